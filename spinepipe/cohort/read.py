@@ -1,0 +1,138 @@
+"""Read a cohort folder, or say everything that is wrong with it."""
+
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+
+import pandas as pd
+
+from spinepipe.cohort.applied_loads import applied_loads
+from spinepipe.cohort.check_bodies import check_bodies
+from spinepipe.cohort.check_geometry import check_geometry
+from spinepipe.cohort.check_header import check_header, usable_vertebrae
+from spinepipe.cohort.check_keys import check_keys
+from spinepipe.cohort.check_loads import check_loads
+from spinepipe.cohort.check_motion import check_motion
+from spinepipe.cohort.check_names import check_names
+from spinepipe.cohort.check_steps import check_steps
+from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.header import CohortHeader
+from spinepipe.cohort.read_table import read_table
+from spinepipe.cohort.read_yaml import Document, read_yaml
+from spinepipe.cohort.validate import validate
+from spinepipe.problems import InputError, Problem
+
+__all__ = ["read"]
+
+
+def read(folder: Path) -> Cohort:
+    """Read and validate one cohort folder.
+
+    Parameters
+    ----------
+    folder : ``config/cohorts/<cohort>``, or any other folder of the same form.
+
+    Raises
+    ------
+    InputError
+        With every problem of every file of the folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        found, allowed = "no such folder", "a folder with cohort.yaml and specimens.csv"
+        raise InputError([Problem(str(folder), None, None, found, allowed, "check the name")])
+    name = folder.resolve().name
+    document, header, problems = _read_header(folder, name)
+    tables, absent = _read_tables(folder, name, problems)
+    draft = Draft(
+        name=name,
+        vertebrae=usable_vertebrae(document) if document else (),
+        gravity=document.data.get("gravity") is True if document else None,
+        tables=tables,
+        absent=absent,
+    )
+    problems += _checks(draft)
+    if problems or header is None:
+        raise InputError(problems)
+    return _cohort(folder, header, tables)
+
+
+def _read_header(
+    folder: Path, name: str
+) -> tuple[Document | None, CohortHeader | None, list[Problem]]:
+    file = f"{name}/{COHORT_YAML}"
+    if not (folder / COHORT_YAML).is_file():
+        return None, None, [_missing(file)]
+    document, problems = read_yaml(folder / COHORT_YAML, file)
+    if document is None:
+        return None, None, problems
+    header, faults = validate(CohortHeader, document)
+    return document, header, [*problems, *faults, *check_header(document, name)]
+
+
+def _read_tables(
+    folder: Path, name: str, problems: list[Problem]
+) -> tuple[dict[str, pd.DataFrame], frozenset[str]]:
+    """Tables by stem and the stems without a file; what is wrong is added to ``problems``."""
+    tables: dict[str, pd.DataFrame] = {}
+    absent = {stem for stem, form in TABLES.items() if not (folder / form.file).is_file()}
+    if "specimens" in absent:
+        problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
+    for stem, form in TABLES.items():
+        if stem not in absent:
+            table, faults = read_table(folder / form.file, form, f"{name}/{form.file}")
+            problems += faults
+            if table is not None:
+                tables[stem] = table
+    return tables, frozenset(absent)
+
+
+def _checks(draft: Draft) -> Iterator[Problem]:
+    applied = list(applied_loads(draft))
+    yield from check_names(draft)
+    yield from check_keys(draft)
+    yield from check_geometry(draft)
+    yield from check_bodies(draft)
+    yield from check_loads(draft, applied)
+    yield from check_steps(draft, applied)
+    yield from check_motion(draft, applied)
+
+
+def _missing(file: str) -> Problem:
+    return Problem(file, None, None, "no such file", "a file of this name", "add it")
+
+
+def _cohort(folder: Path, header: CohortHeader, tables: dict[str, pd.DataFrame]) -> Cohort:
+    final = {stem: _final(stem, tables[stem]) if stem in tables else None for stem in TABLES}
+    specimens = final.pop("specimens")
+    assert specimens is not None, "specimens.csv is required and its absence is a problem"
+    return Cohort(
+        name=header.cohort,
+        **header.model_dump(include={"title", "source", "vertebrae", "gravity"}),
+        zeroed_at_step_0=header.zeroed_at_step_0,
+        measurement_sd=header.measurement_sd,
+        folder=folder,
+        specimens=specimens,
+        digest=_digest(folder),
+        **final,
+    )
+
+
+def _final(stem: str, table: pd.DataFrame) -> pd.DataFrame:
+    """The table without line numbers, whole numbers as such."""
+    table = table.reset_index(drop=True)
+    if stem == "motion":
+        table["cycle"] = table["cycle"].fillna(1.0).astype("int64")
+    if "step" in table:
+        table["step"] = table["step"].astype("int64")
+    return table
+
+
+def _digest(folder: Path) -> str:
+    digest = sha256()
+    for file in sorted([COHORT_YAML, *(form.file for form in TABLES.values())]):
+        if (folder / file).is_file():
+            digest.update(file.encode() + b"\0" + sha256((folder / file).read_bytes()).digest())
+    return digest.hexdigest()

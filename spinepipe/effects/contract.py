@@ -1,0 +1,227 @@
+"""The contract of an effect: what a named component of the model must be able to say.
+
+An effect has a name, declared parameters and one of five kinds. Each kind is a protocol below; an
+effect is a frozen dataclass that satisfies one of them, in one file, entered in the registry.
+Everything is vectorised over the joints in the effect's scope: J joints, P parameters, S states.
+
+Signs. A joint law returns the generalised load that *holds* the joint at q (a spring of stiffness
+k returns +k q, conjugate to each coordinate). A load effect returns the generalised load it
+*applies*; equilibrium is ``holding loads - applied loads = 0``.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Kind(StrEnum):
+    """What an effect acts on."""
+
+    JOINT_LAW = "joint law"
+    LOAD = "load"
+    GEOMETRY = "geometry"
+    PATH = "path"
+    MEASUREMENT = "measurement"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One declared parameter of an effect, in SI units.
+
+    Attributes
+    ----------
+    low, high : bounds that a model file and a fit must respect.
+    default : value at which the effect is usually started.
+    prior_scale : one prior SD; of the natural logarithm when ``logarithmic``.
+    logarithmic : whether fits work with the logarithm (positive, spread over decades).
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: float
+    prior_scale: float
+    logarithmic: bool
+    meaning: str
+
+
+@dataclass(frozen=True)
+class JointResponse:
+    """Generalised load of a law and its derivatives at fixed parameters.
+
+    Attributes
+    ----------
+    load : (J, 6) N and N m.
+    tangent : (J, 6, 6) derivative of the load by the joint's own coordinates.
+    by_carried : (J, 6, 6) derivative by the load of the laws before it, or None for none.
+    """
+
+    load: Array
+    tangent: Array
+    by_carried: Array | None = None
+
+
+@dataclass(frozen=True)
+class Advance:
+    """State after a load step and its derivatives: (J, S), (J, S, 6), (J, S, P), (J, S, S)."""
+
+    state: Array
+    by_coordinate: Array
+    by_parameter: Array
+    by_state: Array
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Coordinates at which the joint laws act, as a function of the joint's coordinates.
+
+    Attributes
+    ----------
+    q : (J, 6) coordinates handed to the laws (m, rad).
+    by_coordinate : (J, 6, 6) first derivative.
+    by_coordinates : (J, 6, 6, 6) second derivative, ``[j, k, a, b]`` of output k by inputs a, b.
+    """
+
+    q: Array
+    by_coordinate: Array
+    by_coordinates: Array
+
+
+@dataclass(frozen=True)
+class PlacementByParameter:
+    """Derivatives of a placement by its parameters: (J, 6, P) and (J, 6, 6, P)."""
+
+    q: Array
+    by_coordinate: Array
+
+
+@dataclass(frozen=True)
+class AppliedLoad:
+    """Generalised load (n,) an effect applies and its tangent (n, n) by the coordinates."""
+
+    load: Array
+    tangent: Array
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Observed coordinates (J, 6) and their derivative (J, 6, 6) by the true ones."""
+
+    q: Array
+    by_coordinate: Array
+
+
+class Motion(Protocol):
+    """The pose of the whole chain, as load effects may ask about it; n = 6 x joints."""
+
+    @property
+    def axes(self) -> Array:
+        """(n, 3) axis of each rotational coordinate in ground, zero for translations."""
+
+    def velocities(self, body: int, point: Array) -> Array:
+        """(n, 3) velocity in ground of a body's point (neutral position, ground, m) by rate."""
+
+    def angular(self, body: int) -> Array:
+        """(n, 3) angular velocity in ground of a body by coordinate rate."""
+
+    def wrench(self, body: int, point: Array, force: Array, moment: Array) -> AppliedLoad:
+        """Generalised load of a ground-fixed force (N) and moment (N m) on a body."""
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """A ground-fixed force (3,) N at a body's point (3,) m (ground, neutral) and moment (3,) N m."""
+
+    body: int
+    point: Array
+    force: Array
+    moment: Array
+
+
+class Effect(Protocol):
+    """What every effect declares. ``per_joint``: one parameter row per joint in scope, or one."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def kind(self) -> Kind: ...
+    @property
+    def per_joint(self) -> bool: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+
+@runtime_checkable
+class JointLaw(Effect, Protocol):
+    """Load and tangent of joints as a function of their own coordinates."""
+
+    def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:
+        """Response at q (J, 6) with parameters (J, P); ``carried`` (J, 6): laws before this one."""
+
+    def by_parameter(self, q: Array, parameters: Array, carried: Array) -> Array:
+        """(J, 6, P) derivative of the load by the parameters at fixed q and carried load."""
+
+
+@runtime_checkable
+class LoadEffect(Effect, Protocol):
+    """A load on the chain besides those listed in the cohort."""
+
+    def apply(self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array) -> AppliedLoad:
+        """Load applied at this pose, given the step's listed wrenches and parameters (R, P)."""
+
+    def by_parameter(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array
+    ) -> Array:
+        """(n, R, P) derivative of the applied load by the parameters at fixed pose."""
+
+
+@runtime_checkable
+class GeometryEffect(Effect, Protocol):
+    """Where in a joint its laws act."""
+
+    def place(self, q: Array, parameters: Array) -> Placement:
+        """Coordinates seen by the laws, with first and second derivatives."""
+
+    def by_parameter(self, q: Array, parameters: Array) -> PlacementByParameter:
+        """Derivatives of the placement by the parameters at fixed q."""
+
+
+@runtime_checkable
+class PathLaw(Effect, Protocol):
+    """A joint law with an internal state that advances once per load step."""
+
+    @property
+    def n_states(self) -> int: ...
+
+    def respond_on_path(
+        self, q: Array, parameters: Array, state: Array, carried: Array
+    ) -> JointResponse:
+        """Response with the state (J, S) as the last load step left it."""
+
+    def by_parameter_on_path(
+        self, q: Array, parameters: Array, state: Array, carried: Array
+    ) -> Array:
+        """(J, 6, P) derivative of the load by the parameters at fixed q and state."""
+
+    def by_state(self, q: Array, parameters: Array, state: Array, carried: Array) -> Array:
+        """(J, 6, S) derivative of the load by the state."""
+
+    def advance(self, q: Array, parameters: Array, state: Array, seconds: float) -> Advance:
+        """State after the step that ended at q and took ``seconds``."""
+
+
+@runtime_checkable
+class MeasurementEffect(Effect, Protocol):
+    """What the instruments report for a true motion."""
+
+    def observe(self, q: Array, parameters: Array) -> Observation:
+        """Reported coordinates (J, 6) for true ones."""
+
+    def by_parameter(self, q: Array, parameters: Array) -> Array:
+        """(J, 6, P) derivative of the reported coordinates by the parameters."""

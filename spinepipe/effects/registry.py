@@ -1,0 +1,48 @@
+"""The registry of effects: name in a model file to class. One file per effect enters itself."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from spinepipe.effects.contract import Effect
+
+EffectClass = TypeVar("EffectClass", bound=type)
+
+_CLASSES: dict[str, type] = {}
+
+
+def register(name: str) -> Callable[[EffectClass], EffectClass]:
+    """Class decorator that enters an effect under the name used in model files and results."""
+
+    def enter(cls: EffectClass) -> EffectClass:
+        if name in _CLASSES:
+            raise ValueError(f"effect {name!r} is registered twice")
+        _CLASSES[name] = cls
+        return cls
+
+    return enter
+
+
+def registered() -> Mapping[str, type]:
+    """Read-only view of all registered effects, by name."""
+    return MappingProxyType(_CLASSES)
+
+
+def create(name: str, options: Mapping[str, Any] | None = None) -> Effect:
+    """The effect of that name with its options.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name or option, with what is allowed.
+    """
+    if name not in _CLASSES:
+        raise ValueError(f"unknown effect {name!r}; known: {', '.join(sorted(_CLASSES))}")
+    cls = _CLASSES[name]
+    allowed = [field.name for field in fields(cls)]
+    unknown = sorted(set(options or {}) - set(allowed))
+    if unknown:
+        raise ValueError(f"effect {name!r} has no option {unknown[0]!r}; allowed: {allowed}")
+    effect: Effect = cls(**(options or {}))
+    return effect

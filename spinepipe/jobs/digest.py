@@ -1,0 +1,142 @@
+"""Digests that decide what must be computed again: of code (its meaning, not its text) and of values.
+
+Snakemake sees neither imported modules nor parts of a configuration, so the rules carry these
+digests in their `params`.
+"""
+
+import ast
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+_ROOT = Path(__file__).resolve().parents[2]
+_PACKAGE = "spinepipe"
+_DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json")
+
+
+@cache
+def code_digest(module: str) -> str:
+    """sha256 over a module and everything of spinepipe that it imports, directly or not.
+
+    Comments, docstrings, layout and the version number do not count. The data files that lie
+    beside an imported module (published values) do. Imports are followed where they are written,
+    also inside functions; a module loaded by a computed name is not seen.
+
+    Parameters
+    ----------
+    module
+        Dotted name, for example ``spinepipe.jobs.calibrate``.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        When the module is not part of this package.
+    """
+    if _source(module) is None:
+        raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
+    closure = _closure(module)
+    lines = [f"{name} {_meaning(name)}" for name in sorted(closure)]
+    lines += [_bytes_digest(path) for path in _data_files(closure)]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def value_digest(*values: Any) -> str:
+    """sha256 over plain values (what JSON can hold), independent of the order of keys."""
+    text = json.dumps(values, sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _closure(module: str) -> set[str]:
+    """The module, its packages and all spinepipe modules they import in turn."""
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting.extend(_imports(name))
+    return found
+
+
+@cache
+def _source(module: str) -> Path | None:
+    """The file of a module of this package, or None if there is no such module."""
+    base = _ROOT.joinpath(*module.split("."))
+    for path in (base / "__init__.py", base.with_suffix(".py")):
+        if path.is_file():
+            return path
+    return None
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    path = _source(module)
+    return ast.parse(path.read_bytes()) if path else ast.Module(body=[], type_ignores=[])
+
+
+@cache
+def _imports(module: str) -> frozenset[str]:
+    """Modules of spinepipe named in the import statements of one module, and its packages."""
+    names: set[str] = set(_parents(module))
+    for node in ast.walk(_tree(module)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(module, node)
+            names.add(base)
+            names.update(f"{base}.{alias.name}" for alias in node.names)
+    ours = {name for name in names if name.split(".")[0] == _PACKAGE}
+    with_packages = ours | {parent for name in ours for parent in _parents(name)}
+    return frozenset(name for name in with_packages if _source(name))
+
+
+def _parents(module: str) -> list[str]:
+    parts = module.split(".")
+    return [".".join(parts[:count]) for count in range(1, len(parts))]
+
+
+def _absolute(module: str, node: ast.ImportFrom) -> str:
+    """The full name of what `from ... import` names, with leading dots resolved."""
+    if not node.level:
+        return node.module or ""
+    path = _source(module)
+    drop = node.level - (1 if path and path.name == "__init__.py" else 0)
+    parts = module.split(".")
+    return ".".join(parts[: len(parts) - drop] + ([node.module] if node.module else []))
+
+
+@cache
+def _meaning(module: str) -> str:
+    """Digest of one module's syntax tree without docstrings and version number."""
+    tree = _tree(module)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [entry for entry in body if not _is_cosmetic(entry)]  # type: ignore[attr-defined]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_cosmetic(node: ast.stmt) -> bool:
+    """A bare string (docstring) or the assignment of ``__version__``."""
+    if isinstance(node, ast.Assign):
+        return any(isinstance(to, ast.Name) and to.id == "__version__" for to in node.targets)
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def _data_files(modules: set[str]) -> list[Path]:
+    """Data files beside the modules, in a fixed order."""
+    folders = {path.parent for name in modules if (path := _source(name))}
+    files = (file for folder in folders for file in folder.iterdir())
+    return sorted(file for file in files if file.suffix in _DATA_SUFFIXES)
+
+
+@cache
+def _bytes_digest(path: Path) -> str:
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return f"{path.relative_to(_ROOT).as_posix()} {digest}"

@@ -1,0 +1,23 @@
+"""The model room: what a spine model is, its YAML, its URDF and its OpenSim export."""
+
+from spinepipe.model.spine import (
+    MOST_JOINTS,
+    STANDARD_GRAVITY,
+    Body,
+    LoadCase,
+    LoadStep,
+    RefusedModel,
+    ScopedEffect,
+    SpineModel,
+)
+
+__all__ = [
+    "MOST_JOINTS",
+    "STANDARD_GRAVITY",
+    "Body",
+    "LoadCase",
+    "LoadStep",
+    "RefusedModel",
+    "ScopedEffect",
+    "SpineModel",
+]

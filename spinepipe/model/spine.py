@@ -1,0 +1,158 @@
+"""The spine model: rigid vertebrae on six-coordinate joints, with named effects. SI throughout."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from spinepipe.effects import Effect, Wrench
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+
+STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
+"""m/s2 in ground axes: y points up."""
+
+MOST_JOINTS = 20
+"""Beyond 120 coordinates PyBullet's answers are silently wrong."""
+
+
+class RefusedModel(ValueError):
+    """A model that no solver should be given; the message says what and why."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A vertebra with what is fixed to it.
+
+    Attributes
+    ----------
+    mass : kg. com : (3,) centre of mass, m; inertia : (3, 3) about it, kg m2; both in ground axes
+    at the neutral pose.
+    """
+
+    name: str
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True)
+class ScopedEffect:
+    """An effect at work: on which joints, with which parameter values.
+
+    Attributes
+    ----------
+    joints : indices into the model's joints.
+    values : (R, P) one row per joint in scope, or one row when the effect is not per joint.
+    tests : names of the tests in scope; ``("*",)`` for all.
+    """
+
+    effect: Effect
+    joints: tuple[int, ...]
+    values: Array
+    tests: tuple[str, ...] = ("*",)
+
+    def in_scope(self, test: str) -> bool:
+        """Whether the effect acts in this test."""
+        return self.tests == ("*",) or test in self.tests
+
+    def with_values(self, values: Array) -> "ScopedEffect":
+        """The same effect with other parameter values (R, P)."""
+        return replace(self, values=values)
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """Loads of one step of a test; ``time`` in s where the test records it."""
+
+    step: int
+    wrenches: tuple[Wrench, ...]
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """One cycle of one test: its load steps in the order in which they were applied."""
+
+    test: str
+    cycle: int
+    steps: tuple[LoadStep, ...]
+
+
+@dataclass(frozen=True)
+class SpineModel:
+    """A serial chain, caudal to cranial; the lowest vertebra is ground.
+
+    Attributes
+    ----------
+    joints : names, e.g. ``("L3L4", "L2L3")``; joint j carries ``bodies[j]``.
+    frames : joint frames in ground, neutral pose.
+    gravity : (3,) m/s2 in ground.
+    damping : (J, 6) N s/m and N m s/rad, resisting each coordinate's rate.
+    """
+
+    specimen: str
+    joints: tuple[str, ...]
+    frames: tuple[Pose, ...]
+    bodies: tuple[Body, ...]
+    gravity: Array
+    damping: Array
+    effects: tuple[ScopedEffect, ...]
+
+    def __post_init__(self) -> None:
+        problem = _problem(self)
+        if problem:
+            raise RefusedModel(f"{self.specimen}: {problem}")
+
+    @cached_property
+    def n_joints(self) -> int:
+        """Number of joints J; the model has 6 J coordinates."""
+        return len(self.joints)
+
+    def with_effects(self, effects: tuple[ScopedEffect, ...]) -> "SpineModel":
+        """The same geometry and bodies with other effects."""
+        return replace(self, effects=effects)
+
+    def with_frames(self, frames: tuple[Pose, ...]) -> "SpineModel":
+        """The same bodies and effects with other joint frames."""
+        return replace(self, frames=frames)
+
+
+def _problem(model: SpineModel) -> str | None:
+    """The first reason to refuse a model, or None."""
+    n = len(model.joints)
+    if not 1 <= n <= MOST_JOINTS:
+        return f"{n} joints; 1 to {MOST_JOINTS} are allowed (PyBullet is wrong beyond)"
+    if not len(model.frames) == len(model.bodies) == len(model.damping) == n:
+        return "joints, frames, bodies and damping differ in number"
+    for joint, frame in zip(model.joints, model.frames, strict=True):
+        if not (np.isfinite(frame.origin).all() and np.isfinite(frame.rotation).all()):
+            return f"the frame of joint {joint} is not finite"
+    return _body_problem(model) or _effect_problem(model)
+
+
+def _body_problem(model: SpineModel) -> str | None:
+    for body in model.bodies:
+        numbers = np.concatenate([[body.mass], body.com, body.inertia.ravel()])
+        if not np.isfinite(numbers).all() or body.mass < 0.0:
+            return f"body {body.name}: mass, centre and inertia must be finite, mass not negative"
+        if body.mass == 0.0 and np.any(model.gravity):
+            return f"body {body.name} has no mass, but gravity is on"
+    return None
+
+
+def _effect_problem(model: SpineModel) -> str | None:
+    for scoped in model.effects:
+        rows = len(scoped.joints) if scoped.effect.per_joint else 1
+        declared = scoped.effect.parameters
+        if scoped.values.shape != (rows, len(declared)):
+            return f"effect {scoped.effect.name}: values must be {rows} x {len(declared)}"
+        for column, parameter in zip(scoped.values.T, declared, strict=True):
+            inside = (column >= parameter.low) & (column <= parameter.high)
+            if not inside.all():
+                found = column[~inside][0]
+                return (
+                    f"effect {scoped.effect.name}: {parameter.name} is {found:.6g} "
+                    f"{parameter.unit}, allowed {parameter.low:.3g} to {parameter.high:.3g}"
+                )
+    return None

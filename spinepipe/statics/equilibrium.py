@@ -1,0 +1,128 @@
+"""Equilibrium by Newton with the exact tangent, continued along the load when it must be."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.statics.holding import States
+from spinepipe.statics.linear import Factored, SingularTangent, factor
+from spinepipe.statics.loading import Loading
+from spinepipe.statics.stability import stability
+from spinepipe.statics.status import Status
+from spinepipe.statics.system import System
+
+MOST_ITERATIONS = 12
+SMALLEST_FRACTION = 1.0 / 1024.0
+"""Continuation gives up when a load increment this small does not contract."""
+
+LARGEST_ROTATION = np.deg2rad(80.0)
+"""Rotations beyond this are no joint motion and near the singularity of Z, X', Y''."""
+
+# Newton squares its error: once a step is below these, the next would be below rounding.
+STEP_TOLERANCE = np.tile([1e-11] * 3 + [1e-9] * 3, 1)
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """End of a solve.
+
+    Attributes
+    ----------
+    q : (n,) m and rad; the last stable pose when the status is not converged.
+    factored : LU of the tangent there, or None.
+    iterations : Newton iterations in all. reached : fraction of the load increment carried.
+    """
+
+    q: Array
+    factored: Factored | None
+    status: Status
+    message: str
+    iterations: int
+    reached: float
+
+
+@dataclass(frozen=True)
+class _Newton:
+    q: Array
+    factored: Factored
+    tangent: Array
+    iterations: int
+
+
+def solve(
+    system: System, start: Array, loading_from: Loading, loading_to: Loading, states: States
+) -> Equilibrium:
+    """Equilibrium under ``loading_to``, starting from the one at ``start`` under ``loading_from``.
+
+    The full increment is tried first; if Newton does not contract or ends unstable, the load is
+    continued in fractions that halve on failure and double on success.
+    """
+    direct = _newton(system, start, loading_to, states)
+    if direct is not None and _stable(system, direct):
+        return _converged(direct, direct.iterations)
+    return _continue(system, start, loading_from, loading_to, states)
+
+
+def _continue(
+    system: System, start: Array, loading_from: Loading, loading_to: Loading, states: States
+) -> Equilibrium:
+    reached, increment, iterations = 0.0, 0.25, 0
+    last: _Newton | None = None
+    while reached < 1.0:
+        target = min(1.0, reached + increment)
+        loading = loading_from.towards(loading_to, target)
+        q = start if last is None else last.q
+        found = _newton(system, q, loading, states)
+        iterations += MOST_ITERATIONS if found is None else found.iterations
+        if found is not None and _stable(system, found):
+            last, reached, increment = found, target, 2.0 * increment
+        elif increment > SMALLEST_FRACTION:
+            increment *= 0.5
+        else:
+            return _stopped(start if last is None else last.q, found, reached, iterations)
+    assert last is not None
+    return _converged(last, iterations)
+
+
+def _converged(found: _Newton, iterations: int) -> Equilibrium:
+    return Equilibrium(found.q, found.factored, Status.CONVERGED, "", iterations, 1.0)
+
+
+def _stopped(q: Array, found: _Newton | None, reached: float, iterations: int) -> Equilibrium:
+    """Continuation stalled: past the last stable pose there is an unstable one, or none near."""
+    share = f"{100.0 * reached:.1f} % of the load increment"
+    if found is not None:
+        message = f"the segment loses stability beyond {share}"
+        return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
+    message = f"no equilibrium near the last one beyond {share}: it tips over or snaps"
+    return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
+
+
+def _newton(system: System, start: Array, loading: Loading, states: States) -> _Newton | None:
+    """Newton from ``start``; None unless the steps contract onto a pose within joint motion."""
+    q, last = start, np.inf
+    tolerance = np.tile(STEP_TOLERANCE, system.model.n_joints)
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        balance = system.balance(q, loading, states)
+        try:
+            factored = factor(balance.tangent)
+        except SingularTangent:
+            return None
+        step = factored.solve(-balance.residual)
+        size = float(np.max(np.abs(step) / tolerance))
+        q = q + step
+        if not size < 4.0 * last or _beyond_motion(q):
+            return None
+        if size < 1.0:
+            return _Newton(q, factored, balance.tangent, iteration)
+        last = size
+    return None
+
+
+def _beyond_motion(q: Array) -> bool:
+    return bool(np.abs(q.reshape(-1, 6)[:, 3:]).max() > LARGEST_ROTATION)
+
+
+def _stable(system: System, found: _Newton) -> bool:
+    return stability(system.chain, found.q, found.tangent, found.factored.sign).stable

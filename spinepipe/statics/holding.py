@@ -1,0 +1,124 @@
+"""What the joints hold: the joint and path laws of a model summed, with all derivatives.
+
+Laws act in the model's order; a law may depend on the load of those before it (``carried``), so
+derivatives of earlier laws pass through later ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects import JointLaw, JointResponse, PathLaw
+from spinepipe.effects.contract import Array
+from spinepipe.statics.placement import Placed
+
+States = dict[int, Array]
+"""Internal state (J, S) of each path law, by its place in the model's effects."""
+
+
+@dataclass(frozen=True)
+class ActiveLaw:
+    """A joint or path law at work: its place in the model's effects, its joints and values."""
+
+    index: int
+    effect: JointLaw | PathLaw
+    joints: Array
+    values: Array
+
+    def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
+        """Response of the joints in scope."""
+        if self.index in states:
+            return self.effect.respond_on_path(q, self.values, states[self.index], carried)  # type: ignore[union-attr]
+        return self.effect.respond(q, self.values, carried)  # type: ignore[union-attr]
+
+    def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
+        """(J, 6, P) derivative by the parameters of each joint in scope."""
+        if self.index in states:
+            return self.effect.by_parameter_on_path(q, self.values, states[self.index], carried)  # type: ignore[union-attr]
+        return self.effect.by_parameter(q, self.values, carried)  # type: ignore[union-attr]
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Generalised load (J, 6) that holds the joints and its tangent blocks (J, 6, 6)."""
+
+    load: Array
+    tangent: Array
+
+
+def hold(placed: Placed, laws: Sequence[ActiveLaw], states: States, moved: bool) -> Holding:
+    """Sum of the laws, pulled back to the joints' own coordinates where geometry moved them."""
+    load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
+    for law in laws:
+        j = law.joints
+        response = law.respond(placed.q[j], load[j], states)
+        if response.by_carried is not None:
+            tangent[j] += response.by_carried @ tangent[j]
+        tangent[j] += response.tangent
+        load[j] += response.load
+    if not moved:
+        return Holding(load, tangent)
+    first = placed.by_coordinate
+    pulled = np.einsum("jka,jk->ja", first, load)
+    stiff = np.einsum("jka,jkl,jlb->jab", first, tangent, first)
+    return Holding(pulled, stiff + np.einsum("jk,jkab->jab", load, placed.by_coordinates))
+
+
+@dataclass(frozen=True)
+class HoldingDerivatives:
+    """Derivatives of the holding load at fixed coordinates.
+
+    Attributes
+    ----------
+    by_parameter : effect index to (J, 6, R, P). by_state : path law index to (J, 6, R, S).
+    """
+
+    by_parameter: dict[int, Array]
+    by_state: dict[int, Array]
+
+
+def differentiate(
+    placed: Placed, laws: Sequence[ActiveLaw], states: States
+) -> HoldingDerivatives:
+    """Derivatives by every parameter and internal state, geometry effects included."""
+    load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
+    by_parameter: dict[int, Array] = {}
+    by_state: dict[int, Array] = {}
+    for law in laws:
+        j, here, carried = law.joints, placed.q[law.joints], load[law.joints]
+        response = law.respond(here, carried, states)
+        if response.by_carried is not None:
+            _pass_on(by_parameter, by_state, j, response.by_carried)
+            tangent[j] += response.by_carried @ tangent[j]
+        by_parameter[law.index] = _spread(law, law.by_parameter(here, carried, states), len(load))
+        if isinstance(law.effect, PathLaw):
+            own = law.effect.by_state(here, law.values, states[law.index], carried)
+            by_state[law.index] = _spread(law, own, len(load))
+        tangent[j] += response.tangent
+        load[j] += response.load
+    pull = placed.by_coordinate
+    by_parameter = {i: np.einsum("jka,jkrp->jarp", pull, d) for i, d in by_parameter.items()}
+    by_state = {i: np.einsum("jka,jkrp->jarp", pull, d) for i, d in by_state.items()}
+    for index, (dq, dfirst) in placed.by_parameter.items():
+        by_parameter[index] = np.einsum("jkarp,jk->jarp", dfirst, load) + np.einsum(
+            "jka,jkl,jlrp->jarp", pull, tangent, dq
+        )
+    return HoldingDerivatives(by_parameter, by_state)
+
+
+def _pass_on(
+    by_parameter: dict[int, Array], by_state: dict[int, Array], joints: Array, by_carried: Array
+) -> None:
+    """Earlier laws' derivatives also act through a later law that reads the carried load."""
+    for derivatives in (by_parameter, by_state):
+        for derivative in derivatives.values():
+            derivative[joints] += np.einsum("jkl,jlrp->jkrp", by_carried, derivative[joints])
+
+
+def _spread(law: ActiveLaw, own: Array, n_joints: int) -> Array:
+    """(J, 6, R, P) from (R, 6, P): each joint in scope has its own row of parameters."""
+    spread = np.zeros((n_joints, 6, len(law.joints), own.shape[2]))
+    rows = np.arange(len(law.joints))
+    spread[law.joints, :, rows] = own
+    return spread

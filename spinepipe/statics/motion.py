@@ -1,0 +1,74 @@
+"""The chain at one pose: velocities of points, generalised loads of wrenches and their tangents.
+
+With v_i and a_i the linear and angular velocity of a body's point by coordinate i (a_i zero for
+translations), the exact tangents on a serial chain are
+
+    d(v_i . f) / dq_j = f . (a_min(i,j) x v_max(i,j))
+    d(a_i . m) / dq_j = m . (a_j x a_i)  for j < i, else 0
+
+so a constant force has a symmetric tangent and a constant moment has not.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from spinepipe.effects.contract import AppliedLoad, Array
+from spinepipe.world import Chain
+
+
+def cross_matrix(vector: Array) -> Array:
+    """(3, 3) matrix W with ``W @ u = vector x u``."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+class ChainMotion:
+    """Implements `spinepipe.effects.Motion` on a loaded chain at coordinates q (n,)."""
+
+    def __init__(self, chain: Chain, q: Array) -> None:
+        self.chain = chain
+        self.q = q
+
+    @cached_property
+    def axes(self) -> Array:
+        """(n, 3) axis of each rotational coordinate in ground, zero for translations."""
+        return self._jacobian(self.chain.model.n_joints - 1, np.zeros(3))[1]
+
+    @cached_property
+    def mass_velocity(self) -> Array:
+        """(n, 3) kg: generalised weight per unit of gravity along each axis."""
+        return self.chain.mass_velocity(self.q)
+
+    def velocities(self, body: int, point: Array) -> Array:
+        """(n, 3) velocity of the body's point (neutral position in ground, m)."""
+        return self._jacobian(body, self.chain.local_point(body, point))[0]
+
+    def angular(self, body: int) -> Array:
+        """(n, 3) angular velocity of a body: the axes of the coordinates that carry it."""
+        carried = self.axes.copy()
+        carried[6 * (body + 1) :] = 0.0
+        return carried
+
+    def wrench(self, body: int, point: Array, force: Array, moment: Array) -> AppliedLoad:
+        """Generalised load (n,) of a ground-fixed wrench and its tangent (n, n)."""
+        velocities, angular = self.velocities(body, point), self.angular(body)
+        load = velocities @ force + angular @ moment
+        return AppliedLoad(
+            load, force_tangent(self.axes, velocities, force) + moment_tangent(angular, moment)
+        )
+
+    def _jacobian(self, body: int, local_point: Array) -> tuple[Array, Array]:
+        return self.chain.jacobian(self.q, body, local_point)
+
+
+def force_tangent(axes: Array, velocities: Array, force: Array) -> Array:
+    """(n, n) tangent of the generalised load of a constant force (3,)."""
+    products = (axes @ cross_matrix(force).T) @ velocities.T
+    upper = np.triu(products)
+    return upper + np.triu(products, 1).T
+
+
+def moment_tangent(angular: Array, moment: Array) -> Array:
+    """(n, n) tangent of the generalised load of a constant moment (3,): not symmetric."""
+    return np.tril(angular @ (angular @ cross_matrix(moment).T).T, -1)

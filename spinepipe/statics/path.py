@@ -1,0 +1,77 @@
+"""A case step by step: each equilibrium starts from the last, path states advance in between."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects import Advance, PathLaw
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadStep
+from spinepipe.statics.equilibrium import Equilibrium, solve
+from spinepipe.statics.holding import States
+from spinepipe.statics.loading import Loading
+from spinepipe.statics.status import Status
+from spinepipe.statics.system import System
+
+
+@dataclass(frozen=True)
+class SolvedStep:
+    """One load step: the pose it ended in and what was needed to get there.
+
+    Attributes
+    ----------
+    states : path states that acted during the step. advances : how they moved on after it.
+    """
+
+    step: LoadStep
+    loading: Loading
+    equilibrium: Equilibrium
+    states: States
+    advances: dict[int, Advance]
+
+    @property
+    def usable(self) -> bool:
+        """Whether the pose is an equilibrium."""
+        return self.equilibrium.status.usable
+
+
+def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedStep]:
+    """Solve all steps of the system's case in order.
+
+    After a step without a stable equilibrium the rest is not tried: their rows carry the status
+    and say so.
+
+    Parameters
+    ----------
+    guesses : (n,) poses close to the solutions, one per step, from a neighbouring problem.
+    """
+    solved: list[SolvedStep] = []
+    q, before, states = np.zeros(system.chain.n), system.slots.unloaded(), system.initial_states()
+    seconds = 0.0
+    for number, step in enumerate(system.case.steps):
+        loading = system.slots.loading(step.wrenches)
+        if solved and not solved[-1].usable:
+            equilibrium = replace(solved[-1].equilibrium, message="an earlier load step failed")
+            solved.append(SolvedStep(step, loading, equilibrium, states, {}))
+            continue
+        start = q if guesses is None else guesses[number]
+        equilibrium = solve(system, start, before, loading, states)
+        if equilibrium.status is not Status.CONVERGED and guesses is not None:
+            equilibrium = solve(system, q, before, loading, states)
+        advances = _advance(system, equilibrium.q, states, (step.time or 0.0) - seconds)
+        solved.append(SolvedStep(step, loading, equilibrium, states, advances))
+        q, before, seconds = equilibrium.q, loading, step.time or 0.0
+        states = {index: advance.state for index, advance in advances.items()}
+    return solved
+
+
+def _advance(system: System, q: Array, states: States, seconds: float) -> dict[int, Advance]:
+    """States after a step that ended at q (n,)."""
+    joints = q.reshape(-1, 6)
+    if system.geometry:
+        joints = system.placed(q, with_parameters=False).q
+    return {
+        law.index: law.effect.advance(joints[law.joints], law.values, states[law.index], seconds)
+        for law in system.laws
+        if isinstance(law.effect, PathLaw)
+    }

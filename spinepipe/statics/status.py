@@ -1,0 +1,18 @@
+"""How a solve ended: stored beside the numbers, with a message in plain words."""
+
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """Outcome of an equilibrium, a settling run or a fit."""
+
+    CONVERGED = "converged"
+    CONVERGED_AT_BOUND = "converged_at_bound"
+    UNSTABLE = "unstable"
+    NOT_CONVERGED = "not_converged"
+    REFUSED = "refused"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the numbers beside it are a solution."""
+        return self in (Status.CONVERGED, Status.CONVERGED_AT_BOUND)

@@ -1,0 +1,138 @@
+"""A model under one test, ready to be solved: residual and exact tangent at any pose."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects import GeometryEffect, JointLaw, LoadEffect, MeasurementEffect, PathLaw
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase, SpineModel
+from spinepipe.statics.holding import ActiveLaw, Holding, HoldingDerivatives, States, hold
+from spinepipe.statics.holding import differentiate as differentiate_holding
+from spinepipe.statics.loading import Loading, Slots
+from spinepipe.statics.motion import ChainMotion, cross_matrix
+from spinepipe.statics.placement import ActiveGeometry, Placed, place
+from spinepipe.world import Chain
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Residual r (n,), what the joints hold less what is applied, and K = dr/dq (n, n)."""
+
+    residual: Array
+    tangent: Array
+
+
+@dataclass(frozen=True)
+class ActiveEffect:
+    """A load or measurement effect at work."""
+
+    index: int
+    effect: LoadEffect | MeasurementEffect
+    joints: Array
+    values: Array
+
+
+class System:
+    """Effects of a model that are in scope of a case, on a loaded chain."""
+
+    def __init__(self, chain: Chain, model: SpineModel, case: LoadCase) -> None:
+        self.chain, self.model, self.case = chain, model, case
+        self.slots = Slots.of(case)
+        self.local_points = [chain.local_point(b, np.array(p)) for b, p in self.slots.places]
+        self.geometry: list[ActiveGeometry] = []
+        self.laws: list[ActiveLaw] = []
+        self.load_effects: list[ActiveEffect] = []
+        self.measurement: list[ActiveEffect] = []
+        for index, scoped in enumerate(model.effects):
+            if scoped.in_scope(case.test):
+                self._activate(index, scoped.effect, np.array(scoped.joints), scoped.values)
+        self._blocks = _block_indices(model.n_joints)
+
+    def _activate(self, index: int, effect: object, joints: Array, values: Array) -> None:
+        if isinstance(effect, JointLaw | PathLaw):
+            self.laws.append(ActiveLaw(index, effect, joints, values))
+        elif isinstance(effect, GeometryEffect):
+            self.geometry.append(ActiveGeometry(index, effect, joints, values))
+        elif isinstance(effect, LoadEffect):
+            self.load_effects.append(ActiveEffect(index, effect, joints, values))
+        elif isinstance(effect, MeasurementEffect):
+            self.measurement.append(ActiveEffect(index, effect, joints, values))
+        else:
+            raise TypeError(f"{effect!r} satisfies none of the five protocols of an effect")
+
+    def initial_states(self) -> States:
+        """States (J, S) of all path laws before the first step: zero."""
+        return {
+            law.index: np.zeros((len(law.joints), law.effect.n_states))
+            for law in self.laws
+            if isinstance(law.effect, PathLaw)
+        }
+
+    def balance(self, q: Array, loading: Loading, states: States) -> Balance:
+        """Residual and tangent at q (n,)."""
+        motion = ChainMotion(self.chain, q)
+        holding = self._hold(q, states)
+        applied, tangent = self._apply(motion, loading)
+        stiffness = -tangent
+        stiffness[self._blocks] += holding.tangent
+        return Balance(holding.load.ravel() - applied, stiffness)
+
+    def placed(self, q: Array, with_parameters: bool) -> Placed:
+        """Coordinates seen by the laws at q (n,)."""
+        return place(q.reshape(-1, 6), self.geometry, with_parameters)
+
+    def _hold(self, q: Array, states: States) -> Holding:
+        if not self.geometry:
+            unmoved = Placed(q.reshape(-1, 6), _NOTHING, _NOTHING, {})
+            return hold(unmoved, self.laws, states, moved=False)
+        return hold(self.placed(q, with_parameters=False), self.laws, states, moved=True)
+
+    def _apply(self, motion: ChainMotion, loading: Loading) -> tuple[Array, Array]:
+        """Generalised applied load (n,) and its tangent (n, n)."""
+        gravity = loading.share * self.model.gravity
+        load = np.zeros(self.chain.n)
+        symmetric = np.zeros((self.chain.n, self.chain.n))
+        lower = np.zeros_like(symmetric)
+        axes = motion.axes
+        if np.any(gravity):
+            load += motion.mass_velocity @ gravity
+            symmetric += (axes @ cross_matrix(gravity).T) @ motion.mass_velocity.T
+        for slot, (body, _) in enumerate(self.slots.places):
+            force, moment = loading.forces[slot], loading.moments[slot]
+            if force.any():
+                velocities = self.chain.jacobian(motion.q, body, self.local_points[slot])[0]
+                load += velocities @ force
+                symmetric += (axes @ cross_matrix(force).T) @ velocities.T
+            if moment.any():
+                angular = motion.angular(body)
+                load += angular @ moment
+                lower += angular @ (angular @ cross_matrix(moment).T).T
+        tangent = np.triu(symmetric) + np.triu(symmetric, 1).T + np.tril(lower, -1)
+        for active in self.load_effects:
+            response = active.effect.apply(motion, self.slots.wrenches(loading), active.values)  # type: ignore[union-attr]
+            load += loading.share * response.load
+            tangent += loading.share * response.tangent
+        return load, tangent
+
+    def derivatives(self, q: Array, states: States) -> HoldingDerivatives:
+        """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""
+        return differentiate_holding(self.placed(q, with_parameters=True), self.laws, states)
+
+    def load_derivative(self, q: Array, loading: Loading, active: ActiveEffect) -> Array:
+        """(n, R, P) derivative of the residual by a load effect's parameters."""
+        motion = ChainMotion(self.chain, q)
+        wrenches = self.slots.wrenches(loading)
+        by_parameter: Array = active.effect.by_parameter(motion, wrenches, active.values)  # type: ignore[union-attr, call-arg, arg-type]
+        return -loading.share * by_parameter
+
+
+_NOTHING = np.empty(0)
+
+
+def _block_indices(n_joints: int) -> tuple[Array, Array]:
+    """Index arrays (J, 6, 6) of the diagonal blocks of an (n, n) matrix."""
+    at = np.arange(6 * n_joints).reshape(-1, 6)
+    rows = np.repeat(at[:, :, None], 6, axis=2)
+    columns = np.repeat(at[:, None, :], 6, axis=1)
+    return rows, columns

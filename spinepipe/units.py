@@ -1,0 +1,43 @@
+"""Units at the border: degrees and millimetres in files and tables, SI inside the code."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+COORDINATES = (
+    "anterior",
+    "superior",
+    "right",
+    "extension",
+    "right_bending",
+    "left_rotation",
+)
+"""The six coordinates of a joint, in the order used everywhere."""
+
+TRANSLATIONS = COORDINATES[:3]
+ROTATIONS = COORDINATES[3:]
+
+MM_PER_M = 1000.0
+DEG_PER_RAD = float(np.rad2deg(1.0))
+
+BORDER_PER_SI = np.array([MM_PER_M] * 3 + [DEG_PER_RAD] * 3)
+"""(6,) what one SI unit of each coordinate is in file units (mm, deg)."""
+
+COORDINATE_COLUMNS = tuple(
+    f"{name}_{'mm' if name in TRANSLATIONS else 'deg'}" for name in COORDINATES
+)
+"""Column names of the six coordinates in files and tables."""
+
+STIFFNESS_COLUMNS = tuple(
+    f"{name}_{'n_per_m' if name in TRANSLATIONS else 'nm_per_rad'}" for name in COORDINATES
+)
+"""Column names of the six stiffnesses in files and tables."""
+
+
+def to_si(coordinates: ArrayLike) -> NDArray[np.float64]:
+    """(…, 6) coordinates in mm and deg to m and rad."""
+    return np.asarray(coordinates, dtype=float) / BORDER_PER_SI
+
+
+def from_si(coordinates: ArrayLike) -> NDArray[np.float64]:
+    """(…, 6) coordinates in m and rad to mm and deg."""
+    return np.asarray(coordinates, dtype=float) * BORDER_PER_SI

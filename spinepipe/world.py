@@ -1,0 +1,180 @@
+"""The only file that imports pybullet: rigid-body terms of a model, guarded against its traps.
+
+One client per process, reset before each model: removing and reloading a body leaves stale
+dynamics behind. Link poses are never read (single precision in part); every quantity comes from
+inverse dynamics, Jacobians or the mass matrix, which are exact to rounding.
+"""
+
+import contextlib
+import ctypes
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.model.spine import RefusedModel, SpineModel
+from spinepipe.model.urdf import urdf
+
+
+
+@contextlib.contextmanager
+def _silent_stdout() -> Iterator[None]:
+    """Swallow what C code prints: PyBullet greets on import."""
+    sys.stdout.flush()
+    saved, sink = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, 1)
+    try:
+        yield
+        ctypes.CDLL(None).fflush(None)
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
+        os.close(sink)
+
+
+with _silent_stdout():
+    import pybullet
+
+_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
+_LAST_LINK = 5
+_UNIT_GRAVITY = np.eye(3)
+
+
+class StaleChain(RuntimeError):
+    """A chain was used after another model had been loaded into the same client."""
+
+
+class _Client:
+    """The process's one physics client and the count of models it has been given."""
+
+    def __init__(self) -> None:
+        self.id = pybullet.connect(pybullet.DIRECT)
+        self.generation = 0
+        self.folder = tempfile.TemporaryDirectory(prefix="spinepipe-urdf-")
+
+    def load(self, model: SpineModel) -> int:
+        """Reset and load; the file name is new each time, PyBullet caches by name."""
+        pybullet.resetSimulation(physicsClientId=self.id)
+        self.generation += 1
+        path = Path(self.folder.name) / f"{os.getpid()}-{self.generation}.urdf"
+        path.write_text(urdf(model), encoding="ascii")
+        try:
+            body = pybullet.loadURDF(
+                str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=self.id
+            )
+        except pybullet.error as error:
+            raise RefusedModel(f"{model.specimen}: PyBullet refused the model ({error})") from error
+        finally:
+            path.unlink()
+        return int(body)
+
+
+@cache
+def _client_of(_process: int) -> _Client:
+    return _Client()
+
+
+class Chain:
+    """Rigid-body terms of one loaded model; n = 6 x joints coordinates, SI, ground axes."""
+
+    def __init__(self, model: SpineModel) -> None:
+        """Load the model, replacing whatever the process had loaded.
+
+        Raises
+        ------
+        RefusedModel
+            When PyBullet does not take it.
+        """
+        self._client = _client_of(os.getpid())
+        self._body = self._client.load(model)
+        self._generation = self._client.generation
+        self.model = model
+        self.n = 6 * model.n_joints
+        self._zero = [0.0] * self.n
+        self._principal = [self._principal_axes(j) for j in range(model.n_joints)]
+        self._gravity_now: tuple[float, ...] | None = None
+
+    def _ready(self) -> None:
+        if self._client.generation != self._generation:
+            raise StaleChain("another model was loaded since; load this one again")
+
+    def _principal_axes(self, body: int) -> Array:
+        """(3, 3) principal axes of inertia in the joint frame.
+
+        PyBullet measures a Jacobian's local point from the link's origin, but along these axes.
+        """
+        info = pybullet.getDynamicsInfo(
+            self._body, 6 * body + _LAST_LINK, physicsClientId=self._client.id
+        )
+        return np.array(pybullet.getMatrixFromQuaternion(info[4])).reshape(3, 3)
+
+    def _set_gravity(self, gravity: Array) -> None:
+        wanted = tuple(gravity.tolist())
+        if wanted != self._gravity_now:
+            pybullet.setGravity(*wanted, physicsClientId=self._client.id)
+            self._gravity_now = wanted
+
+    def _inverse_dynamics(self, q: list[float], rate: list[float]) -> tuple[float, ...]:
+        load: tuple[float, ...] = pybullet.calculateInverseDynamics(
+            self._body, q, rate, self._zero, physicsClientId=self._client.id
+        )
+        return load
+
+    def local_point(self, body: int, point: Array) -> Array:
+        """(3,) a body's point, given in ground at the neutral pose, in its joint frame, m."""
+        frame = self.model.frames[body]
+        local: Array = frame.rotation.T @ (point - frame.origin)
+        return local
+
+    def mass_velocity(self, q: Array) -> Array:
+        """(n, 3) sum over bodies of mass times centre-of-mass velocity by coordinate rate, kg.
+
+        Its product with gravity is the generalised weight. Read off inverse dynamics under unit
+        gravity along each axis.
+        """
+        self._ready()
+        at = q.tolist()
+        columns = []
+        for direction in _UNIT_GRAVITY:
+            self._set_gravity(direction)
+            columns.append(self._inverse_dynamics(at, self._zero))
+        return -np.array(columns).T
+
+    def jacobian(self, q: Array, body: int, local_point: Array) -> tuple[Array, Array]:
+        """(n, 3) linear and (n, 3) angular velocity by coordinate rate of a body's point.
+
+        Parameters
+        ----------
+        q : (n,) coordinates, m and rad.
+        body : index of the vertebra, caudal to cranial.
+        local_point : (3,) m in the frame of the joint that carries the body.
+        """
+        self._ready()
+        linear, angular = pybullet.calculateJacobian(
+            self._body,
+            6 * body + _LAST_LINK,
+            (local_point @ self._principal[body]).tolist(),
+            q.tolist(),
+            self._zero,
+            self._zero,
+            physicsClientId=self._client.id,
+        )
+        return np.array(linear).T, np.array(angular).T
+
+    def mass_matrix(self, q: Array) -> Array:
+        """(n, n) generalised mass matrix."""
+        self._ready()
+        return np.array(
+            pybullet.calculateMassMatrix(self._body, q.tolist(), physicsClientId=self._client.id)
+        )
+
+    def bias(self, q: Array, rate: Array, gravity: Array) -> Array:
+        """(n,) generalised load that inertia at this rate and gravity (3,) need, no acceleration."""
+        self._ready()
+        self._set_gravity(gravity)
+        return np.array(self._inverse_dynamics(q.tolist(), rate.tolist()))
