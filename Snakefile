@@ -1,4 +1,4 @@
-# The front door: what is computed, from which studies. Rules live in workflow/rules.
+# The front door: which studies are computed. What is computed of each: workflow/rules.
 import sys
 
 from snakemake.utils import min_version
@@ -11,6 +11,7 @@ configfile: "config/config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/execution.smk"
 
 
 STUDIES = selected_studies()
@@ -21,26 +22,27 @@ wildcard_constraints:
     specimen="[^/=]+",
     pose="[0-9]{4}",
     stiffness="calibrated|best[0-9]{2}",
+    table="calibrations|simulations",
     block="[0-9]{3}",
 
 
 include: "workflow/rules/joint_pose_sensitivity.smk"
 
 
-localrules:
-    all,
-
-
 rule all:
-    input:
-        [path for study in STUDIES for path in study_results(study)],
     default_target: True
+    input:
+        [
+            path
+            for name in STUDIES
+            for path in layout(name).results() + layout(name).lost()
+        ],
 
 
 onstart:
     check_engine()
-    drop_job_chatter()
     check_writable(STUDIES)
+    drop_job_chatter()
 
 
 onsuccess:

@@ -1,7 +1,7 @@
 """Has every joint of every specimen a pose?"""
 
 from collections.abc import Iterator, Mapping
-from typing import cast
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,12 +73,21 @@ def _joint_problems(
 ) -> Iterator[Problem]:
     if any(np.isnan(point).any() for side in (lower, upper) for point in side.values()):
         return  # a bad cell, reported there
-    if UPPER_FACE in upper and LOWER_FACE in lower:
-        distance = float(np.linalg.norm(upper[UPPER_FACE] - lower[LOWER_FACE]))
-        wrong_unit = list(spacing_problem(place, distance, f"the endplate centres at {joint}"))
-        if wrong_unit:
-            yield from wrong_unit
+    for side, face, which in ((upper, UPPER_FACE, "upper"), (lower, LOWER_FACE, "lower")):
+        if face not in side:
+            yield _no_pose(place, joint, f"the {which} vertebra has no {face}")
             return
+    distance = float(np.linalg.norm(upper[UPPER_FACE] - lower[LOWER_FACE]))
+    wrong_unit = list(spacing_problem(place, distance, f"the endplate centres at {joint}"))
+    if wrong_unit:
+        yield from wrong_unit
+        return
+    yield from _frame_problems(place, joint, lower, upper)
+
+
+def _frame_problems(
+    place: Place, joint: str, lower: Mapping[str, Array], upper: Mapping[str, Array]
+) -> Iterator[Problem]:
     try:
         pose = joint_pose(_metres(lower), _metres(upper))
     except ValueError as error:
@@ -109,7 +118,7 @@ def _origin_spacing(draft: Draft) -> Iterator[Problem]:
     origins = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
     names = draft.joint_names
     for specimen in draft.specimens:
-        for below, joint in zip(names[:-1], names[1:], strict=True):
+        for below, joint in pairwise(names):
             if (specimen, below) in origins and (specimen, joint) in origins:
                 line, origin = origins[specimen, joint]
                 distance = float(np.linalg.norm(origin - origins[specimen, below][1]))

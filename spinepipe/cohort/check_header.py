@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem
@@ -47,7 +48,7 @@ def _chain_problems(document: Document, names: list[str], count: int) -> Iterato
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
             yield Problem(*place, f"'{name}' twice", "each vertebra once", "delete one")
-    for lower, upper in zip(names[:-1], names[1:], strict=True):
+    for lower, upper in pairwise(names):
         low, high = _height(lower), _height(upper)
         if low is not None and high is not None and low > high:
             found = f"'{lower}' before '{upper}'"

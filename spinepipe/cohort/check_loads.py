@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import pairwise
 from math import isnan
 
 from spinepipe.cohort.applied_loads import AppliedLoad
@@ -58,11 +59,7 @@ def _partial_points(draft: Draft) -> Iterator[Problem]:
 def _without_a_point(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     """A force without a point acts at the centre of mass, which must then be known."""
     rows = draft.rows("loads", *POINT, *FORCE)
-    pointless = {
-        line
-        for line, cells in rows
-        if all(isnan(p) for p in cells[:3]) and any(f not in (0.0,) and f == f for f in cells[3:])
-    }
+    pointless = {line for line, cells in rows if _pulls_without_a_point(cells)}
     if not pointless or not ("bodies" in draft.tables or "bodies" in draft.absent):
         return
     known = {cells for _, cells in draft.rows("bodies", "specimen", "vertebra")}
@@ -74,6 +71,11 @@ def _without_a_point(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Probl
             found = "a force without a point, on a vertebra without a body"
             allowed = f"a point, or a row for {load.specimen}, {load.vertebra} in bodies.csv"
             yield Problem(*place, found, allowed, "fill px_mm, py_mm, pz_mm")
+
+
+def _pulls_without_a_point(cells: tuple[float, ...]) -> bool:
+    point, force = cells[:3], cells[3:]
+    return all(map(isnan, point)) and any(f != 0.0 and not isnan(f) for f in force)
 
 
 def _times(draft: Draft) -> Iterator[Problem]:
@@ -93,7 +95,7 @@ def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Itera
             allowed = "a time in every row of a test, or in none"
             yield Problem(file, line, "time_s", "no time", allowed, "fill the cell")
     timed = [row for row in rows if not isnan(row[1])]
-    for (step, time, _), (later_step, later, line) in zip(timed[:-1], timed[1:], strict=True):
+    for (step, time, _), (later_step, later, line) in pairwise(timed):
         found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
         if step == later_step and later != time:
             yield Problem(file, line, "time_s", found, "one time per step", "correct the time")

@@ -1,6 +1,7 @@
 """A validated cohort of specimens."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +13,7 @@ __all__ = ["Cohort", "joint_names"]
 
 def joint_names(vertebrae: tuple[str, ...]) -> tuple[str, ...]:
     """Joints of vertebrae listed caudal to cranial: (L4, L3, L2) has L3L4 and L2L3."""
-    return tuple(upper + lower for lower, upper in zip(vertebrae[:-1], vertebrae[1:], strict=True))
+    return tuple(upper + lower for lower, upper in pairwise(vertebrae))
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,10 +121,7 @@ def _loads(names: tuple[str, ...], what: str, limit: float) -> tuple[Column, ...
 
 
 def _inertia(axes: str) -> Column:
-    limit = 100.0
-    return Column(
-        f"i{axes}_kg_m2", f"inertia {axes} about the centre of mass", low=-limit, high=limit
-    )
+    return Column(f"i{axes}_kg_m2", f"inertia {axes} about the centre of mass, ground axes")
 
 
 _SPECIMEN = _key("specimen", "specimen")

@@ -105,29 +105,37 @@ def _missing(file: str) -> Problem:
 
 
 def _cohort(folder: Path, header: CohortHeader, tables: dict[str, pd.DataFrame]) -> Cohort:
-    final = {stem: _final(stem, tables[stem]) if stem in tables else None for stem in TABLES}
-    specimens = final.pop("specimens")
-    assert specimens is not None, "specimens.csv is required and its absence is a problem"
+    final = {stem: _final(table) for stem, table in tables.items()}
     return Cohort(
         name=header.cohort,
-        **header.model_dump(include={"title", "source", "vertebrae", "gravity"}),
+        title=header.title,
+        source=header.source,
+        folder=folder,
+        vertebrae=header.vertebrae,
+        gravity=header.gravity,
         zeroed_at_step_0=header.zeroed_at_step_0,
         measurement_sd=header.measurement_sd,
-        folder=folder,
-        specimens=specimens,
+        specimens=final["specimens"],
+        landmarks=final.get("landmarks"),
+        joints=final.get("joints"),
+        bodies=final.get("bodies"),
+        loads=final.get("loads"),
+        motion=_numbered(final.get("motion")),
         digest=_digest(folder),
-        **final,
     )
 
 
-def _final(stem: str, table: pd.DataFrame) -> pd.DataFrame:
-    """The table without line numbers, whole numbers as such."""
+def _final(table: pd.DataFrame) -> pd.DataFrame:
+    """The table without line numbers, steps as whole numbers."""
     table = table.reset_index(drop=True)
-    if stem == "motion":
-        table["cycle"] = table["cycle"].fillna(1.0).astype("int64")
-    if "step" in table:
-        table["step"] = table["step"].astype("int64")
-    return table
+    return table.astype({"step": "int64"}) if "step" in table else table
+
+
+def _numbered(motion: pd.DataFrame | None) -> pd.DataFrame | None:
+    """Motion whose cycles are all numbered: an empty cell is the first."""
+    if motion is None:
+        return None
+    return motion.assign(cycle=motion["cycle"].fillna(1.0).astype("int64"))
 
 
 def _digest(folder: Path) -> str:

@@ -75,7 +75,7 @@ def _converted(
         return _text_series(cells, rows.lines)
     numbers = [float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells]
     for index, (number, cell) in enumerate(zip(numbers, cells, strict=True)):
-        if cell and (fault := _number_fault(number, column)):
+        if cell and (fault := _number_fault(cell, number, column)):
             allowed, remedy = fault
             place = (rows.file, rows.lines[index], column.name)
             problems.append(Problem(*place, f"'{cell}'", allowed, remedy))
@@ -87,11 +87,12 @@ def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
     return pd.Series([cell or None for cell in cells], index=lines, dtype="str")
 
 
-def _number_fault(number: float, column: Column) -> tuple[str, str] | None:
+def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:
     """What is allowed and what to do, when a number is wrong."""
     if not isfinite(number):
-        remedy = "leave the cell empty when nothing was measured"
-        return "a finite number with a decimal point", "correct it" if column.required else remedy
+        remedy = "correct it" if column.required else "leave the cell empty if not measured"
+        remedy = "write a decimal point" if "," in cell else remedy
+        return "a finite number with a decimal point", remedy
     if column.kind == "integer" and number != int(number):
         return "a whole number", "correct it"
     low_bad = number <= column.low if column.open_low else number < column.low

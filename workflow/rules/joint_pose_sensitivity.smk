@@ -5,12 +5,12 @@
 rule sample_landmarks:
     output:
         output=f"{RESULTS}/landmarks.parquet",
-    params:
-        digest=lambda wildcards: digests("sample_landmarks", wildcards.study),
     log:
         f"{LOGS}/sample_landmarks.log",
+    params:
+        digest=digest("sample_landmarks"),
     run:
-        run_job("sample_landmarks", wildcards, input, output, log)
+        run_job(rule, "sample_landmarks", wildcards, input, output, log)
 
 
 rule build_models:
@@ -19,12 +19,12 @@ rule build_models:
     output:
         output=f"{RESULTS}/poses.parquet",
         model=f"{RESULTS}/model.yaml",
-    params:
-        digest=lambda wildcards: digests("build_models", wildcards.study),
     log:
         f"{LOGS}/build_models.log",
+    params:
+        digest=digest("build_models"),
     run:
-        run_job("build_models", wildcards, input, output, log)
+        run_job(rule, "build_models", wildcards, input, output, log)
 
 
 rule calibrate:
@@ -32,38 +32,38 @@ rule calibrate:
         poses=f"{RESULTS}/poses.parquet",
     output:
         output=f"{RESULTS}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
-    params:
-        digest=lambda wildcards: digests("calibrate", wildcards.study),
     log:
         f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
+    params:
+        digest=digest("calibrate"),
     run:
-        run_job("calibrate", wildcards, input, output, log)
+        run_job(rule, "calibrate", wildcards, input, output, log)
 
 
-rule aggregate_calibration_block:
+rule aggregate_block:
     input:
-        calibrations_of_block,
+        jobs_of_block,
     output:
-        f"{RESULTS}/blocks/calibrations/specimen={{specimen}}/block={{block}}.parquet",
+        f"{RESULTS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.parquet",
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
     params:
         digest=digests("collect"),
-    log:
-        f"{LOGS}/blocks/calibrations/specimen={{specimen}}/block={{block}}.log",
     run:
-        collect("calibrations", wildcards, input, output, log)
+        collect(rule, wildcards, input, output, log)
 
 
-rule aggregate_calibrations:
+rule aggregate_table:
     input:
-        block_files("calibrations"),
+        blocks_of_table,
     output:
-        f"{RESULTS}/calibrations.parquet",
+        f"{RESULTS}/{{table}}.parquet",
+    log:
+        f"{LOGS}/{{table}}.log",
     params:
         digest=digests("collect"),
-    log:
-        f"{LOGS}/calibrations.log",
     run:
-        collect("calibrations", wildcards, input, output, log)
+        collect(rule, wildcards, input, output, log)
 
 
 # A checkpoint, so that a ranking that comes out the same as before computes no simulation again.
@@ -72,12 +72,12 @@ checkpoint rank_models:
         calibrations=f"{RESULTS}/calibrations.parquet",
     output:
         output=f"{RESULTS}/best.json",
-    params:
-        digest=lambda wildcards: digests("rank", wildcards.study),
     log:
         f"{LOGS}/rank_models.log",
+    params:
+        digest=digest("rank"),
     run:
-        run_job("rank", wildcards, input, output, log)
+        run_job(rule, "rank", wildcards, input, output, log)
 
 
 rule simulate:
@@ -86,38 +86,14 @@ rule simulate:
         poses=f"{RESULTS}/poses.parquet",
     output:
         output=f"{RESULTS}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
-    params:
-        digest=lambda wildcards: digests("simulate", wildcards.study),
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
-    run:
-        run_job("simulate", wildcards, input, output, log, calibration="", best="")
-
-
-rule aggregate_simulation_block:
-    input:
-        simulations_of_block,
-    output:
-        f"{RESULTS}/blocks/simulations/specimen={{specimen}}/block={{block}}.parquet",
     params:
-        digest=digests("collect"),
-    log:
-        f"{LOGS}/blocks/simulations/specimen={{specimen}}/block={{block}}.log",
+        digest=digest("simulate"),
     run:
-        collect("simulations", wildcards, input, output, log)
-
-
-rule aggregate_simulations:
-    input:
-        block_files("simulations"),
-    output:
-        f"{RESULTS}/simulations.parquet",
-    params:
-        digest=digests("collect"),
-    log:
-        f"{LOGS}/simulations.log",
-    run:
-        collect("simulations", wildcards, input, output, log)
+        run_job(
+            rule, "simulate", wildcards, input, output, log, calibration="", best=""
+        )
 
 
 rule figures:
@@ -129,9 +105,9 @@ rule figures:
         stiffness=figure("stiffness"),
         errors=figure("errors"),
         joint_pose=figure("joint_pose"),
-    params:
-        digest=lambda wildcards: digests("figures", wildcards.study),
     log:
         f"{LOGS}/figures.log",
+    params:
+        digest=digest("figures"),
     run:
-        run_job("figures", wildcards, input, output, log)
+        run_job(rule, "figures", wildcards, input, output, log)

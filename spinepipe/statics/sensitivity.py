@@ -1,0 +1,141 @@
+"""Exact sensitivities of solved steps: dq/dx = -K^-1 dr/dx, path states carried along.
+
+Every derivative is taken at the solved pose with the tangent's LU factors that Newton left.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spinepipe.effects import MeasurementEffect
+from spinepipe.effects.contract import Array
+from spinepipe.statics.free import FreeParameter
+from spinepipe.statics.path import SolvedStep
+from spinepipe.statics.system import System
+
+
+def by_parameters(
+    system: System, solved: Sequence[SolvedStep], free: Sequence[FreeParameter]
+) -> list[Array]:
+    """(n, m) derivative of each step's pose by the m unknowns.
+
+    Raises
+    ------
+    ValueError
+        When a step has no equilibrium.
+    """
+    state_by_x = {
+        i: np.zeros((*s.shape, len(free))) for i, s in system.initial_states().items()
+    }
+    result = []
+    for step in solved:
+        if step.equilibrium.factored is None:
+            raise ValueError(f"step {step.step.step} has no equilibrium to differentiate")
+        residual = residual_by_parameters(system, step, free, state_by_x)
+        dq = -step.equilibrium.factored.solve(residual)
+        result.append(dq)
+        state_by_x = _advance(system, step, free, dq, state_by_x)
+    return result
+
+
+def residual_by_parameters(
+    system: System,
+    step: SolvedStep,
+    free: Sequence[FreeParameter],
+    state_by_x: dict[int, Array],
+) -> Array:
+    """(n, m) derivative of the residual at fixed pose by the unknowns."""
+    q = step.equilibrium.q
+    derivatives = system.derivatives(q, step.states)
+    table = {
+        i: d.reshape(system.chain.n, *d.shape[2:]) for i, d in derivatives.by_parameter.items()
+    }
+    for active in system.load_effects:
+        table[active.index] = system.load_derivative(q, step.loading, active)
+    columns = np.zeros((system.chain.n, len(free)))
+    for column, parameter in enumerate(free):
+        if parameter.effect in table:
+            rows = list(parameter.rows)
+            weights = parameter.derivative(system.model.effects[parameter.effect].values)
+            columns[:, column] = table[parameter.effect][:, rows, parameter.column] @ weights
+    for index, by_state in derivatives.by_state.items():
+        flat = by_state.reshape(system.chain.n, -1)
+        columns += flat @ state_by_x[index].reshape(flat.shape[1], -1)
+    return columns
+
+
+def _advance(
+    system: System,
+    step: SolvedStep,
+    free: Sequence[FreeParameter],
+    dq: Array,
+    state_by_x: dict[int, Array],
+) -> dict[int, Array]:
+    """Derivatives of the states after the step: by pose, by parameter and by earlier state."""
+    if not step.advances:
+        return {}
+    placed = system.placed(step.equilibrium.q, with_parameters=True)
+    joints_by_x = np.einsum("jab,jbm->jam", placed.by_coordinate, dq.reshape(-1, 6, len(free)))
+    joints_by_x += _placement_by_x(system, placed.by_parameter, free)
+    following = {}
+    for law in system.laws:
+        if law.index in step.advances:
+            advance = step.advances[law.index]
+            following[law.index] = np.einsum(
+                "jsa,jam->jsm", advance.by_coordinate, joints_by_x[law.joints]
+            ) + np.einsum("jst,jtm->jsm", advance.by_state, state_by_x[law.index])
+            for column, parameter in enumerate(free):
+                if parameter.effect == law.index:
+                    rows = list(parameter.rows)
+                    own = advance.by_parameter[rows, :, parameter.column]
+                    following[law.index][rows, :, column] += (
+                        own * parameter.derivative(law.values)[:, None]
+                    )
+    return following
+
+
+def _placement_by_x(
+    system: System, by_parameter: dict[int, tuple[Array, Array]], free: Sequence[FreeParameter]
+) -> Array:
+    """(J, 6, m) derivative of the coordinates seen by the laws by geometry parameters."""
+    result = np.zeros((system.model.n_joints, 6, len(free)))
+    for column, parameter in enumerate(free):
+        if parameter.effect in by_parameter:
+            dq = by_parameter[parameter.effect][0]
+            weights = parameter.derivative(system.model.effects[parameter.effect].values)
+            result[:, :, column] = dq[:, :, list(parameter.rows), parameter.column] @ weights
+    return result
+
+
+def observe(system: System, q: Array) -> tuple[Array, Array]:
+    """Reported coordinates (J, 6) at pose q (n,), and their derivative (J, 6, 6) by the true."""
+    joints = q.reshape(-1, 6).copy()
+    by_coordinate = np.tile(np.eye(6), (len(joints), 1, 1))
+    for active in system.measurement:
+        assert isinstance(active.effect, MeasurementEffect)
+        seen = active.effect.observe(joints[active.joints], active.values)
+        joints[active.joints] = seen.q
+        by_coordinate[active.joints] = seen.by_coordinate @ by_coordinate[active.joints]
+    return joints, by_coordinate
+
+
+def observed_by_parameters(
+    system: System, q: Array, dq: Array, free: Sequence[FreeParameter]
+) -> Array:
+    """(J, 6, m) derivative of the reported coordinates by the unknowns, at pose q (n,)."""
+    joints = q.reshape(-1, 6).copy()
+    by_x = dq.reshape(len(joints), 6, -1).copy()
+    for active in system.measurement:
+        assert isinstance(active.effect, MeasurementEffect)
+        here = joints[active.joints]
+        seen = active.effect.observe(here, active.values)
+        own = active.effect.by_parameter(here, active.values)
+        by_x[active.joints] = seen.by_coordinate @ by_x[active.joints]
+        for column, parameter in enumerate(free):
+            if parameter.effect == active.index:
+                rows = list(parameter.rows)
+                weights = parameter.derivative(active.values)
+                moved = own[rows, :, parameter.column] * weights[:, None]
+                by_x[active.joints[rows], :, column] += moved
+        joints[active.joints] = seen.q
+    return by_x

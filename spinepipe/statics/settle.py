@@ -1,0 +1,233 @@
+"""Damped motion under constant or ramped load: the papers' quasi-static and dynamic loading.
+
+    M(q) q'' + bias(q, q') + C q' + holding(q) - applied(q, t) = 0
+
+on PyBullet's mass matrix and bias loads, integrated implicitly: springs of this stiffness need
+microsecond steps otherwise. Its end is compared with the equilibrium under the final load.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from spinepipe.effects.contract import Array
+from spinepipe.statics.equilibrium import solve
+from spinepipe.statics.loading import Loading
+from spinepipe.statics.rosenbrock import (
+    ALPHA,
+    COUPLING,
+    ERROR_WEIGHTS,
+    GAMMA,
+    STAGE_TIMES,
+    TIME_WEIGHTS,
+    WEIGHTS,
+)
+from spinepipe.statics.status import Status
+from spinepipe.statics.system import System
+
+MOST_STEPS = 20_000
+FIRST_STEP_S = 1e-5
+SMALLEST_STEP_S = 1e-12
+RELATIVE_TOLERANCE = 3e-4
+ABSOLUTE_TOLERANCE = np.array([3e-8] * 3 + [3e-6] * 3)
+"""m and rad per step: a thousandth of the smallest motion the papers report."""
+
+LARGEST_ROTATION = np.deg2rad(80.0)
+
+
+@dataclass(frozen=True)
+class Program:
+    """Loadings at times, straight lines in between, the last one held.
+
+    Attributes
+    ----------
+    times : (T,) s, increasing, first 0.
+    """
+
+    times: tuple[float, ...]
+    loadings: tuple[Loading, ...]
+
+    @classmethod
+    def constant(cls, loading: Loading) -> "Program":
+        """The loading switched on at time zero and held."""
+        return cls((0.0,), (loading,))
+
+    def at(self, time: float) -> Loading:
+        """Loading at a time in s."""
+        later = int(np.searchsorted(self.times, time, side="right"))
+        if later == len(self.times):
+            return self.loadings[-1]
+        start, end = self.times[later - 1], self.times[later]
+        fraction = (time - start) / (end - start)
+        return self.loadings[later - 1].towards(self.loadings[later], fraction)
+
+    def corner_after(self, time: float) -> float:
+        """The next time at which the load changes its rate; infinity after the last."""
+        return next((t for t in self.times if t > time * (1.0 + 1e-12) + 1e-15), np.inf)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """End of a settling run.
+
+    Attributes
+    ----------
+    q, rate : (n,) pose and rate at the end. history : (len(times), n) poses at asked times.
+    remaining : (n,) equilibrium pose less end pose, or None when there is no equilibrium.
+    """
+
+    q: Array
+    rate: Array
+    history: Array
+    remaining: Array | None
+    status: Status
+    message: str
+    steps: int
+
+
+def settle(
+    system: System, program: Program, duration: float, times: Sequence[float] = ()
+) -> Settled:
+    """Let the chain move from rest in the neutral pose for ``duration`` seconds.
+
+    Status ``converged`` says that the run reached its end; ``remaining`` how far it still moves.
+    """
+    refusal = _refusal(system)
+    if refusal:
+        nothing = np.zeros(system.chain.n)
+        history = np.zeros((len(times), system.chain.n))
+        return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, 0)
+    run = _Run(system, program)
+    history = run.to(duration, sorted(times))
+    final = program.at(duration)
+    equilibrium = solve(system, run.q, system.slots.unloaded(), final, {})
+    reachable = equilibrium.status is Status.CONVERGED
+    remaining = equilibrium.q - run.q if reachable else None
+    status, message = run.status, run.message
+    if status.usable and not reachable:
+        status, message = Status.UNSTABLE, f"moving away: {equilibrium.message}"
+    return Settled(run.q, run.rate, history, remaining, status, message, run.steps)
+
+
+def _refusal(system: System) -> str | None:
+    if system.initial_states():
+        return "path effects advance by load step, not in time: use equilibrium loading"
+    try:
+        cho_factor(system.chain.mass_matrix(np.zeros(system.chain.n)))
+    except np.linalg.LinAlgError:
+        return "every vertebra needs mass and inertia to move in time (bodies.csv)"
+    return None
+
+
+class _Run:
+    """Integration state: pose, rate, time and step size."""
+
+    def __init__(self, system: System, program: Program) -> None:
+        self.system, self.program = system, program
+        self.q, self.rate = np.zeros((2, system.chain.n))
+        self.damping = system.model.damping.ravel()
+        self.time, self.size, self.steps = 0.0, FIRST_STEP_S, 0
+        self.status, self.message = Status.CONVERGED, ""
+        self.tolerance = np.tile(ABSOLUTE_TOLERANCE, system.model.n_joints)
+
+    def to(self, duration: float, times: Sequence[float]) -> Array:
+        """Advance to the end; (len(times), n) poses at the asked times on the way."""
+        history = np.full((len(times), len(self.q)), np.nan)
+        while self.time < duration * (1.0 - 1e-12):
+            before = (self.time, self.q, self.rate)
+            if not self._advance(min(duration, self.program.corner_after(self.time))):
+                break
+            for index, time in enumerate(times):
+                if before[0] <= time <= self.time:
+                    history[index] = _between(before, (self.time, self.q, self.rate), time)
+        return np.nan_to_num(history)
+
+    def _advance(self, limit: float) -> bool:
+        """One accepted step, not beyond the limit."""
+        while True:
+            self.steps += 1
+            size = min(self.size, limit - self.time)
+            q, rate, error = self._try(size)
+            accepted = bool(np.isfinite(error)) and error <= 1.0
+            growth = 0.9 * error ** (-1.0 / 3.0) if np.isfinite(error) and error > 0 else 0.2
+            if accepted:
+                self.q, self.rate, self.time = q, rate, self.time + size
+            self.size = size * float(np.clip(growth, 0.2, 6.0))
+            if accepted:
+                return self._within_motion()
+            if self.steps > MOST_STEPS or self.size < SMALLEST_STEP_S:
+                return self._stop(Status.NOT_CONVERGED, "the step size went to zero")
+
+    def _within_motion(self) -> bool:
+        if np.abs(self.q.reshape(-1, 6)[:, 3:]).max() < LARGEST_ROTATION:
+            return True
+        return self._stop(Status.UNSTABLE, f"tips over: beyond 80 degrees at {self.time:.3f} s")
+
+    def _stop(self, status: Status, message: str) -> bool:
+        self.status, self.message = status, message
+        return False
+
+    def _try(self, size: float) -> tuple[Array, Array, float]:
+        """Pose, rate and scaled error after a step of that size."""
+        system, n = self.system, len(self.q)
+        balance = system.balance(self.q, self.program.at(self.time), {})
+        mass = system.chain.mass_matrix(self.q)
+        implicit = size * GAMMA
+        iteration = mass + implicit * np.diag(self.damping) + implicit**2 * balance.tangent
+        lu, pivots, _ = dgetrf(iteration)
+        ramp = self._ramp(balance.residual)
+        stage_q, stage_v = np.zeros((2, 4, n))
+        for i in range(4):
+            q = self.q + size * (ALPHA[i] @ stage_q)
+            rate = self.rate + size * (ALPHA[i] @ stage_v)
+            coupled_q, coupled_v = COUPLING[i] @ stage_q, COUPLING[i] @ stage_v
+            force = self._force(q, rate, self.time + STAGE_TIMES[i] * size)
+            force = force if i == 0 else mass @ cho_solve(
+                cho_factor(system.chain.mass_matrix(q), check_finite=False), force
+            )
+            drift = rate + size * coupled_v
+            force -= balance.tangent @ (implicit * drift + size * coupled_q)
+            force -= self.damping * (size * coupled_v)
+            force += size * TIME_WEIGHTS[i] * ramp
+            stage_v[i] = dgetrs(lu, pivots, force)[0]
+            stage_q[i] = drift + implicit * stage_v[i]
+        error = size * (ERROR_WEIGHTS @ stage_q)
+        q = self.q + size * (WEIGHTS @ stage_q)
+        scale = self.tolerance + RELATIVE_TOLERANCE * np.abs(q)
+        return q, self.rate + size * (WEIGHTS @ stage_v), float(np.max(np.abs(error) / scale))
+
+    def _force(self, q: Array, rate: Array, time: float) -> Array:
+        """(n,) generalised force that accelerates the chain."""
+        system = self.system
+        residual = system.balance(q, self.program.at(time), {}).residual
+        inertial = system.chain.bias(q, rate, np.zeros(3))
+        force: Array = -residual - inertial - self.damping * rate
+        return force
+
+    def _ramp(self, residual: Array) -> Array:
+        """(n,) rate of change of the applied load at this pose; the load is linear in time."""
+        corner = self.program.corner_after(self.time)
+        if corner == np.inf:
+            return np.zeros_like(self.q)
+        end = self.system.balance(self.q, self.program.at(corner), {}).residual
+        ramp: Array = (residual - end) / (corner - self.time)
+        return ramp
+
+
+def _between(
+    before: tuple[float, Array, Array], after: tuple[float, Array, Array], time: float
+) -> Array:
+    """(n,) pose at a time inside a step, by the cubic through both ends' poses and rates."""
+    (t0, q0, v0), (t1, q1, v1) = before, after
+    span = t1 - t0
+    s = (time - t0) / span
+    value: Array = (
+        (1 + 2 * s) * (1 - s) ** 2 * q0
+        + s * (1 - s) ** 2 * span * v0
+        + s**2 * (3 - 2 * s) * q1
+        + s**2 * (s - 1) * span * v1
+    )
+    return value

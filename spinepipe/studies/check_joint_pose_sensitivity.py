@@ -1,0 +1,112 @@
+"""What a study of joint-pose sensitivity demands of its cohort."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.check_geometry import landmark_problems
+from spinepipe.cohort.columns import TABLES
+from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.read_yaml import Document
+from spinepipe.frames import FRAME_LANDMARKS
+from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+
+__all__ = ["check_joint_pose_sensitivity"]
+
+
+def check_joint_pose_sensitivity(
+    document: Document, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[Problem]:
+    """Every way in which a sound study and a sound cohort do not fit.
+
+    Parameters
+    ----------
+    document : the study file, for the lines of its keys.
+    """
+    yield from _landmarks(document, study, cohort)
+    yield from _loading(document, study, cohort)
+    yield from _tests(document, study, cohort)
+    if study.best_models > study.poses:
+        place = _at(document, "best_models")
+        allowed = f"at most the number of poses, {study.poses}"
+        yield Problem(*place, str(study.best_models), allowed, "take fewer, or more poses")
+
+
+def _at(document: Document, key: str) -> tuple[str, int | None, str]:
+    return document.file, document.line_of(key), key
+
+
+def _landmarks(
+    document: Document, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[Problem]:
+    if cohort.landmarks is None:
+        allowed = "a cohort with landmarks.csv: the study samples landmarks"
+        found = f"cohort '{cohort.name}', which has none"
+        yield Problem(*_at(document, "cohort"), found, allowed, "choose another cohort")
+        return
+    for problem in landmark_problems(_draft(cohort, cohort.landmarks), set()):
+        place = (problem.file, None, problem.column)  # blank lines may have shifted the rows
+        yield Problem(*place, problem.found, problem.allowed, problem.remedy)
+    frame = cohort.landmarks[cohort.landmarks["landmark"].isin(FRAME_LANDMARKS)]
+    bare = frame[frame["sd_mm"].isna()]
+    if study.landmark_sd_mm is None and len(bare):
+        first = ", ".join(bare.iloc[0][["specimen", "vertebra", "landmark"]])
+        found = f"null, and {len(bare)} of {len(frame)} landmarks without sd_mm (first: {first})"
+        allowed = "a number in mm, or an sd_mm for every landmark of a joint frame"
+        remedy = "set landmark_sd_mm or fill the column"
+        yield Problem(*_at(document, "landmark_sd_mm"), found, allowed, remedy)
+
+
+def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
+    tables = {"specimens": cohort.specimens, "landmarks": landmarks}
+    absent = frozenset(TABLES) - set(tables)
+    return Draft(cohort.name, cohort.vertebrae, cohort.gravity, tables, absent)
+
+
+def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:
+    if study.loading == "settle" and cohort.bodies is None:
+        found = f"settle, with cohort '{cohort.name}', which has no bodies.csv"
+        allowed = "equilibrium, or a cohort with masses"
+        yield Problem(*_at(document, "loading"), found, allowed, "choose equilibrium")
+
+
+def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:
+    """Tests must exist, and every specimen must have been measured in one of them."""
+    if cohort.motion is None:
+        found = f"cohort '{cohort.name}', which has no motion.csv"
+        allowed = "a cohort with loads.csv and motion.csv: the study calibrates on motion"
+        yield Problem(*_at(document, "cohort"), found, allowed, "choose another cohort")
+        return
+    for index, name in enumerate(study.tests or ()):
+        if name not in cohort.tests:
+            remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
+            place = _at(document, f"tests.{index}")
+            yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
+    chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
+    measured = chosen[chosen[list(COORDINATE_COLUMNS)].notna().any(axis=1)]
+    if measured.empty:
+        tests = one_of(dict.fromkeys(cohort.motion["test"]))
+        found = "no motion in any chosen test"
+        yield Problem(*_at(document, "tests"), found, tests, "choose a test with motion")
+        return
+    for specimen in cohort.specimen_names:
+        if specimen not in set(measured["specimen"]):
+            found = f"no motion of specimen '{specimen}' in any chosen test"
+            allowed = "motion of every specimen in one chosen test at least"
+            remedy = "choose more tests, or leave the specimen out of the cohort"
+            yield Problem(*_at(document, "tests"), found, allowed, remedy)
+    yield from _weights(document, study, measured)
+
+
+def _weights(
+    document: Document, study: JointPoseSensitivity, measured: pd.DataFrame
+) -> Iterator[Problem]:
+    weights = study.calibration.weights.in_order()
+    for name, column, weight in zip(COORDINATES, COORDINATE_COLUMNS, weights, strict=True):
+        if weight > 0 and measured[column].isna().all():
+            place = _at(document, f"calibration.weights.{name}")
+            found = f"weight {weight:g} on {column}, which was not measured"
+            yield Problem(*place, found, "0 for what was not measured", f"write `{name}: 0`")

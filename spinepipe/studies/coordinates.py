@@ -1,0 +1,96 @@
+"""Choices that are made for each of the six coordinates of a joint."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = ["FORM", "Coordinate", "Damping", "Shift", "Stiffness", "Weights"]
+
+FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+"""Unknown keys, `yes` for a number and NaN are errors."""
+
+Coordinate = Literal["anterior", "superior", "right", "extension", "right_bending", "left_rotation"]
+
+_Translational = Annotated[float, Field(gt=0, le=1e9)]
+_Rotational = Annotated[float, Field(gt=0, le=1e6)]
+_Weight = Annotated[float, Field(ge=0, le=1e6)]
+_Millimetres = Annotated[float, Field(ge=-200, le=200)]
+
+
+class Stiffness(BaseModel):
+    """Diagonal stiffness of a joint."""
+
+    model_config = FORM
+
+    anterior_n_per_m: _Translational = Field(default=24600.0, description="anterior stiffness, N/m")
+    superior_n_per_m: _Translational = Field(
+        default=110000.0, description="superior stiffness, N/m"
+    )
+    right_n_per_m: _Translational = Field(default=13500.0, description="lateral stiffness, N/m")
+    extension_nm_per_rad: _Rotational = Field(
+        default=37.0, description="flexion-extension stiffness, N m/rad"
+    )
+    right_bending_nm_per_rad: _Rotational = Field(
+        default=64.0, description="lateral bending stiffness, N m/rad"
+    )
+    left_rotation_nm_per_rad: _Rotational = Field(
+        default=268.0, description="axial rotation stiffness, N m/rad"
+    )
+
+    def in_order(self) -> tuple[float, ...]:
+        """(6,) N/m and N m/rad in the order of the coordinates."""
+        return tuple(dict(self).values())
+
+
+class Damping(BaseModel):
+    """Viscous damping of a joint; equilibria do not depend on it."""
+
+    model_config = FORM
+
+    translation_n_s_per_m: float = Field(
+        default=1000.0, ge=0, le=1e7, description="damping of the three translations, N s/m"
+    )
+    rotation_nm_s_per_rad: float = Field(
+        default=1.4, ge=0, le=1e5, description="damping of the three rotations, N m s/rad"
+    )
+
+    def in_order(self) -> tuple[float, ...]:
+        """(6,) N s/m and N m s/rad in the order of the coordinates."""
+        return (self.translation_n_s_per_m,) * 3 + (self.rotation_nm_s_per_rad,) * 3
+
+
+class Weights(BaseModel):
+    """Weights of the measured coordinates in the least squares, on mm and degrees."""
+
+    model_config = FORM
+
+    anterior: _Weight = Field(default=10.0, description="weight of the anterior translation, 1/mm")
+    superior: _Weight = Field(default=100.0, description="weight of the superior translation, 1/mm")
+    right: _Weight = Field(default=1.0, description="weight of the lateral translation, 1/mm")
+    extension: _Weight = Field(default=1.0, description="weight of extension, 1/deg")
+    right_bending: _Weight = Field(default=0.0, description="weight of right bending, 1/deg")
+    left_rotation: _Weight = Field(default=0.0, description="weight of left rotation, 1/deg")
+
+    def in_order(self) -> tuple[float, ...]:
+        """(6,) in the order of the coordinates."""
+        return tuple(dict(self).values())
+
+    @model_validator(mode="after")
+    def _something_counts(self) -> Self:
+        if not any(self.in_order()):
+            raise ValueError("at least one weight above 0")
+        return self
+
+
+class Shift(BaseModel):
+    """A shift in ground axes."""
+
+    model_config = FORM
+
+    anterior: _Millimetres = Field(default=0.0, description="shift anterior, mm")
+    superior: _Millimetres = Field(default=0.0, description="shift superior, mm")
+    right: _Millimetres = Field(default=0.0, description="shift to the right, mm")
+
+    def in_order(self) -> tuple[float, ...]:
+        """(3,) mm: x anterior, y superior, z right."""
+        return tuple(dict(self).values())

@@ -1,0 +1,96 @@
+"""The study kind that asks how much the landmarks' uncertainty does to stiffness and motion."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints
+
+from spinepipe.studies.coordinates import FORM, Coordinate, Damping, Shift, Stiffness, Weights
+from spinepipe.studies.study import Study
+
+__all__ = ["Calibration", "JointPoseSensitivity"]
+
+
+def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
+    return names
+
+
+_TestName = Annotated[str, StringConstraints(min_length=1)]
+_Tests = Annotated[
+    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(_distinct)
+]
+_Coordinates = Annotated[
+    tuple[Coordinate, ...], Field(strict=False, min_length=1), AfterValidator(_distinct)
+]
+
+
+class Calibration(BaseModel):
+    """How stiffness is fitted to measured motion."""
+
+    model_config = FORM
+
+    free: _Coordinates = Field(
+        default=("anterior", "superior", "extension"),
+        description="coordinates whose stiffness is fitted; the others keep their start",
+    )
+    grouping: Literal["per_specimen", "per_joint"] = Field(
+        default="per_specimen",
+        description="one stiffness for all joints of a specimen, or one for each",
+    )
+    weights: Weights = Field(default_factory=Weights, description="weights on mm and degrees")
+    bound_factor: float = Field(
+        default=1000.0, gt=1, le=1e9, description="bounds are start / factor and start x factor"
+    )
+    starts: int = Field(default=4, ge=1, le=50, description="number of starting points of the fit")
+    identifiable_below: float = Field(
+        default=1.0,
+        gt=0,
+        le=100,
+        description="a stiffness is identifiable when the standard error of its natural "
+        "logarithm is below this",
+    )
+
+
+class JointPoseSensitivity(Study):
+    """Sample landmarks, rebuild the joint poses, calibrate the stiffness for each, compare."""
+
+    kind: Literal["joint_pose_sensitivity"] = Field(description="kind of study")
+    seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
+    tests: _Tests | None = Field(
+        default=None, description="load cases used; null: all that have a load and a motion"
+    )
+    poses: int = Field(
+        default=500, ge=2, le=20000, description="sampled landmark sets per specimen"
+    )
+    landmark_sd_mm: float | None = Field(
+        default=None,
+        gt=0,
+        le=20,
+        description="SD of a landmark per axis, mm; null: the cohort's sd_mm",
+    )
+    load_point_shift_mm: Shift = Field(
+        default_factory=Shift, description="added to every load point, ground axes"
+    )
+    stiffness: Stiffness = Field(
+        default_factory=Stiffness, description="stiffness the calibration starts from"
+    )
+    damping: Damping = Field(default_factory=Damping, description="viscous damping")
+    loading: Literal["equilibrium", "settle"] = Field(
+        default="equilibrium",
+        description="equilibrium: static; settle: the state a time after the load was applied",
+    )
+    settle_time_s: float = Field(
+        default=1.5, gt=0, le=60, description="time after which a settling spine is read, s"
+    )
+    calibration: Calibration = Field(
+        default_factory=Calibration, description="how stiffness is fitted"
+    )
+    best_models: int = Field(
+        default=10,
+        ge=1,
+        le=99,
+        description="best stiffnesses of a specimen that all its poses are run with",
+    )
+    block: int = Field(default=25, ge=1, le=1000, description="poses per summary table")

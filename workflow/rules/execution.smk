@@ -1,0 +1,90 @@
+# How jobs are run: checks before the first one, the warm worker pool, and progress.
+import os
+import sys
+from collections import Counter
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
+from spinepipe.jobs.pool import submit_and_wait
+from spinepipe.jobs.progress import Progress
+
+
+def check_engine():
+    """Refuse to run jobs as one Snakemake process each, which is 70 times slower."""
+    if not workflow.execution_settings.use_threads:
+        raise WorkflowError(
+            "the option force-use-threads is off: each job would start Snakemake anew, 70 times "
+            "slower.\nLet Snakemake find profiles/default beside the Snakefile (do not pass "
+            "--workflow-profile none), or add --force-use-threads."
+        )
+
+
+def drop_job_chatter():
+    """Keep Snakemake from writing two lines per job; its warnings and errors stay."""
+    chatter = ("Select jobs to execute", "Execute ")
+    logger.addFilter(lambda record: not str(record.msg).startswith(chatter))
+
+
+def check_writable(names):
+    """Say so at once when results cannot be written."""
+    for folder in ["results", *(f"results/{name}" for name in names)]:
+        try:
+            os.makedirs(folder, exist_ok=True)
+            probe = Path(folder, f".probe-{os.getpid()}")
+            probe.write_text("1")
+            probe.unlink()
+        except OSError as error:
+            raise WorkflowError(
+                f"results cannot be written to {Path(folder).resolve()}: {error.strerror}. Make "
+                "room or change permissions, then run again (finished jobs are kept)."
+            ) from None
+
+
+def say_where(names):
+    """Name the folder of each study's tables and figures."""
+    for name in names:
+        print(
+            f"{name}: tables and figures in {Path('results', name).resolve()}",
+            file=sys.stderr,
+        )
+
+
+def totals():
+    """Jobs per rule in this run, as far as Snakemake knows them by now."""
+    jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
+    return Counter(job.rule.name for job in jobs)
+
+
+progress = Progress(totals)
+
+
+def run_job(rule, job, wildcards, input, output, log, **others):
+    """Run `spinepipe.jobs.<job>` in the warm pool on the files and wildcards of a rule.
+
+    Named input and output files and the wildcards become arguments of the same name; `others`
+    are further arguments, and defaults for input that only some jobs of the rule have.
+    """
+    files = {name: plain(value) for name, value in [*input.items(), *output.items()]}
+    arguments = {"root": ROOT, **others, **wildcards, **files}
+    execute(rule, job, wildcards, log, arguments)
+
+
+def collect(rule, wildcards, input, output, log):
+    """Join the rows of many files into one table."""
+    table = wildcards.table
+    arguments = {"table": table, "inputs": plain(input), "output": plain(output[0])}
+    execute(rule, "collect", wildcards, log, arguments)
+
+
+def plain(value):
+    """Paths as plain strings: Snakemake's own carry the whole rule with them."""
+    return str(value) if isinstance(value, str) else [str(path) for path in value]
+
+
+def execute(rule, job, wildcards, log, arguments):
+    progress.start(rule)
+    name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
+    submit_and_wait(name, f"spinepipe.jobs.{job}:run", str(log), **arguments)
+    progress.finish(rule)
