@@ -6,7 +6,7 @@ from difflib import get_close_matches
 
 __all__ = ["InputError", "Problem", "closest", "did_you_mean", "one_of"]
 
-LONGEST_FOUND = 80
+LONGEST_FOUND = 160
 """Longer findings are cut: a message is read on a terminal."""
 
 

@@ -17,27 +17,29 @@ class AppliedLoad:
     Attributes
     ----------
     line : its line in ``loads.csv``.
+    step : None when the cell is bad.
     """
 
     line: int
     specimen: str
     test: str
     cycle: int
-    step: int
+    step: int | None
     vertebra: str
 
 
 def applied_loads(draft: Draft) -> Iterator[AppliedLoad]:
-    """Every load on every specimen in every cycle; rows with a bad key cell are left out."""
+    """Every load on every specimen in every cycle; rows without a name are left out."""
     cycles = _known_cycles(draft)
     everyone = draft.specimens or ("*",)
     keys = ("specimen", "test", "cycle", "step", "vertebra")
     for line, (specimen, test, cycle, step, vertebra) in draft.rows("loads", *keys):
-        if not all(isinstance(name, str) for name in (specimen, test, vertebra)) or isnan(step):
+        if not all(isinstance(name, str) for name in (specimen, test, vertebra)):
             continue
+        known_step = None if isnan(step) else int(step)
         for name in everyone if specimen == "*" else (specimen,):
             for number in cycles[test] if isnan(cycle) else (int(cycle),):
-                yield AppliedLoad(line, name, test, number, int(step), vertebra)
+                yield AppliedLoad(line, name, test, number, known_step, vertebra)
 
 
 def _known_cycles(draft: Draft) -> dict[str, tuple[int, ...]]:

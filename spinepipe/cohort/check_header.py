@@ -30,11 +30,11 @@ def check_header(document: Document, folder: str) -> Iterator[Problem]:
 
 
 def usable_vertebrae(document: Document) -> tuple[str, ...]:
-    """The vertebrae when they name a chain without ambiguity, else none."""
+    """The vertebrae when they are a sound chain; none otherwise, so that one fault stays one."""
     names = document.data.get("vertebrae")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         return ()
-    return tuple(names) if len(set(names)) == len(names) >= 2 else ()
+    return () if any(_chain_problems(document, names, len(names))) else tuple(names)
 
 
 def _chain_problems(document: Document, names: list[str], count: int) -> Iterator[Problem]:

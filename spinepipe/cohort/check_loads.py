@@ -28,6 +28,8 @@ def _repeated(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     seen: dict[tuple[object, ...], int] = {}
     reported = set()
     for load in applied:
+        if load.step is None:
+            continue
         key = (load.specimen, load.test, load.cycle, load.step, load.vertebra)
         first = seen.setdefault(key, load.line)
         if first != load.line and load.line not in reported:

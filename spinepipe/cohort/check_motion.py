@@ -23,12 +23,14 @@ def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     tests = sorted({load.test for load in applied})
     reported = set()
     rows = draft.rows("motion", "specimen", "test", "cycle", "step")
+    specimens = set(draft.specimens)  # rows of an unknown one are reported as such
     for line, (specimen, test, cycle, step) in rows:
-        if not (isinstance(specimen, str) and isinstance(test, str)) or isnan(step):
+        if specimen not in specimens or not isinstance(test, str) or isnan(step):
             continue
         key = (specimen, test, 1 if isnan(cycle) else int(cycle), int(step))
         missing = next((key[:n] for n in (2, 3, 4) if key[:n] not in known), None)
-        if missing is not None and missing not in reported:
+        unclear = (*key[:3], None) in known  # a bad step cell may be the one looked for
+        if missing is not None and missing not in reported and not unclear:
             reported.add(missing)
             yield _problem(file, line, missing, tests)
 

@@ -17,29 +17,35 @@ def check_steps(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     remedy = "add the row, with zeros where nothing acts"
     yield from _gaps(draft.file("loads"), loads, remedy)
     columns = ("specimen", "test", "cycle", "joint", "step")
-    rows = draft.rows("motion", *columns)
     motion = (
-        ((specimen, test, 1 if isnan(cycle) else cycle, joint), step, line)
-        for line, (specimen, test, cycle, joint, step) in rows
+        (
+            (specimen, test, 1 if isnan(cycle) else cycle, joint),
+            None if isnan(step) else int(step),
+            line,
+        )
+        for line, (specimen, test, cycle, joint, step) in draft.rows("motion", *columns)
+        if all(isinstance(name, str) for name in (specimen, test, joint))
     )
     remedy = "add the row, with empty cells where nothing was measured"
     yield from _gaps(draft.file("motion"), motion, remedy)
 
 
 def _gaps(
-    file: str, rows: Iterable[tuple[tuple[object, ...], float, int]], remedy: str
+    file: str, rows: Iterable[tuple[tuple[object, ...], int | None, int]], remedy: str
 ) -> Iterator[Problem]:
-    series: dict[tuple[object, ...], list[tuple[float, int]]] = defaultdict(list)
+    series: dict[tuple[object, ...], list[tuple[int, int]]] = defaultdict(list)
+    unclear = set()  # a bad cell hides one step, and is reported there
     for key, step, line in rows:
-        series[key].append((step, line))
+        if step is None:
+            unclear.add(key)
+        else:
+            series[key].append((step, line))
     for key, steps in series.items():
-        if any(isnan(step) for step, _ in steps):  # a bad cell, reported there
-            continue
-        before = -1.0
+        before = -1
         for step, line in sorted(steps):
-            if step > before + 1:
-                last = f"after step {before:g}" if before >= 0 else "first"
-                found = f"step {step:g} {last} in test '{key[1]}'"
+            if step > before + 1 and key not in unclear:
+                last = f"after step {before}" if before >= 0 else "first"
+                found = f"step {step} {last} in test '{key[1]}'"
                 allowed = "steps 0, 1, 2, … without a gap"
                 yield Problem(file, line, "step", found, allowed, remedy)
             before = step

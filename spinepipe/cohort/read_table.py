@@ -34,13 +34,11 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
     rows, problems = read_rows(path, file)
     if rows is None:
         return None, problems
-    header_problems = list(_column_problems(rows, form))
-    problems += header_problems
-    if any(column.required and column.name not in rows.header for column in form.columns):
+    problems += _column_problems(rows, form)
+    lacking = any(column.required and column.name not in rows.header for column in form.columns)
+    if lacking or not rows.cells:
         return None, problems
     texts = dict(zip(rows.header, map(list, zip(*rows.cells, strict=True)), strict=True))
-    if not rows.cells:
-        return None, problems
     data: dict[str, pd.Series] = {}
     for column in form.columns:
         cells = texts.pop(column.name, [""] * len(rows.lines))

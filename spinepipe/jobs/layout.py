@@ -57,7 +57,9 @@ class Layout:
             return [f"{folder}/pose={pose}.parquet" for pose in poses]
         folder = f"results/{self.study}/jobs/specimen={specimen}"
         names = self.stiffnesses
-        return [f"{folder}/pose={pose}/stiffness={name}.parquet" for pose in poses for name in names]
+        return [
+            f"{folder}/pose={pose}/stiffness={name}.parquet" for pose in poses for name in names
+        ]
 
     def results(self) -> list[str]:
         """What a reader of the study wants to have: tables, ranking, model and figures."""
@@ -70,11 +72,19 @@ class Layout:
 
         Snakemake does not miss a deleted file once the table made of it exists.
         """
+        tables = ("calibrations", "simulations")
+        return [file for table in tables for file in self._absent(table, joined=True)]
+
+    def simulations_to_do(self) -> int:
+        """Number of simulations that have no file yet."""
+        return len(self._absent("simulations", joined=False))
+
+    def _absent(self, table: str, joined: bool) -> list[str]:
+        """Missing job files of a table; with `joined` of those blocks only that are in a table."""
         return [
             file
-            for table in ("calibrations", "simulations")
             for specimen, block in self.blocks(table)
-            if self._is_joined(table, specimen, block)
+            if not joined or self._is_joined(table, specimen, block)
             for file in self.job_files(table, specimen, block)
             if not os.path.exists(file)
         ]

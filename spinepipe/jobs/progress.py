@@ -3,22 +3,25 @@
 import sys
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from typing import TextIO
 
 _SECONDS_BETWEEN_LINES = 2.0
+_JOBS_IN_RATE = 400
 
 
 class Progress:
     """Counts finished jobs and writes a line with an estimate of the time left.
+
+    The estimate is the pace of the latest few hundred jobs, applied to all that are left.
 
     Parameters
     ----------
     totals
         Returns how many jobs of each rule the run needs, as far as is known by now.
     stream
-        Where the lines go.
+        Where the lines go; standard error unless told.
     clock
         Seconds, monotonic.
     """
@@ -26,42 +29,41 @@ class Progress:
     def __init__(
         self,
         totals: Callable[[], Mapping[str, int]],
-        stream: TextIO = sys.stderr,
+        stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._totals = totals
-        self._stream = stream
+        self._stream = stream or sys.stderr
         self._clock = clock
         self._lock = threading.Lock()
         self._done: Counter[str] = Counter()
-        self._started: dict[str, float] = {}
-        self._printed = clock()
-
-    def start(self, rule: str) -> None:
-        """Note that a job of this rule begins; the first one starts the rule's clock."""
-        with self._lock:
-            self._started.setdefault(rule, self._clock())
+        self._finished_at: deque[float] = deque(maxlen=_JOBS_IN_RATE)
+        self._printed_at = clock()
 
     def finish(self, rule: str) -> None:
         """Count one finished job of this rule and print a line when one is due."""
         with self._lock:
             self._done[rule] += 1
             now = self._clock()
-            if now - self._printed >= _SECONDS_BETWEEN_LINES:
-                self._printed = now
-                print(self._line(rule, now), file=self._stream, flush=True)
+            self._finished_at.append(now)
+            if now - self._printed_at >= _SECONDS_BETWEEN_LINES:
+                self._printed_at = now
+                print(self._line(rule), file=self._stream, flush=True)
 
-    def _line(self, rule: str, now: float) -> str:
-        totals = self._totals()
-        done = self._done[rule]
+    def _line(self, rule: str) -> str:
+        try:
+            totals = self._totals()
+        except RuntimeError:  # Snakemake changed its table of jobs while we were counting
+            totals = {}
+        done, all_done = self._done[rule], sum(self._done.values())
         total = max(totals.get(rule, 0), done)
-        left = (now - self._started.get(rule, now)) / done * (total - done)
-        all_done = sum(self._done.values())
         everything = max(sum(totals.values()), all_done)
-        return (
-            f"{rule}  {done}/{total}  ·  {duration(left)} left"
-            f"  ·  {all_done}/{everything} jobs in all"
-        )
+        line = f"{rule}  {done}/{total}  ·  {all_done}/{everything} jobs in all"
+        intervals = len(self._finished_at) - 1
+        if intervals > 0 and totals:
+            pace = (self._finished_at[-1] - self._finished_at[0]) / intervals
+            line += f"  ·  {duration(pace * (everything - all_done))} left"
+        return line
 
 
 def duration(seconds: float) -> str:

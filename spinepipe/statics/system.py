@@ -1,6 +1,8 @@
 """A model under one test, ready to be solved: residual and exact tangent at any pose."""
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -60,6 +62,16 @@ class System:
             self.measurement.append(ActiveEffect(index, effect, joints, values))
         else:
             raise TypeError(f"{effect!r} satisfies none of the five protocols of an effect")
+
+    def with_model(self, model: SpineModel) -> "System":
+        """The same chain, case and effects with the parameter values of another model."""
+        other = copy(self)
+        other.model = model
+        other.geometry = [_renewed(active, model) for active in self.geometry]
+        other.laws = [_renewed(active, model) for active in self.laws]
+        other.load_effects = [_renewed(active, model) for active in self.load_effects]
+        other.measurement = [_renewed(active, model) for active in self.measurement]
+        return other
 
     def initial_states(self) -> States:
         """States (J, S) of all path laws before the first step: zero."""
@@ -128,6 +140,12 @@ class System:
 
 
 _NOTHING = np.empty(0)
+
+Active = TypeVar("Active", ActiveGeometry, ActiveLaw, ActiveEffect)
+
+
+def _renewed(active: Active, model: SpineModel) -> Active:
+    return replace(active, values=model.effects[active.index].values)
 
 
 def _block_indices(n_joints: int) -> tuple[Array, Array]:

@@ -52,9 +52,13 @@ def say_where(names):
 
 
 def totals():
-    """Jobs per rule in this run, as far as Snakemake knows them by now."""
+    """Jobs per rule in this run. Until models are ranked, Snakemake does not know simulations."""
     jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
-    return Counter(job.rule.name for job in jobs)
+    counts = Counter(job.rule.name for job in jobs)
+    if not counts["simulate"]:
+        names = {job.wildcards.study for job in jobs if job.rule.name == "rank_models"}
+        counts["simulate"] = sum(layout(name).simulations_to_do() for name in names)
+    return counts
 
 
 progress = Progress(totals)
@@ -84,7 +88,6 @@ def plain(value):
 
 
 def execute(rule, job, wildcards, log, arguments):
-    progress.start(rule)
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
     submit_and_wait(name, f"spinepipe.jobs.{job}:run", str(log), **arguments)
     progress.finish(rule)

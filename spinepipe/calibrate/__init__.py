@@ -1,0 +1,16 @@
+"""Calibration: stiffness from measured motion, with its uncertainty and its honest status."""
+
+from spinepipe.calibrate.fit import Fit, Optimum, fit
+from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
+from spinepipe.calibrate.uncertainty import Uncertainty
+
+__all__ = [
+    "Evaluation",
+    "Evaluator",
+    "Fit",
+    "MeasuredCase",
+    "Optimum",
+    "Problem",
+    "Uncertainty",
+    "fit",
+]

@@ -1,0 +1,220 @@
+"""Bounded least squares with the exact Jacobian, from several starts, with honest status."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.uncertainty import Uncertainty, uncertainty
+from spinepipe.effects.contract import Array
+from spinepipe.statics import SolvedStep, Status
+
+MOST_EVALUATIONS = 200
+STIFFENING = 2.0
+"""Factor by which a start without a stable equilibrium is stiffened, again and again."""
+
+START_SPREAD = 30.0
+"""Further starts are drawn within this factor of the first, inside the bounds."""
+
+SAME_OPTIMUM = 1e-3
+"""Optima whose identifiable unknowns agree to this (logarithm) are one."""
+
+COST_TIE = 1e-6
+AT_BOUND = 1e-6
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where one start ended.
+
+    Attributes
+    ----------
+    x : (m,) unknowns relative to the model's values. at_bound : (m,) -1 lower, 0 none, 1 upper.
+    stiffened : doublings of stiffness the start needed before it had a stable equilibrium.
+    """
+
+    x: Array
+    at_bound: Array
+    cost: float
+    evaluation: Evaluation
+    status: Status
+    message: str
+    iterations: int
+    stiffened: int
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best optimum of all starts and what can be said of it.
+
+    Attributes
+    ----------
+    x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
+    cost : sum of weight times squared error, mm2 and deg2.
+    n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
+    """
+
+    x: Array
+    values: Array
+    at_bound: Array
+    uncertainty: Uncertainty
+    cost: float
+    status: Status
+    message: str
+    iterations: int
+    evaluations: int
+    n_optima: int
+    stiffened: int
+    solved: tuple[tuple[SolvedStep, ...], ...]
+
+
+def fit(
+    problem: Problem,
+    starts: int = 1,
+    seed: int = 0,
+    identifiable_below: float = 1.0,
+    noise: Array | None = None,
+) -> Fit:
+    """Fit a problem from the model's own values and ``starts - 1`` further points.
+
+    Parameters
+    ----------
+    identifiable_below : largest standard error of an unknown (of its logarithm where it is
+        logarithmic) at which it still counts as identified.
+    noise : (6,) m and rad, SD of one reading; None takes it from the residuals.
+    """
+    evaluator = Evaluator(problem)
+    optima = [_descend(evaluator, x) for x in _start_points(problem, starts, seed)]
+    best = min(optima, key=lambda o: (not o.status.usable, o.cost))
+    found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
+    return Fit(
+        x=best.x,
+        values=_values(problem, best.x),
+        at_bound=best.at_bound,
+        uncertainty=found,
+        cost=best.cost,
+        status=best.status,
+        message=best.message,
+        iterations=best.iterations,
+        evaluations=evaluator.evaluations,
+        n_optima=_distinct(optima, found.identifiable),
+        stiffened=best.stiffened,
+        solved=best.evaluation.solved,
+    )
+
+
+def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
+    """The model's own values, then a Latin hypercube around them inside the bounds."""
+    m = len(problem.free)
+    points = [np.zeros(m)]
+    if starts > 1:
+        spread = np.log(START_SPREAD)
+        low, high = np.maximum(problem.lower, -spread), np.minimum(problem.upper, spread)
+        unit = qmc.LatinHypercube(m, rng=np.random.default_rng(seed)).random(starts - 1)
+        points += list(low + unit * (high - low))
+    return points
+
+
+def _descend(evaluator: Evaluator, start: Array) -> Optimum:
+    """Least squares from one start; the start is stiffened until it has a stable equilibrium."""
+    problem = evaluator.problem
+    start, stiffened = _stand_up(evaluator, start)
+    if start is None:
+        nowhere = Evaluation(None, None, (), evaluator.coordinate)
+        x = problem.upper.copy()
+        message = "no stable equilibrium up to the upper bounds: the loads tip the segment over"
+        at_bound = np.ones(len(x), dtype=int)
+        return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, message, 0, stiffened)
+    return _least_squares(evaluator, start, stiffened)
+
+
+def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
+    """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
+    problem, stiffened = evaluator.problem, 0
+    while evaluator.at(start, with_jacobian=False).residual is None:
+        if np.all(start >= problem.upper):
+            return None, stiffened
+        start = np.minimum(start + np.log(STIFFENING), problem.upper)
+        stiffened += 1
+    return start, stiffened
+
+
+def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimum:
+    problem = evaluator.problem
+    size = len(evaluator.coordinate)
+    seen: dict[bytes, Evaluation] = {}
+
+    def residual(x: Array) -> Array:
+        seen[x.tobytes()] = here = evaluator.at(x)
+        return np.full(size, np.nan) if here.residual is None else here.residual
+
+    def jacobian(x: Array) -> Array:
+        found = seen[x.tobytes()].jacobian
+        assert found is not None
+        return found
+
+    result = least_squares(
+        residual,
+        np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9),
+        jac=jacobian,
+        bounds=(problem.lower, problem.upper),
+        method="dogbox",
+        ftol=1e-14,
+        xtol=1e-12,
+        gtol=1e-14,
+        max_nfev=MOST_EVALUATIONS,
+    )
+    at_bound = _bounds_reached(problem, result.x)
+    status, message = _verdict(problem, bool(result.success), at_bound)
+    evaluation = seen[result.x.tobytes()]
+    return Optimum(
+        result.x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
+    )
+
+
+def _bounds_reached(problem: Problem, x: Array) -> Array:
+    """(m,) -1 at the lower, 1 at the upper bound, else 0."""
+    low, high = x - problem.lower < AT_BOUND, problem.upper - x < AT_BOUND
+    return high.astype(int) - low.astype(int)
+
+
+def _verdict(problem: Problem, success: bool, at_bound: Array) -> tuple[Status, str]:
+    if not success:
+        return Status.NOT_CONVERGED, f"no optimum within {MOST_EVALUATIONS} evaluations"
+    if not at_bound.any():
+        return Status.CONVERGED, ""
+    names = [
+        f"{parameter.label} at its {'upper' if side > 0 else 'lower'} bound"
+        for parameter, side in zip(problem.free, at_bound, strict=True)
+        if side
+    ]
+    return Status.CONVERGED_AT_BOUND, ", ".join(names)
+
+
+def _values(problem: Problem, x: Array) -> Array:
+    """(m,) value of each unknown's first row, SI."""
+    start = [problem.model.effects[p.effect].values[p.rows[0], p.column] for p in problem.free]
+    return np.array(
+        [
+            value * np.exp(change) if parameter.logarithmic else value + change
+            for parameter, value, change in zip(problem.free, start, x, strict=True)
+        ]
+    )
+
+
+def _distinct(optima: Sequence[Optimum], identifiable: Array) -> int:
+    """Number of different optima among the starts that ended, told by what is identifiable."""
+    kept: list[Optimum] = []
+    for optimum in (o for o in optima if o.status.usable):
+        if not any(_same(optimum, other, identifiable) for other in kept):
+            kept.append(optimum)
+    return len(kept)
+
+
+def _same(one: Optimum, other: Optimum, identifiable: Array) -> bool:
+    close = np.abs(one.x - other.x)[identifiable] < SAME_OPTIMUM
+    tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
+    return bool(close.all()) and tie

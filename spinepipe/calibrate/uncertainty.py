@@ -1,0 +1,91 @@
+"""How sure a fit is of each unknown: covariance, standard errors, identifiability."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.calibrate.problem import Evaluation, Problem
+from spinepipe.effects.contract import Array
+from spinepipe.units import BORDER_PER_SI
+
+RANK_TOLERANCE = 1e-8
+"""Directions whose singular value is this far below the largest leave no trace in the data."""
+
+UNSEEN_SHARE = 1e-6
+"""An unknown with more of its axis than this in such directions is not determined."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard errors of the unknowns, of their logarithm where they are logarithmic.
+
+    Attributes
+    ----------
+    covariance : (m, m); infinite for unknowns at a bound.
+    standard_error : (m,); infinite where the data do not constrain the unknown.
+    identifiable : (m,) bool.
+    degrees_of_freedom : readings less unknowns; the scatter comes from them.
+    """
+
+    covariance: Array
+    standard_error: Array
+    identifiable: Array
+    degrees_of_freedom: int
+
+
+def uncertainty(
+    problem: Problem,
+    evaluation: Evaluation,
+    at_bound: Array,
+    identifiable_below: float,
+    noise: Array | None,
+) -> Uncertainty:
+    """Uncertainty of a fit from its Jacobian; unknowns at a bound are held there.
+
+    Parameters
+    ----------
+    noise : (6,) m and rad; with None the scatter of the weighted residuals is used, and with no
+        degree of freedom left nothing is identifiable.
+    """
+    m = len(problem.free)
+    infinite = np.full((m, m), np.inf)
+    nothing = np.zeros(m, dtype=bool)
+    if evaluation.residual is None or evaluation.jacobian is None:
+        return Uncertainty(infinite, np.full(m, np.inf), nothing, 0)
+    inside = at_bound == 0
+    freedom = len(evaluation.residual) - int(inside.sum())
+    covariance, error = infinite, np.full(m, np.inf)
+    deviation = _deviation(problem, evaluation, freedom, noise)
+    if deviation is not None:
+        inner, known = _covariance(evaluation.jacobian[:, inside], deviation)
+        covariance = infinite.copy()
+        covariance[np.ix_(inside, inside)] = inner
+        error[inside] = np.where(known, np.sqrt(np.diagonal(inner)), np.inf)
+    return Uncertainty(covariance, error, error < identifiable_below, freedom)
+
+
+def _deviation(
+    problem: Problem, evaluation: Evaluation, freedom: int, noise: Array | None
+) -> Array | None:
+    """(N,) SD of each weighted residual: declared, or one scatter for all, or None if unknown."""
+    residual = evaluation.residual
+    assert residual is not None
+    if noise is not None:
+        declared: Array = (np.sqrt(problem.weights) * BORDER_PER_SI * noise)[evaluation.coordinate]
+        return declared
+    if freedom <= 0:
+        return None
+    return np.full(len(residual), np.sqrt(residual @ residual / freedom))
+
+
+def _covariance(jacobian: Array, deviation: Array) -> tuple[Array, Array]:
+    """Covariance (m, m) of the unknowns and which of them (m,) the data determine at all."""
+    if jacobian.shape[1] == 0:
+        return np.zeros((0, 0)), np.zeros(0, dtype=bool)
+    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    seen = singular > RANK_TOLERANCE * singular[0]
+    if not singular[0] > 0.0:
+        return np.zeros((len(right), len(right))), np.zeros(len(right), dtype=bool)
+    gain = (right[seen].T / singular[seen]) @ left[:, seen].T * deviation
+    unseen = np.linalg.norm(right[~seen], axis=0)
+    return gain @ gain.T, unseen < UNSEEN_SHARE

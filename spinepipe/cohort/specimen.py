@@ -1,0 +1,212 @@
+"""From a cohort's tables to what the engine takes: frames, bodies, load cases, motion. SI."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort.cohort import Cohort
+from spinepipe.effects import Wrench
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose, joint_pose, reexpress, rotation_zxy
+from spinepipe.model import (
+    STANDARD_GRAVITY,
+    Body,
+    LoadCase,
+    LoadStep,
+    ScopedEffect,
+    SpineModel,
+)
+from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, to_si
+
+Landmarks = Mapping[str, Mapping[str, Array]]
+"""Points in m, ground: vertebra to landmark to (3,)."""
+
+_POINT = ["x_mm", "y_mm", "z_mm"]
+_INERTIA = ["ixx_kg_m2", "iyy_kg_m2", "izz_kg_m2", "ixy_kg_m2", "ixz_kg_m2", "iyz_kg_m2"]
+
+
+@dataclass(frozen=True)
+class MeasuredMotion:
+    """Motion of one cycle of one test.
+
+    Attributes
+    ----------
+    q : (T, J, 6) m and rad by the load case's steps, NaN where not measured.
+    """
+
+    test: str
+    cycle: int
+    q: Array
+
+
+def landmarks(cohort: Cohort, specimen: str) -> dict[str, dict[str, Array]]:
+    """Landmarks of a specimen as the cohort lists them."""
+    assert cohort.landmarks is not None
+    rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
+    points = rows[_POINT].to_numpy(float) / MM_PER_M
+    found: dict[str, dict[str, Array]] = {}
+    for vertebra, name, point in zip(rows["vertebra"], rows["landmark"], points, strict=True):
+        found.setdefault(vertebra, {})[name] = point
+    return found
+
+
+def frames_from_landmarks(vertebrae: Sequence[str], points: Landmarks) -> tuple[Pose, ...]:
+    """Joint frames in ground, caudal to cranial.
+
+    Raises
+    ------
+    ValueError
+        Naming the joint whose landmarks define no frame.
+    """
+    frames = []
+    for lower, upper in zip(vertebrae[:-1], vertebrae[1:], strict=True):
+        try:
+            frames.append(joint_pose(points[lower], points[upper]))
+        except ValueError as error:
+            raise ValueError(f"joint {upper}{lower}: {error}") from error
+    return tuple(frames)
+
+
+def joint_frames(cohort: Cohort, specimen: str) -> tuple[Pose, ...]:
+    """Joint frames in ground at the neutral pose: ``joints.csv`` counts before landmarks."""
+    if cohort.joints is None:
+        return frames_from_landmarks(cohort.vertebrae, landmarks(cohort, specimen))
+    rows = cohort.joints[cohort.joints["specimen"] == specimen].set_index("joint")
+    rows = rows.loc[list(cohort.joint_names)]
+    origins = rows[_POINT].to_numpy(float) / MM_PER_M
+    angles = np.deg2rad(rows[["extension_deg", "right_bending_deg", "left_rotation_deg"]])
+    return tuple(
+        Pose(rotation_zxy(*angle), origin)
+        for origin, angle in zip(origins, angles.to_numpy(float), strict=True)
+    )
+
+
+def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
+    """Moving vertebrae; massless where the cohort lists no bodies, points without inertia."""
+    names = cohort.vertebrae[1:]
+    if cohort.bodies is None:
+        return tuple(Body(name, 0.0, np.zeros(3), np.zeros((3, 3))) for name in names)
+    rows = cohort.bodies[cohort.bodies["specimen"] == specimen].set_index("vertebra")
+    return tuple(_body(name, rows.loc[name]) for name in names if name in rows.index)
+
+
+def _body(name: str, row: pd.Series) -> Body:
+    com = row[["com_x_mm", "com_y_mm", "com_z_mm"]].to_numpy(float) / MM_PER_M
+    xx, yy, zz, xy, xz, yz = np.nan_to_num(row[_INERTIA].to_numpy(float))
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Body(name, float(row["mass_kg"]), com, inertia)
+
+
+def spine_model(
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    effects: tuple[ScopedEffect, ...],
+    damping: Array,
+) -> SpineModel:
+    """The model of a specimen with these joint frames and effects; ``damping`` (6,) SI."""
+    n = len(cohort.joint_names)
+    return SpineModel(
+        specimen=specimen,
+        joints=cohort.joint_names,
+        frames=frames,
+        bodies=bodies(cohort, specimen),
+        gravity=STANDARD_GRAVITY if cohort.gravity else np.zeros(3),
+        damping=np.tile(damping, (n, 1)),
+        effects=effects,
+    )
+
+
+def load_cases(
+    cohort: Cohort, specimen: str, tests: Sequence[str], shift: Array
+) -> tuple[LoadCase, ...]:
+    """Cycles of the named tests of a specimen; ``shift`` (3,) m is added to every load point."""
+    assert cohort.loads is not None
+    rows = cohort.loads[cohort.loads["specimen"].isin([specimen, "*"])]
+    coms = {body.name: body.com for body in bodies(cohort, specimen)}
+    cases = []
+    for test in tests:
+        of_test = rows[rows["test"] == test]
+        for cycle in _cycles(cohort, specimen, test):
+            of_cycle = of_test[of_test["cycle"].isna() | (of_test["cycle"] == cycle)]
+            if len(of_cycle):
+                cases.append(LoadCase(test, cycle, _steps(cohort, of_cycle, coms, shift)))
+    return tuple(cases)
+
+
+def _cycles(cohort: Cohort, specimen: str, test: str) -> list[int]:
+    """Cycle numbers of a test that the loads or the motion of the specimen name, else 1."""
+    assert cohort.loads is not None
+    numbers: set[int] = set()
+    for table in (cohort.loads, cohort.motion):
+        if table is not None:
+            here = table[table["specimen"].isin([specimen, "*"]) & (table["test"] == test)]
+            numbers |= set(here["cycle"].dropna().astype(int))
+    return sorted(numbers) or [1]
+
+
+def _steps(
+    cohort: Cohort, rows: pd.DataFrame, coms: Mapping[str, Array], shift: Array
+) -> tuple[LoadStep, ...]:
+    moving = {name: index for index, name in enumerate(cohort.vertebrae[1:])}
+    steps = []
+    for step, of_step in rows.groupby("step", sort=True):
+        wrenches = tuple(
+            _wrench(moving[row.vertebra], row, coms, shift) for row in of_step.itertuples()
+        )
+        times = of_step["time_s"].dropna()
+        steps.append(LoadStep(int(step), wrenches, float(times.iloc[0]) if len(times) else None))  # type: ignore[call-overload]
+    return tuple(steps)
+
+
+def _wrench(body: int, row, coms: Mapping[str, Array], shift: Array) -> Wrench:  # type: ignore[no-untyped-def]
+    point = np.array([row.px_mm, row.py_mm, row.pz_mm]) / MM_PER_M
+    if np.isnan(point).any():
+        point = coms[row.vertebra]
+    force = np.array([row.fx_n, row.fy_n, row.fz_n], dtype=float)
+    moment = np.array([row.mx_nm, row.my_nm, row.mz_nm], dtype=float)
+    return Wrench(body, point + shift, force, moment)
+
+
+def measured_motion(
+    cohort: Cohort, specimen: str, cases: Sequence[LoadCase]
+) -> tuple[MeasuredMotion, ...]:
+    """Measured motion of each case, in the cohort's own joint frames, all NaN where there is none."""
+    joints = {name: index for index, name in enumerate(cohort.joint_names)}
+    return tuple(_motion(cohort, specimen, case, joints) for case in cases)
+
+
+def _motion(
+    cohort: Cohort, specimen: str, case: LoadCase, joints: Mapping[str, int]
+) -> MeasuredMotion:
+    q = np.full((len(case.steps), len(joints), 6), np.nan)
+    if cohort.motion is not None:
+        table = cohort.motion
+        rows = table[
+            (table["specimen"] == specimen)
+            & (table["test"] == case.test)
+            & (table["cycle"] == case.cycle)
+        ]
+        at = {step.step: index for index, step in enumerate(case.steps)}
+        values = to_si(rows[list(COORDINATE_COLUMNS)].to_numpy(float))
+        for step, joint, value in zip(rows["step"], rows["joint"], values, strict=True):
+            q[at[int(step)], joints[joint]] = value
+    return MeasuredMotion(case.test, case.cycle, q)
+
+
+def in_frames(
+    motion: MeasuredMotion, nominal: Sequence[Pose], sampled: Sequence[Pose]
+) -> MeasuredMotion:
+    """The same motion of the vertebrae, expressed in other joint frames.
+
+    The motion belongs to the vertebrae, so all six components are needed: those not measured are
+    taken as zero for the purpose, and stay NaN in the result.
+    """
+    q = motion.q.copy()
+    for step, joint in zip(*np.nonzero(np.isfinite(motion.q).any(axis=2)), strict=True):
+        known = np.isfinite(q[step, joint])
+        moved = reexpress(np.nan_to_num(q[step, joint]), nominal[joint], sampled[joint])
+        q[step, joint] = np.where(known, moved, np.nan)
+    return MeasuredMotion(motion.test, motion.cycle, q)

@@ -1,0 +1,38 @@
+"""Statics: equilibria of a spine model, their stability and sensitivities, and settling in time."""
+
+from spinepipe.statics.equilibrium import Equilibrium
+from spinepipe.statics.free import FreeParameter, declared, free_parameters, moved
+from spinepipe.statics.load_sensitivity import LoadSensitivity, by_load
+from spinepipe.statics.loading import Loading, Slots
+from spinepipe.statics.path import SolvedStep, follow
+from spinepipe.statics.pose_sensitivity import by_joint_pose
+from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
+from spinepipe.statics.settle import Program, Settled, settle
+from spinepipe.statics.status import Status
+from spinepipe.statics.system import Balance, System
+from spinepipe.world import Chain
+
+__all__ = [
+    "Balance",
+    "Chain",
+    "Equilibrium",
+    "FreeParameter",
+    "LoadSensitivity",
+    "Loading",
+    "Program",
+    "Settled",
+    "Slots",
+    "SolvedStep",
+    "Status",
+    "System",
+    "by_joint_pose",
+    "by_load",
+    "by_parameters",
+    "declared",
+    "follow",
+    "free_parameters",
+    "moved",
+    "observe",
+    "observed_by_parameters",
+    "settle",
+]
