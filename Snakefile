@@ -7,14 +7,11 @@ min_version("9.27")
 sys.path.insert(0, workflow.basedir)
 
 
-configfile: "config/config.yaml"
-
-
 include: "workflow/rules/common.smk"
 include: "workflow/rules/execution.smk"
 
 
-STUDIES = selected_studies()
+SELECTION = selection()
 
 
 wildcard_constraints:
@@ -32,18 +29,25 @@ include: "workflow/rules/joint_pose_sensitivity.smk"
 rule all:
     default_target: True
     input:
-        [
-            path
-            for name in STUDIES
-            for path in layout(name).results() + layout(name).lost()
-        ],
+        everything(SELECTION.studies),
+
+
+# The long studies of config.yaml, read only when asked for.
+rule full:
+    input:
+        lambda wildcards: everything(SELECTION.full),
 
 
 onstart:
     check_engine()
-    check_writable(STUDIES)
-    drop_job_chatter()
+    check_writable()
+    logger.addFilter(to_the_point)
 
 
 onsuccess:
-    say_where(STUDIES)
+    sweep_logs()
+    say_where()
+
+
+onerror:
+    sweep_logs()

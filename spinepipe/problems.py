@@ -66,8 +66,12 @@ class InputError(Exception):
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that is most like ``name``, if any is."""
-    matches = get_close_matches(name, list(known), n=1, cutoff=0.6)
+    """The known name that is most like ``name``, or the only one that begins with it."""
+    names = list(known)
+    matches = get_close_matches(name, names, n=1, cutoff=0.6)
+    longer = [other for other in names if other.startswith(name)]
+    if not matches and len(longer) == 1:
+        return longer[0]
     return matches[0] if matches else None
 
 

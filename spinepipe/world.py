@@ -21,7 +21,6 @@ from spinepipe.model.spine import RefusedModel, SpineModel
 from spinepipe.model.urdf import urdf
 
 
-
 @contextlib.contextmanager
 def _silent_stdout() -> Iterator[None]:
     """Swallow what C code prints: PyBullet greets on import."""

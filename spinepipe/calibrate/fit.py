@@ -134,7 +134,7 @@ def _descend(evaluator: Evaluator, start: Array) -> Optimum:
 def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
     """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
     problem, stiffened = evaluator.problem, 0
-    while evaluator.at(start, with_jacobian=False).residual is None:
+    while evaluator.at(start).residual is None:
         if np.all(start >= problem.upper):
             return None, stiffened
         start = np.minimum(start + np.log(STIFFENING), problem.upper)

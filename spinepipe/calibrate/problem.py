@@ -80,47 +80,69 @@ class Evaluator:
         self._used = [_used(m.measured, problem.weights) for m in problem.cases]
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
-        self._guesses: list[list[Array]] | None = None
+        self._last: _Neighbour | None = None
         self.evaluations = 0
 
-    def at(self, x: Array, with_jacobian: bool = True) -> Evaluation:
+    def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,)."""
         self.evaluations += 1
         model = moved(self.problem.model, self.problem.free, x)
         systems = [system.with_model(model) for system in self._systems]
-        guesses = self._guesses or [None] * len(systems)
+        guesses = self._last.guesses(x) if self._last else [None] * len(systems)
         solved = tuple(
             tuple(follow(system, guess)) for system, guess in zip(systems, guesses, strict=True)
         )
         failed = [step for case in solved for step in case if not step.usable]
         if failed:
             return Evaluation(None, None, solved, self.coordinate, failed[0].equilibrium.message)
-        self._guesses = [[step.equilibrium.q for step in case] for case in solved]
-        parts = [self._case(n, systems[n], solved[n], with_jacobian) for n in range(len(systems))]
-        residual = np.concatenate([part[0] for part in parts])
-        jacobian = np.concatenate([part[1] for part in parts]) if with_jacobian else None
+        poses = [[step.equilibrium.q for step in case] for case in solved]
+        free = self.problem.free
+        by_x = [by_parameters(s, c, free) for s, c in zip(systems, solved, strict=True)]
+        self._last = _Neighbour(x.copy(), poses, by_x)
+        numbers = range(len(systems))
+        residual = np.concatenate([self._residual(n, systems[n], poses[n]) for n in numbers])
+        jacobian = np.concatenate(
+            [self._jacobian(n, systems[n], poses[n], by_x[n]) for n in numbers]
+        )
         return Evaluation(residual, jacobian, solved, self.coordinate)
 
-    def _case(
-        self, number: int, system: System, solved: Sequence[SolvedStep], with_jacobian: bool
-    ) -> tuple[Array, Array]:
-        """Weighted residuals of the used readings of one case, and their Jacobian."""
-        measured, used = self.problem.cases[number], self._used[number]
-        seen = np.stack([observe(system, step.equilibrium.q)[0] for step in solved])
+    def _residual(self, number: int, system: System, poses: Sequence[Array]) -> Array:
+        """(N,) weighted residuals of the readings of one case that enter the cost."""
+        measured = self.problem.cases[number]
+        seen = np.stack([observe(system, q)[0] for q in poses])
         seen = seen - seen[0] if measured.zeroed else seen
-        error = (seen - np.nan_to_num(measured.measured)) * self._scale
-        if not with_jacobian:
-            return error[used], np.empty((0, 0))
-        free = self.problem.free
-        poses = by_parameters(system, solved, free)
-        by_x = np.stack(
+        error: Array = (seen - measured.measured) * self._scale
+        return error[self._used[number]]
+
+    def _jacobian(
+        self, number: int, system: System, poses: Sequence[Array], by_x: Sequence[Array]
+    ) -> Array:
+        """(N, m) derivative of the residuals of one case by the unknowns."""
+        seen = np.stack(
             [
-                observed_by_parameters(system, step.equilibrium.q, dq, free)
-                for step, dq in zip(solved, poses, strict=True)
+                observed_by_parameters(system, q, dq, self.problem.free)
+                for q, dq in zip(poses, by_x, strict=True)
             ]
         )
-        by_x = by_x - by_x[0] if measured.zeroed else by_x
-        return error[used], (by_x * self._scale[:, None])[used]
+        seen = seen - seen[0] if self.problem.cases[number].zeroed else seen
+        return (seen * self._scale[:, None])[self._used[number]]
+
+
+@dataclass(frozen=True)
+class _Neighbour:
+    """The last solved point: poses (n,) and their derivatives (n, m) by case and step."""
+
+    x: Array
+    poses: list[list[Array]]
+    by_x: list[list[Array]]
+
+    def guesses(self, x: Array) -> list[list[Array]]:
+        """Poses to start from at another point, to first order; far away the poses themselves."""
+        change = np.clip(x - self.x, -1.0, 1.0)
+        return [
+            [q + dq @ change for q, dq in zip(case, by_x, strict=True)]
+            for case, by_x in zip(self.poses, self.by_x, strict=True)
+        ]
 
 
 def _used(measured: Array, weights: Array) -> Array:

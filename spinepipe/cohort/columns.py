@@ -11,6 +11,7 @@ COHORT_YAML = "cohort.yaml"
 Kind = Literal["text", "number", "integer"]
 
 LARGEST_ANGLE_DEG = 90.0
+LARGEST_COUNT = 1_000_000
 LARGEST_COORDINATE_MM = 10_000.0
 LARGEST_FORCE_N = 20_000.0
 LARGEST_MOMENT_NM = 500.0
@@ -128,7 +129,7 @@ _SPECIMEN = _key("specimen", "specimen")
 _VERTEBRA = _key("vertebra", "vertebra, as listed in cohort.yaml")
 _JOINT = _key("joint", "joint, upper vertebra then lower: L4L5 is L4 moving on L5")
 _TEST = _key("test", "load case")
-_STEP = Column("step", "load step, from 0, in the order applied", "integer", True, low=0)
+_STEP = Column("step", "load step, from 0, in the order applied", "integer", True, 0, LARGEST_COUNT)
 
 SPECIMENS = TableForm(
     "specimens",
@@ -188,7 +189,13 @@ LOADS = TableForm(
     (
         _key("specimen", "specimen, * stands for all"),
         _TEST,
-        Column("cycle", "repeat of the test, empty stands for all", "integer", low=1),
+        Column(
+            "cycle",
+            "repeat of the test, empty stands for all",
+            "integer",
+            low=1,
+            high=LARGEST_COUNT,
+        ),
         _STEP,
         _VERTEBRA,
         *_loads(("fx_n", "fy_n", "fz_n"), "force", LARGEST_FORCE_N),
@@ -205,7 +212,9 @@ MOTION = TableForm(
     (
         _SPECIMEN,
         _TEST,
-        Column("cycle", "repeat of the test, empty stands for 1", "integer", low=1),
+        Column(
+            "cycle", "repeat of the test, empty stands for 1", "integer", low=1, high=LARGEST_COUNT
+        ),
         _STEP,
         _JOINT,
         *_angles("measured rotation of the joint", required=False),

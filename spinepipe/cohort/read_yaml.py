@@ -64,7 +64,7 @@ def read_yaml(path: Path, file: str) -> tuple[Document | None, list[Problem]]:
         if not isinstance(node, yaml.MappingNode):
             return None, [_no_keys(file)]
         lines: dict[str, int] = {}
-        problems = list(_walk(node, "", file, lines))
+        problems = list(_walk(node, "", file, lines, set()))
         data = loader.construct_document(node)
     except (yaml.YAMLError, ValueError) as error:
         return None, [_no_yaml(file, error)]
@@ -73,13 +73,18 @@ def read_yaml(path: Path, file: str) -> tuple[Document | None, list[Problem]]:
     return Document(file, data, lines), problems
 
 
-def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Iterator[Problem]:
+def _walk(
+    node: yaml.Node, path: str, file: str, lines: dict[str, int], walked: set[int]
+) -> Iterator[Problem]:
     """Note the line of every key below a node, and report repeated keys."""
+    if id(node) in walked:  # an alias, perhaps of a node that holds itself
+        return
+    walked.add(id(node))
     prefix = f"{path}." if path else ""
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             lines[f"{prefix}{index}"] = item.start_mark.line + 1
-            yield from _walk(item, f"{prefix}{index}", file, lines)
+            yield from _walk(item, f"{prefix}{index}", file, lines, walked)
     if isinstance(node, yaml.MappingNode):
         seen: set[str] = set()
         for key_node, value in node.value:
@@ -89,7 +94,7 @@ def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Itera
                 yield Problem(file, line, key, "the same key twice", "each key once", remedy)
             seen.add(key)
             lines.setdefault(key, line)
-            yield from _walk(value, key, file, lines)
+            yield from _walk(value, key, file, lines, walked)
 
 
 def _no_keys(file: str) -> Problem:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 TABLES = ("landmarks", "poses", "calibrations", "simulations")
 FIGURES = ("stiffness", "errors", "joint_pose")
-_FILES_PER_BLOCK = 200
+_MOST_FILES_PER_BLOCK = 300
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,15 @@ class Layout:
         Number of sampled joint poses per specimen.
     best_models
         Number of best stiffness sets that are tried on every pose.
+    block
+        Poses whose job files are joined into one block, fewer if they have too many files.
     """
 
     study: str
     specimens: tuple[str, ...]
     poses: int
     best_models: int
+    block: int
 
     @property
     def stiffnesses(self) -> list[str]:
@@ -99,4 +102,4 @@ class Layout:
 
     def _poses_per_block(self, table: str) -> int:
         files_per_pose = 1 if table == "calibrations" else len(self.stiffnesses)
-        return max(1, _FILES_PER_BLOCK // files_per_pose)
+        return min(self.block, max(1, _MOST_FILES_PER_BLOCK // files_per_pose))

@@ -71,7 +71,9 @@ def _inertial(body: Body, frame: Pose) -> list[str]:
 def _origin(pose: Pose) -> str:
     if pose is IDENTITY:
         return '<origin xyz="0 0 0" rpy="0 0 0"/>'
-    return f'<origin xyz="{_numbers(pose.origin)}" rpy="{_numbers(_roll_pitch_yaw(pose.rotation))}"/>'
+    return (
+        f'<origin xyz="{_numbers(pose.origin)}" rpy="{_numbers(_roll_pitch_yaw(pose.rotation))}"/>'
+    )
 
 
 def _roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:

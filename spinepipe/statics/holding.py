@@ -78,9 +78,7 @@ class HoldingDerivatives:
     by_state: dict[int, Array]
 
 
-def differentiate(
-    placed: Placed, laws: Sequence[ActiveLaw], states: States
-) -> HoldingDerivatives:
+def differentiate(placed: Placed, laws: Sequence[ActiveLaw], states: States) -> HoldingDerivatives:
     """Derivatives by every parameter and internal state, geometry effects included."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     by_parameter: dict[int, Array] = {}

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.effects import Advance, PathLaw
+from spinepipe.effects import Advance
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
 from spinepipe.statics.equilibrium import Equilibrium, solve
@@ -67,11 +67,12 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
 
 def _advance(system: System, q: Array, states: States, seconds: float) -> dict[int, Advance]:
     """States after a step that ended at q (n,)."""
+    if not system.paths:
+        return {}
     joints = q.reshape(-1, 6)
     if system.geometry:
         joints = system.placed(q, with_parameters=False).q
     return {
         law.index: law.effect.advance(joints[law.joints], law.values, states[law.index], seconds)
-        for law in system.laws
-        if isinstance(law.effect, PathLaw)
+        for law in system.paths
     }

@@ -38,9 +38,7 @@ class Placed:
 def place(q: Array, geometry: Sequence[ActiveGeometry], with_parameters: bool) -> Placed:
     """Compose the geometry effects at joint coordinates q (J, 6), in the model's order."""
     n = len(q)
-    placed = Placed(
-        q.copy(), np.tile(np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6, 6)), {}
-    )
+    placed = Placed(q.copy(), np.tile(np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6, 6)), {})
     for active in geometry:
         placed = _then(placed, active, with_parameters)
     return placed

@@ -29,9 +29,7 @@ COUPLING = np.array(
 )
 """(4, 4) weights of earlier stages in the Jacobian term (gamma_ij, j < i)."""
 
-WEIGHTS = np.array(
-    [2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, GAMMA]
-)
+WEIGHTS = np.array([2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, GAMMA])
 EMBEDDED = np.array(
     [
         3.7810903145819369e-01,

@@ -24,9 +24,7 @@ def by_parameters(
     ValueError
         When a step has no equilibrium.
     """
-    state_by_x = {
-        i: np.zeros((*s.shape, len(free))) for i, s in system.initial_states().items()
-    }
+    state_by_x = {i: np.zeros((*s.shape, len(free))) for i, s in system.initial_states().items()}
     result = []
     for step in solved:
         if step.equilibrium.factored is None:

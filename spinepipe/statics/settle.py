@@ -185,8 +185,11 @@ class _Run:
             rate = self.rate + size * (ALPHA[i] @ stage_v)
             coupled_q, coupled_v = COUPLING[i] @ stage_q, COUPLING[i] @ stage_v
             force = self._force(q, rate, self.time + STAGE_TIMES[i] * size)
-            force = force if i == 0 else mass @ cho_solve(
-                cho_factor(system.chain.mass_matrix(q), check_finite=False), force
+            force = (
+                force
+                if i == 0
+                else mass
+                @ cho_solve(cho_factor(system.chain.mass_matrix(q), check_finite=False), force)
             )
             drift = rate + size * coupled_v
             force -= balance.tangent @ (implicit * drift + size * coupled_q)

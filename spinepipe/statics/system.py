@@ -49,7 +49,11 @@ class System:
         for index, scoped in enumerate(model.effects):
             if scoped.in_scope(case.test):
                 self._activate(index, scoped.effect, np.array(scoped.joints), scoped.values)
+        self.paths = tuple(law for law in self.laws if isinstance(law.effect, PathLaw))
         self._blocks = _block_indices(model.n_joints)
+        ones = np.ones((chain.n, chain.n))
+        self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
+        self._diagonal = np.diag_indices(chain.n)
 
     def _activate(self, index: int, effect: object, joints: Array, values: Array) -> None:
         if isinstance(effect, JointLaw | PathLaw):
@@ -69,17 +73,15 @@ class System:
         other.model = model
         other.geometry = [_renewed(active, model) for active in self.geometry]
         other.laws = [_renewed(active, model) for active in self.laws]
+        on_path = {law.index for law in self.paths}
+        other.paths = tuple(law for law in other.laws if law.index in on_path)
         other.load_effects = [_renewed(active, model) for active in self.load_effects]
         other.measurement = [_renewed(active, model) for active in self.measurement]
         return other
 
     def initial_states(self) -> States:
         """States (J, S) of all path laws before the first step: zero."""
-        return {
-            law.index: np.zeros((len(law.joints), law.effect.n_states))
-            for law in self.laws
-            if isinstance(law.effect, PathLaw)
-        }
+        return {law.index: np.zeros((len(law.joints), law.effect.n_states)) for law in self.paths}
 
     def balance(self, q: Array, loading: Loading, states: States) -> Balance:
         """Residual and tangent at q (n,)."""
@@ -120,7 +122,9 @@ class System:
                 angular = motion.angular(body)
                 load += angular @ moment
                 lower += angular @ (angular @ cross_matrix(moment).T).T
-        tangent = np.triu(symmetric) + np.triu(symmetric, 1).T + np.tril(lower, -1)
+        above = symmetric * self._above
+        tangent = above + above.T + lower * self._below
+        tangent[self._diagonal] += symmetric[self._diagonal]
         for active in self.load_effects:
             response = active.effect.apply(motion, self.slots.wrenches(loading), active.values)  # type: ignore[union-attr]
             load += loading.share * response.load

@@ -3,8 +3,6 @@ import os
 from functools import cache
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
-
 from spinepipe import studies
 from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.jobs.layout import Layout
@@ -16,41 +14,61 @@ LOGS = "results/{study}/logs"
 # Parts of a study that a job does not look at: changing them keeps its results. Everything
 # else counts, so that a setting added later is never overlooked.
 UNUSED = {
-    "sample_landmarks": {"title", "best_models"},
-    "build_models": {"title", "best_models"},
-    "calibrate": {"title", "best_models"},
-    "rank": {"title"},
-    "simulate": {"title", "best_models"},
-    "figures": set(),
+    "sample_landmarks": {
+        *("tests", "load_point_shift_mm", "stiffness", "damping", "loading"),
+        *("settle_time_s", "calibration", "best_models", "block"),
+    },
+    "build_models": {"calibration", "loading", "settle_time_s", "best_models", "block"},
+    "calibrate": {"best_models", "block"},
+    "rank": {"block"},
+    "simulate": {"best_models", "block"},
+    "figures": {"block"},
 }
 
 
-def selected_studies():
-    """Names of the studies that `all` builds, each validated; all problems are told at once."""
+def selection():
+    """Which studies are built; those of `all` are validated, all problems told at once."""
     problems = []
-    for name in config.get("studies") or []:
+    try:
+        chosen = studies.read_selection(Path(ROOT))
+    except InputError as error:
+        stop(error)
+    for name in chosen.studies:
         try:
             load(name)
-        except WorkflowError as error:
-            problems.append(str(error))
+        except InputError as error:
+            problems.append(f"study {name}: {error}")
     if problems:
-        raise WorkflowError("\n".join(problems))
-    return config.get("studies") or []
+        stop("\n".join(problems))
+    return chosen
+
+
+def stop(message):
+    """End with a message for people: Snakemake would add where in its rules it was raised."""
+    raise SystemExit(f"Nothing was run. {message}")
+
+
+def everything(names):
+    """All results of these studies, and job files of theirs that got lost."""
+    return [
+        file for name in names for file in layout(name).results() + layout(name).lost()
+    ]
 
 
 @cache
 def load(name):
     """The study of that name and its cohort, validated when first asked for."""
-    try:
-        return studies.check(Path(ROOT), name)
-    except InputError as error:
-        raise WorkflowError(f"study {name}: {error}") from None
+    return studies.check(Path(ROOT), name)
 
 
 @cache
 def layout(name):
-    study, cohort = load(name)
-    return Layout(name, tuple(cohort.specimen_names), study.poses, study.best_models)
+    try:
+        study, cohort = load(name)
+    except InputError as error:
+        stop(f"study {name}: {error}")
+    specimens = tuple(cohort.specimen_names)
+    return Layout(name, specimens, study.poses, study.best_models, study.block)
 
 
 @cache

@@ -4,7 +4,6 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from spinepipe.jobs.pool import submit_and_wait
@@ -14,41 +13,65 @@ from spinepipe.jobs.progress import Progress
 def check_engine():
     """Refuse to run jobs as one Snakemake process each, which is 70 times slower."""
     if not workflow.execution_settings.use_threads:
-        raise WorkflowError(
+        stop(
             "the option force-use-threads is off: each job would start Snakemake anew, 70 times "
             "slower.\nLet Snakemake find profiles/default beside the Snakefile (do not pass "
             "--workflow-profile none), or add --force-use-threads."
         )
 
 
-def drop_job_chatter():
-    """Keep Snakemake from writing two lines per job; its warnings and errors stay."""
-    chatter = ("Select jobs to execute", "Execute ")
-    logger.addFilter(lambda record: not str(record.msg).startswith(chatter))
+def to_the_point(record):
+    """Log filter: no two lines per job that starts, and of a failed job only its own words."""
+    text = str(record.msg)
+    if "JobFailed in file" in text:
+        noise = ("RuleException", "JobFailed in file", '  File "')
+        record.msg = "\n".join(
+            line for line in text.splitlines() if not line.startswith(noise)
+        )
+    return not text.startswith(("Select jobs to execute", "Execute "))
 
 
-def check_writable(names):
+def check_writable():
     """Say so at once when results cannot be written."""
-    for folder in ["results", *(f"results/{name}" for name in names)]:
+    for folder in ["results", *(f"results/{name}" for name in studies_at_work())]:
         try:
             os.makedirs(folder, exist_ok=True)
             probe = Path(folder, f".probe-{os.getpid()}")
             probe.write_text("1")
             probe.unlink()
         except OSError as error:
-            raise WorkflowError(
+            stop(
                 f"results cannot be written to {Path(folder).resolve()}: {error.strerror}. Make "
                 "room or change permissions, then run again (finished jobs are kept)."
-            ) from None
+            )
 
 
-def say_where(names):
-    """Name the folder of each study's tables and figures."""
-    for name in names:
+def studies_at_work():
+    """Names of the studies of which this run makes files."""
+    jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
+    return sorted(
+        {job.wildcards.study for job in jobs if "study" in job.wildcards.keys()}
+    )
+
+
+def say_where():
+    for name in studies_at_work():
         print(
-            f"{name}: tables and figures in {Path('results', name).resolve()}",
+            f"{name}: tables and figures in",
+            Path("results", name).resolve(),
             file=sys.stderr,
         )
+
+
+def sweep_logs():
+    """Remove the empty logs that Snakemake leaves for every job that went well."""
+    for name in studies_at_work():
+        for folder, _, files in os.walk(f"results/{name}/logs", topdown=False):
+            for path in (os.path.join(folder, file) for file in files):
+                if not os.path.getsize(path):
+                    os.unlink(path)
+            if not os.listdir(folder):
+                os.rmdir(folder)
 
 
 def totals():

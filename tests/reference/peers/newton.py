@@ -11,6 +11,11 @@ LoadAt = Callable[[Array, float], Array]
 DIFFERENCE_STEP = 1e-6
 """m and rad: truncation (1e-12) and round-off (1e-10) of a central difference both harmless."""
 
+LARGEST_STEP = 1.0
+"""m and rad: a longer step has left the neighbourhood of the load path; NaN counts as longer."""
+
+SLOW_CONTRACTION = 0.01
+
 MOST_ITERATIONS = 30
 MOST_LOAD_STEPS = 64
 
@@ -31,7 +36,7 @@ def root(load: LoadAt, start: Array, tol: float) -> Array:
         try:
             q = start
             for factor in np.arange(1, n_steps + 1) / n_steps:
-                q = _newton(lambda q, factor=factor: load(q, factor), q, tol)
+                q = _newton(load, float(factor), q, tol)
             return q
         except NoEquilibriumError:
             n_steps *= 4
@@ -44,20 +49,24 @@ def tangent(load: Callable[[Array], Array], q: Array, step: float = DIFFERENCE_S
     return np.array([(load(q + d) - load(q - d)) / (2 * step) for d in moves]).T
 
 
-def _newton(load: Callable[[Array], Array], start: Array, tol: float) -> Array:
+def _newton(load: LoadAt, factor: float, start: Array, tol: float) -> Array:
     """Newton steps; the tangent is taken anew only when a step did not shrink a hundredfold."""
+
+    def load_here(q: Array) -> Array:
+        return load(q, factor)
+
     q = np.array(start)
-    factors = np.linalg.inv(tangent(load, q))
+    inverse = np.linalg.inv(tangent(load_here, q))
     last = np.inf
     for _ in range(MOST_ITERATIONS):
-        step = factors @ load(q)
+        step = inverse @ load_here(q)
         q = q - step
         size = float(np.abs(step).max())
         if size < tol:
             return q
-        if not size < 1.0:
+        if not size < LARGEST_STEP:
             break
-        if size > 0.01 * last:
-            factors = np.linalg.inv(tangent(load, q))
+        if size > SLOW_CONTRACTION * last:
+            inverse = np.linalg.inv(tangent(load_here, q))
         last = size
     raise NoEquilibriumError(f"last step {size:.1e}")

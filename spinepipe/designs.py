@@ -1,0 +1,49 @@
+"""Designs: which points of an uncertain input are computed. Sampling is SALib's."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from SALib.sample import latin
+
+from spinepipe.effects.contract import Array
+
+
+def latin_hypercube_normal(means: Array, sds: Array, n: int, seed: int) -> Array:
+    """(n, D) Latin hypercube of independent normals with means (D,) and SDs (D,).
+
+    A coordinate whose SD is zero stays at its mean.
+
+    Raises
+    ------
+    ValueError
+        For a negative SD or fewer than two points.
+    """
+    if np.any(sds < 0.0) or n < 2:
+        raise ValueError("a Latin hypercube needs SDs that are not negative and at least 2 points")
+    free = np.flatnonzero(sds > 0.0)
+    points = np.tile(np.asarray(means, dtype=float), (n, 1))
+    if len(free):
+        problem = {
+            "num_vars": len(free),
+            "names": [f"x{index}" for index in free],
+            "bounds": [[0.0, 1.0]] * len(free),
+            "dists": ["norm"] * len(free),
+        }
+        points[:, free] += latin.sample(problem, n, seed=seed) * sds[free]
+    return points
+
+
+def specimen_seed(seed: int, specimen: str) -> int:
+    """A seed of its own for each specimen, so that adding one leaves the others' draws alone."""
+    words = np.frombuffer(specimen.encode(), dtype=np.uint8).astype(np.uint32)
+    return int(np.random.SeedSequence([seed, *words.tolist()]).generate_state(1)[0])
+
+
+def sample_landmarks(
+    points: Array, sds: Array, n: int, seed: int, specimen: str
+) -> tuple[Array, Sequence[int]]:
+    """(n, L, 3) landmark sets around points (L, 3) with per-axis SDs (L,), and pose numbers."""
+    flat = latin_hypercube_normal(
+        points.ravel(), np.repeat(sds, 3), n, specimen_seed(seed, specimen)
+    )
+    return flat.reshape(n, *points.shape), range(n)

@@ -1,0 +1,156 @@
+"""Job: stiffness of one specimen with one sampled joint pose."""
+
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
+from spinepipe.cohort.specimen import in_frames
+from spinepipe.designs import specimen_seed
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.jobs.inputs import (
+    bushing_model,
+    sampled_poses,
+    specimen_inputs,
+    start_stiffness,
+    study_and_cohort,
+)
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.statics import Status, free_parameters, moved
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import CALIBRATIONS, to_arrow, write
+from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
+
+
+def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
+    """Write the calibration row of one specimen and pose."""
+    settings, cohort = study_and_cohort(root, study)
+    rows = _rows(root, settings, specimen, int(pose), poses)
+    names = [column.name for column in CALIBRATIONS.columns]
+    columns = {name: [row[name] for row in rows] for name in names}
+    write(to_arrow(CALIBRATIONS, columns), output, provenance("calibrate", settings, cohort))
+
+
+def _rows(
+    root: str, settings: JointPoseSensitivity, specimen: str, pose: int, poses_file: str
+) -> list[dict[str, Any]]:
+    frames, reason = sampled_poses(poses_file).of(specimen, pose)
+    if frames is None:
+        return [_refused(specimen, pose, reason)]
+    try:
+        problem = _problem(root, settings, specimen, frames)
+        seed = specimen_seed(settings.seed, f"{specimen}/{pose}")
+        options = settings.calibration
+        found = fit(problem, options.starts, seed, options.identifiable_below)
+    except RefusedModel as error:
+        return [_refused(specimen, pose, str(error))]
+    return _fitted(settings, specimen, pose, problem, found)
+
+
+def _problem(
+    root: str, settings: JointPoseSensitivity, specimen: str, frames: tuple[Pose, ...]
+) -> Problem:
+    _, cohort = study_and_cohort(root, settings.study)
+    inputs = specimen_inputs(root, settings.study, specimen, cohort.digest)
+    model = bushing_model(settings, cohort, specimen, frames, start_stiffness(settings))
+    options = settings.calibration
+    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
+    free = free_parameters(model, 0, names, options.grouping)
+    reach = np.full(len(free), np.log(options.bound_factor))
+    cases = tuple(
+        MeasuredCase(case, in_frames(motion, inputs.nominal, frames).q, cohort.zeroed_at_step_0)
+        for case, motion in zip(inputs.cases, inputs.motions, strict=True)
+    )
+    weights = np.array(options.weights.in_order(), dtype=float)
+    return Problem(model, cases, free, weights, -reach, reach)
+
+
+def _fitted(
+    settings: JointPoseSensitivity, specimen: str, pose: int, problem: Problem, found: Fit
+) -> list[dict[str, Any]]:
+    """One row, or one per joint where stiffness is per joint."""
+    shared = settings.calibration.grouping == "per_specimen"
+    solved = found.status.usable
+    model = moved(problem.model, problem.free, found.x)
+    common = {
+        "specimen": specimen,
+        "pose": pose,
+        **_errors(problem, found),
+        "cost": found.cost if np.isfinite(found.cost) else None,
+        "degrees_of_freedom": found.uncertainty.degrees_of_freedom,
+        "iterations": found.iterations,
+        "evaluations": found.evaluations,
+        "n_optima": found.n_optima,
+        "start_stiffened": found.stiffened,
+        "status": found.status.value,
+        "message": _message(found),
+    }
+    joints = range(1) if shared else range(model.n_joints)
+    return [
+        {
+            **common,
+            "joint": "*" if shared else model.joints[joint],
+            **_stiffness(problem, found, model, joint, solved),
+        }
+        for joint in joints
+    ]
+
+
+def _message(found: Fit) -> str:
+    notes = [found.message] if found.message else []
+    if found.stiffened:
+        notes.append(f"start stiffened {2**found.stiffened} x to stand")
+    if found.n_optima > 1:
+        notes.append(f"{found.n_optima} optima: the answer depends on the start")
+    return "; ".join(notes)
+
+
+def _stiffness(
+    problem: Problem, found: Fit, model: SpineModel, joint: int, solved: bool
+) -> dict[str, Any]:
+    """Stiffness, standard error and identifiability of one joint."""
+    row: dict[str, Any] = {}
+    values = model.effects[0].values[joint]
+    for column, (name, stiffness) in enumerate(zip(COORDINATES, STIFFNESS_COLUMNS, strict=True)):
+        suffix = stiffness.removeprefix(f"{name}_")
+        row[stiffness] = values[column] if solved else None
+        row[f"{name}_se_{suffix}"], row[f"{name}_identifiable"] = None, None
+        for index, unknown in enumerate(problem.free):
+            if unknown.column == column and joint in unknown.rows:
+                error = values[column] * found.uncertainty.standard_error[index]
+                row[f"{name}_se_{suffix}"] = error if np.isfinite(error) and solved else None
+                row[f"{name}_identifiable"] = bool(found.uncertainty.identifiable[index]) and solved
+    return row
+
+
+def _errors(problem: Problem, found: Fit) -> dict[str, Any]:
+    """Mean absolute error per coordinate over all measured readings, mm and deg."""
+    nothing = {_error_column(name): None for name in COORDINATE_COLUMNS}
+    if not found.status.usable:
+        return nothing
+    errors = np.concatenate(
+        [
+            np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps]) - measured.measured
+            for steps, measured in zip(found.solved, problem.cases, strict=True)
+        ]
+    )
+    size: Array = np.abs(errors.reshape(-1, 6)) * BORDER_PER_SI
+    return {
+        _error_column(name): float(np.nanmean(column)) if np.isfinite(column).any() else None
+        for name, column in zip(COORDINATE_COLUMNS, size.T, strict=True)
+    }
+
+
+def _error_column(column: str) -> str:
+    name, unit = column.rsplit("_", 1)
+    return f"{name}_error_{unit}"
+
+
+def _refused(specimen: str, pose: int, message: str) -> dict[str, Any]:
+    row: dict[str, Any] = {column.name: None for column in CALIBRATIONS.columns}
+    zero = ("degrees_of_freedom", "iterations", "evaluations", "n_optima", "start_stiffened")
+    row.update(dict.fromkeys(zero, 0))
+    row.update(specimen=specimen, pose=pose, joint="*", status=Status.REFUSED.value)
+    return {**row, "message": message}

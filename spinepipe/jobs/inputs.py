@@ -1,0 +1,125 @@
+"""What many jobs of one worker read again and again, kept as long as the files are the same."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import (
+    MeasuredMotion,
+    joint_frames,
+    load_cases,
+    measured_motion,
+    spine_model,
+)
+from spinepipe.effects import create
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose, rotation_zxy
+from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.studies import JointPoseSensitivity, check
+from spinepipe.tables import read_frame
+from spinepipe.units import MM_PER_M, ROTATIONS
+
+Stamp = tuple[str, int, int]
+
+
+def stamp(path: str | Path) -> Stamp:
+    """Name, size and time of change of a file: a key that a change of the file changes."""
+    status = Path(path).stat()
+    return str(path), status.st_size, status.st_mtime_ns
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Sampled joint frames of all specimens: (specimen, pose) to frames or the reason for none."""
+
+    frames: dict[tuple[str, int], tuple[Pose, ...]]
+    refused: dict[tuple[str, int], str]
+
+    def of(self, specimen: str, pose: int) -> tuple[tuple[Pose, ...] | None, str]:
+        """Frames of one pose, or None and the reason."""
+        key = (specimen, pose)
+        return self.frames.get(key), self.refused.get(key, "")
+
+
+@lru_cache(maxsize=8)
+def _study(name: str, root: str, _stamps: tuple[Stamp, ...]) -> tuple[JointPoseSensitivity, Cohort]:
+    study, cohort = check(Path(root), name)
+    assert isinstance(study, JointPoseSensitivity)
+    return study, cohort
+
+
+def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort]:
+    """The validated study and its cohort; read once per worker and state of the files."""
+    config = Path(root) / "config"
+    files = [config / "studies" / f"{name}.yaml"]
+    files += sorted((config / "cohorts").glob("*/*"))
+    return _study(name, root, tuple(stamp(file) for file in files if file.is_file()))
+
+
+@lru_cache(maxsize=4)
+def _poses(where: Stamp) -> Poses:
+    frame = read_frame(where[0])
+    origins = frame[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
+    angles = np.deg2rad(frame[[f"{name}_deg" for name in ROTATIONS]].to_numpy(float))
+    frames: dict[tuple[str, int], tuple[Pose, ...]] = {}
+    refused: dict[tuple[str, int], str] = {}
+    rows = zip(
+        frame["specimen"], frame["pose"], frame["status"], frame["message"], origins, angles,
+        strict=True,
+    )  # fmt: skip
+    for specimen, pose, status, message, origin, angle in rows:
+        key = (specimen, int(pose))
+        if status == "refused":
+            refused[key] = message
+        else:
+            placed = Pose(rotation_zxy(*angle), origin)
+            frames[key] = (*frames.get(key, ()), placed)
+    return Poses(frames, refused)
+
+
+def sampled_poses(path: str) -> Poses:
+    """Sampled joint frames of ``poses.parquet``."""
+    return _poses(stamp(path))
+
+
+@dataclass(frozen=True)
+class SpecimenInputs:
+    """What the jobs of one specimen share: its tests, its motion and its nominal frames."""
+
+    nominal: tuple[Pose, ...]
+    cases: tuple[LoadCase, ...]
+    motions: tuple[MeasuredMotion, ...]
+
+
+@lru_cache(maxsize=16)
+def specimen_inputs(root: str, name: str, specimen: str, _digest: str) -> SpecimenInputs:
+    """Tests and motion of a specimen; ``_digest`` is that of its cohort."""
+    study, cohort = study_and_cohort(root, name)
+    chosen = study.tests or cohort.tests
+    shift = np.array(study.load_point_shift_mm.in_order()) / MM_PER_M
+    cases = load_cases(cohort, specimen, chosen, shift)
+    motions = measured_motion(cohort, specimen, cases)
+    return SpecimenInputs(joint_frames(cohort, specimen), cases, motions)
+
+
+def start_stiffness(study: JointPoseSensitivity) -> Array:
+    """(6,) stiffness a study starts from, SI."""
+    return np.array(study.stiffness.in_order(), dtype=float)
+
+
+def bushing_model(
+    study: JointPoseSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+) -> SpineModel:
+    """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6)."""
+    n = len(cohort.joint_names)
+    values = np.broadcast_to(stiffness, (n, 6)).copy()
+    bushing = ScopedEffect(create("linear_bushing"), tuple(range(n)), values)
+    damping = np.array(study.damping.in_order(), dtype=float)
+    return spine_model(cohort, specimen, frames, (bushing,), damping)

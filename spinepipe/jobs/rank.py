@@ -1,0 +1,45 @@
+"""Job: the best stiffness sets of each specimen, with which all its poses are simulated."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.statics import Status
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import read_frame
+from spinepipe.units import STIFFNESS_COLUMNS
+
+
+def run(root: str, study: str, calibrations: str, output: str) -> None:
+    """Write ``best.json``: specimen to its best sets, best first; least cost is best."""
+    settings, cohort = study_and_cohort(root, study)
+    frame = read_frame(calibrations)
+    best = {
+        specimen: _best(settings, frame[frame["specimen"] == specimen])
+        for specimen in cohort.specimen_names
+    }
+    temporary = Path(output).with_name(f".best.json.{os.getpid()}")
+    temporary.write_text(json.dumps(best, indent=1), encoding="utf-8")
+    os.replace(temporary, output)
+
+
+def _best(settings: JointPoseSensitivity, frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The best sets of one specimen: pose they come from, cost, stiffness (J or 1, 6) SI."""
+    usable = frame[frame["status"].isin([status for status in Status if status.usable])]
+    costs = usable.groupby("pose")["cost"].first().sort_values(kind="stable")
+    chosen = costs.index[: settings.best_models]
+    return [
+        {
+            "name": f"best{rank:02d}",
+            "pose": int(pose),
+            "cost": float(costs[pose]),
+            "stiffness": usable.loc[usable["pose"] == pose, list(STIFFNESS_COLUMNS)]
+            .to_numpy(float)
+            .tolist(),
+        }
+        for rank, pose in enumerate(chosen, start=1)
+    ]

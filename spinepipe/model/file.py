@@ -1,0 +1,161 @@
+"""The model file: one YAML per study with the effects, their scope and their parameter values.
+
+Geometry, masses and loads stay in the cohort. Any study can start from a model file.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from spinepipe.effects import Effect, create
+from spinepipe.effects.contract import Array
+from spinepipe.model.spine import ScopedEffect
+from spinepipe.problems import InputError, Problem
+
+_FORM = ConfigDict(extra="forbid", frozen=True)
+
+
+class Scope(BaseModel):
+    """Where an effect acts; ``*`` stands for all."""
+
+    model_config = _FORM
+
+    specimens: tuple[str, ...] = Field(default=("*",), description="specimens it acts in")
+    joints: tuple[str, ...] = Field(default=("*",), description="joints it acts on")
+    tests: tuple[str, ...] = Field(default=("*",), description="tests it acts in")
+
+
+class Values(BaseModel):
+    """Parameter values for a specimen and joint; the last row that fits a joint counts."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    specimen: str = Field(default="*", description="specimen, or * for all")
+    joint: str = Field(default="*", description="joint, or * for all")
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Parameter name to value, SI."""
+        return dict(self.model_extra or {})
+
+
+class EffectEntry(BaseModel):
+    """One effect of the model."""
+
+    model_config = _FORM
+
+    effect: str = Field(description="name of the effect in the registry")
+    options: dict[str, Any] = Field(default_factory=dict, description="variants of the effect")
+    scope: Scope = Field(default_factory=Scope, description="where it acts")
+    values: tuple[Values, ...] = Field(default=(), description="parameters; defaults otherwise")
+
+
+class ModelFile(BaseModel):
+    """A model: the cohort it belongs to and the effects at work."""
+
+    model_config = _FORM
+
+    model: str = Field(description="name of the model")
+    cohort: str = Field(description="cohort the model was made for")
+    effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
+
+
+def write_model(model: ModelFile, path: str | Path) -> None:
+    """Write a model file; it appears whole or not at all."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    text = yaml.safe_dump(model.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def read_model(path: str | Path) -> ModelFile:
+    """Read a model file and check it against the registry of effects.
+
+    Raises
+    ------
+    InputError
+        With all problems at once.
+    """
+    name = str(path)
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        model = ModelFile.model_validate(data)
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(
+            [Problem(name, None, None, str(error), "a YAML file", "mend it")]
+        ) from None
+    except ValidationError as error:
+        raise InputError([_of_pydantic(name, item) for item in error.errors()]) from None
+    problems = [
+        p for number, entry in enumerate(model.effects) for p in _check(name, number, entry)
+    ]
+    if problems:
+        raise InputError(problems)
+    return model
+
+
+def _of_pydantic(file: str, item: Any) -> Problem:
+    column = ".".join(str(part) for part in item["loc"])
+    return Problem(file, None, column, repr(item.get("input")), item["msg"], "change or remove it")
+
+
+def _check(file: str, number: int, entry: EffectEntry) -> list[Problem]:
+    """Unknown effects, options and parameters, and values out of bounds."""
+    place = f"effects.{number}"
+    try:
+        effect = create(entry.effect, entry.options)
+    except ValueError as error:
+        return [Problem(file, None, place, entry.effect, str(error), "choose one of these")]
+    declared = {parameter.name: parameter for parameter in effect.parameters}
+    problems = []
+    for row in entry.values:
+        for name, value in row.parameters.items():
+            where = f"{place}.values.{name}"
+            if name not in declared:
+                allowed = ", ".join(declared)
+                problems.append(Problem(file, None, where, name, allowed, "rename it"))
+            elif not _within(value, declared[name].low, declared[name].high):
+                p = declared[name]
+                allowed = f"{p.low:.3g} to {p.high:.3g} {p.unit}"
+                problems.append(Problem(file, None, where, repr(value), allowed, "correct it"))
+    return problems
+
+
+def _within(value: Any, low: float, high: float) -> bool:
+    return isinstance(value, int | float) and bool(low <= value <= high)
+
+
+def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple[ScopedEffect, ...]:
+    """The effects of a model file that act on a specimen with these joints."""
+    scoped = []
+    for entry in model.effects:
+        if entry.scope.specimens == ("*",) or specimen in entry.scope.specimens:
+            effect = create(entry.effect, entry.options)
+            chosen = tuple(
+                index
+                for index, joint in enumerate(joints)
+                if entry.scope.joints == ("*",) or joint in entry.scope.joints
+            )
+            values = _values(entry, effect, specimen, [joints[index] for index in chosen])
+            scoped.append(ScopedEffect(effect, chosen, values, entry.scope.tests))
+    return tuple(scoped)
+
+
+def _values(entry: EffectEntry, effect: Effect, specimen: str, joints: Sequence[str]) -> Array:
+    """(R, P) values of the joints in scope; one row for effects that are not per joint."""
+    names = [parameter.name for parameter in effect.parameters]
+    rows = joints if effect.per_joint else ["*"]
+    values = np.tile([parameter.default for parameter in effect.parameters], (len(rows), 1))
+    for row in entry.values:
+        if row.specimen in ("*", specimen):
+            for index, joint in enumerate(rows):
+                if row.joint in ("*", joint):
+                    for name, value in row.parameters.items():
+                        values[index, names.index(name)] = value
+    return values

@@ -1,0 +1,105 @@
+"""Reading and writing result tables as Parquet: checked against their schema, atomically."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from spinepipe.tables.schema import Column, Table
+
+
+class BadTable(ValueError):
+    """A result that does not keep its table's promise: a fault of the library, not of the user."""
+
+
+def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
+    """Columns (NaN or None for empty cells) as a table that keeps the schema.
+
+    Raises
+    ------
+    BadTable
+        For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
+    """
+    names = [column.name for column in table.columns]
+    if set(columns) != set(names):
+        raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(names))}")
+    arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
+    return pa.Table.from_arrays(arrays, schema=table.schema)
+
+
+def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
+    field = pa.field(column.name, pa.float64()).type if column.kind == "number" else None
+    if column.kind == "number":
+        array = pa.array(np.asarray(values, dtype=float), type=field, from_pandas=True)
+    else:
+        kinds = {"text": pa.string(), "integer": pa.int32(), "flag": pa.bool_()}
+        array = pa.array(list(values), type=kinds[column.kind])
+    problem = _problem(column, array)
+    if problem:
+        raise BadTable(f"{table}.{column.name}: {problem}")
+    return array
+
+
+def _problem(column: Column, array: pa.Array) -> str | None:
+    if column.null is None and array.null_count:
+        return f"{array.null_count} empty cells"
+    if len(array) == array.null_count:
+        return None
+    if column.kind in ("number", "integer"):
+        ends = pc.min_max(array)
+        low, high = ends["min"].as_py(), ends["max"].as_py()
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return "an infinite cell"
+        if column.low is not None and low < column.low:
+            return f"{low} is below {column.low}"
+        if column.high is not None and high > column.high:
+            return f"{high} is above {column.high}"
+    if column.allowed:
+        strangers = set(array.drop_null().unique().to_pylist()) - set(column.allowed)
+        if strangers:
+            return f"{sorted(strangers)[0]!r} is not one of {column.allowed}"
+    return None
+
+
+def write(rows: pa.Table, path: str | Path, metadata: Mapping[str, str]) -> None:
+    """Write rows with provenance in the file's metadata; the file appears whole or not at all."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = rows.replace_schema_metadata(dict(sorted(metadata.items())))
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        pq.write_table(rows, temporary, compression="zstd")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def join(table: Table, parts: Sequence[pa.Table], path: str | Path) -> None:
+    """Write tables one after the other as one; their common metadata is kept."""
+    common = dict(parts[0].schema.metadata or {})
+    for part in parts[1:]:
+        other = part.schema.metadata or {}
+        common = {key: value for key, value in common.items() if other.get(key) == value}
+    rows = pa.concat_tables([part.replace_schema_metadata(None) for part in parts])
+    rows = rows.select([column.name for column in table.columns]).cast(table.schema)
+    keys = rows.group_by(list(table.key)).aggregate([]).num_rows
+    if keys != rows.num_rows:
+        raise BadTable(f"{table.name}: {rows.num_rows - keys} rows repeat the key of another")
+    write(rows, path, {key.decode(): value.decode() for key, value in common.items()})
+
+
+def read(path: str | Path) -> pa.Table:
+    """The rows of one file, metadata included; folder names are not read as columns."""
+    return pq.ParquetFile(path).read()
+
+
+def read_frame(path: str | Path) -> pd.DataFrame:
+    """The rows of one file as a data frame, empty cells as NaN or None."""
+    frame: pd.DataFrame = read(path).to_pandas()
+    return frame
