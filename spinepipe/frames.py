@@ -1,6 +1,7 @@
 """ISB frames: joint poses from landmarks, and the Z, X', Y'' coordinates of a joint.
 
-Axes are right-handed: x anterior, y superior, z right (Wu et al. 2002, doi 10.1016/S0021-9290(01)00222-6).
+Axes are right-handed: x anterior, y superior, z right (Wu et al. 2002,
+doi 10.1016/S0021-9290(01)00222-6).
 """
 
 from collections.abc import Mapping
@@ -114,8 +115,7 @@ def vertebra_rotation(landmarks: Mapping[str, Array]) -> Array:
     Raises
     ------
     ValueError
-        When the landmarks coincide, are collinear, or contain left and right exchanged
-        so far that no frame can be told.
+        When the landmarks coincide or are collinear.
     """
     z = _direction(landmarks, "left_pedicle_base", "right_pedicle_base")
     y0 = _direction(landmarks, "inferior_endplate_centre", "superior_endplate_centre")

@@ -29,6 +29,7 @@ def _silent_stdout() -> Iterator[None]:
     os.dup2(sink, 1)
     try:
         yield
+        sys.stdout.flush()
         ctypes.CDLL(None).fflush(None)
     finally:
         os.dup2(saved, 1)
@@ -173,7 +174,7 @@ class Chain:
         )
 
     def bias(self, q: Array, rate: Array, gravity: Array) -> Array:
-        """(n,) generalised load that inertia at this rate and gravity (3,) need, no acceleration."""
+        """(n,) generalised load needed by inertia at this rate and by gravity (3,)."""
         self._ready()
         self._set_gravity(gravity)
         return np.array(self._inverse_dynamics(q.tolist(), rate.tolist()))

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.statics import SolvedStep, Status
@@ -55,6 +56,7 @@ class Fit:
     x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
     cost : sum of weight times squared error, mm2 and deg2.
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
+    cases, solved : the measured cases with the load steps that were needed, and their solutions.
     """
 
     x: Array
@@ -68,6 +70,7 @@ class Fit:
     evaluations: int
     n_optima: int
     stiffened: int
+    cases: tuple[MeasuredCase, ...]
     solved: tuple[tuple[SolvedStep, ...], ...]
 
 
@@ -88,7 +91,7 @@ def fit(
     """
     evaluator = Evaluator(problem)
     optima = [_descend(evaluator, x) for x in _start_points(problem, starts, seed)]
-    best = min(optima, key=lambda o: (not o.status.usable, o.cost))
+    best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
     return Fit(
         x=best.x,
@@ -102,8 +105,16 @@ def fit(
         evaluations=evaluator.evaluations,
         n_optima=_distinct(optima, found.identifiable),
         stiffened=best.stiffened,
+        cases=evaluator.problem.cases,
         solved=best.evaluation.solved,
     )
+
+
+def _best(optima: Sequence[Optimum]) -> Optimum:
+    """The optimum of least cost; of equal ones the first, so that extra starts change nothing."""
+    usable = [optimum for optimum in optima if optimum.status.usable] or list(optima)
+    least = min(optimum.cost for optimum in usable)
+    return next(o for o in usable if not o.cost > least * (1.0 + COST_TIE) + 1e-12)
 
 
 def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
@@ -121,14 +132,14 @@ def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
 def _descend(evaluator: Evaluator, start: Array) -> Optimum:
     """Least squares from one start; the start is stiffened until it has a stable equilibrium."""
     problem = evaluator.problem
-    start, stiffened = _stand_up(evaluator, start)
-    if start is None:
+    standing, stiffened = _stand_up(evaluator, start)
+    if standing is None:
         nowhere = Evaluation(None, None, (), evaluator.coordinate)
         x = problem.upper.copy()
         message = "no stable equilibrium up to the upper bounds: the loads tip the segment over"
         at_bound = np.ones(len(x), dtype=int)
         return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, message, 0, stiffened)
-    return _least_squares(evaluator, start, stiffened)
+    return _least_squares(evaluator, standing, stiffened)
 
 
 def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
@@ -162,8 +173,8 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
         jac=jacobian,
         bounds=(problem.lower, problem.upper),
         method="dogbox",
-        ftol=1e-14,
-        xtol=1e-12,
+        ftol=1e-11,
+        xtol=1e-9,
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
     )
@@ -205,7 +216,7 @@ def _values(problem: Problem, x: Array) -> Array:
     )
 
 
-def _distinct(optima: Sequence[Optimum], identifiable: Array) -> int:
+def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_]) -> int:
     """Number of different optima among the starts that ended, told by what is identifiable."""
     kept: list[Optimum] = []
     for optimum in (o for o in optima if o.status.usable):
@@ -214,7 +225,7 @@ def _distinct(optima: Sequence[Optimum], identifiable: Array) -> int:
     return len(kept)
 
 
-def _same(one: Optimum, other: Optimum, identifiable: Array) -> bool:
+def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_]) -> bool:
     close = np.abs(one.x - other.x)[identifiable] < SAME_OPTIMUM
     tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
     return bool(close.all()) and tie

@@ -1,11 +1,12 @@
 """A calibration problem: a model, the tests it was measured in, and what may be moved to fit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import (
@@ -74,6 +75,8 @@ class Evaluator:
     """Evaluates a problem; the chain is loaded once, neighbouring solutions are reused."""
 
     def __init__(self, problem: Problem) -> None:
+        cases = (_needed(problem, case) for case in problem.cases)
+        problem = replace(problem, cases=tuple(case for case in cases if case.case.steps))
         self.problem = problem
         chain = Chain(problem.model)
         self._systems = [System(chain, problem.model, m.case) for m in problem.cases]
@@ -145,6 +148,17 @@ class _Neighbour:
         ]
 
 
-def _used(measured: Array, weights: Array) -> Array:
+def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
+    """The case without the steps that neither carry a reading nor a path to those that do."""
+    if measured.zeroed or any(s.effect.kind is Kind.PATH for s in problem.model.effects):
+        return measured
+    read = np.any(_used(measured.measured, problem.weights), axis=(1, 2)).tolist()
+    steps = tuple(step for step, here in zip(measured.case.steps, read, strict=True) if here)
+    return replace(
+        measured, case=replace(measured.case, steps=steps), measured=measured.measured[read]
+    )
+
+
+def _used(measured: Array, weights: Array) -> NDArray[np.bool_]:
     """(T, J, 6) which readings enter the cost."""
     return np.isfinite(measured) & (weights > 0.0)

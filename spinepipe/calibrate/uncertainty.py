@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.calibrate.problem import Evaluation, Problem
 from spinepipe.effects.contract import Array
@@ -29,7 +30,7 @@ class Uncertainty:
 
     covariance: Array
     standard_error: Array
-    identifiable: Array
+    identifiable: NDArray[np.bool_]
     degrees_of_freedom: int
 
 

@@ -1,7 +1,9 @@
 """From a cohort's tables to what the engine takes: frames, bodies, load cases, motion. SI."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -61,7 +63,7 @@ def frames_from_landmarks(vertebrae: Sequence[str], points: Landmarks) -> tuple[
         Naming the joint whose landmarks define no frame.
     """
     frames = []
-    for lower, upper in zip(vertebrae[:-1], vertebrae[1:], strict=True):
+    for lower, upper in pairwise(vertebrae):
         try:
             frames.append(joint_pose(points[lower], points[upper]))
         except ValueError as error:
@@ -76,10 +78,10 @@ def joint_frames(cohort: Cohort, specimen: str) -> tuple[Pose, ...]:
     rows = cohort.joints[cohort.joints["specimen"] == specimen].set_index("joint")
     rows = rows.loc[list(cohort.joint_names)]
     origins = rows[_POINT].to_numpy(float) / MM_PER_M
-    angles = np.deg2rad(rows[["extension_deg", "right_bending_deg", "left_rotation_deg"]])
+    orientation = rows[["extension_deg", "right_bending_deg", "left_rotation_deg"]]
+    angles = np.deg2rad(orientation.to_numpy(float))
     return tuple(
-        Pose(rotation_zxy(*angle), origin)
-        for origin, angle in zip(origins, angles.to_numpy(float), strict=True)
+        Pose(rotation_zxy(*angle), origin) for origin, angle in zip(origins, angles, strict=True)
     )
 
 
@@ -88,15 +90,16 @@ def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
     names = cohort.vertebrae[1:]
     if cohort.bodies is None:
         return tuple(Body(name, 0.0, np.zeros(3), np.zeros((3, 3))) for name in names)
-    rows = cohort.bodies[cohort.bodies["specimen"] == specimen].set_index("vertebra")
-    return tuple(_body(name, rows.loc[name]) for name in names if name in rows.index)
+    rows = cohort.bodies[cohort.bodies["specimen"] == specimen]
+    found = {name: rows[rows["vertebra"] == name] for name in names}
+    return tuple(_body(name, row) for name, row in found.items() if len(row))
 
 
-def _body(name: str, row: pd.Series) -> Body:
-    com = row[["com_x_mm", "com_y_mm", "com_z_mm"]].to_numpy(float) / MM_PER_M
-    xx, yy, zz, xy, xz, yz = np.nan_to_num(row[_INERTIA].to_numpy(float))
+def _body(name: str, row: pd.DataFrame) -> Body:
+    com = row[["com_x_mm", "com_y_mm", "com_z_mm"]].to_numpy(float)[0] / MM_PER_M
+    xx, yy, zz, xy, xz, yz = np.nan_to_num(row[_INERTIA].to_numpy(float)[0])
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Body(name, float(row["mass_kg"]), com, inertia)
+    return Body(name, float(row["mass_kg"].iloc[0]), com, inertia)
 
 
 def spine_model(
@@ -152,28 +155,31 @@ def _steps(
 ) -> tuple[LoadStep, ...]:
     moving = {name: index for index, name in enumerate(cohort.vertebrae[1:])}
     steps = []
-    for step, of_step in rows.groupby("step", sort=True):
+    for step in sorted(set(rows["step"])):
+        of_step = rows[rows["step"] == step]
         wrenches = tuple(
-            _wrench(moving[row.vertebra], row, coms, shift) for row in of_step.itertuples()
+            _wrench(moving[row["vertebra"]], row, coms, shift) for row in of_step.to_dict("records")
         )
         times = of_step["time_s"].dropna()
-        steps.append(LoadStep(int(step), wrenches, float(times.iloc[0]) if len(times) else None))  # type: ignore[call-overload]
+        steps.append(LoadStep(int(step), wrenches, float(times.iloc[0]) if len(times) else None))
     return tuple(steps)
 
 
-def _wrench(body: int, row, coms: Mapping[str, Array], shift: Array) -> Wrench:  # type: ignore[no-untyped-def]
-    point = np.array([row.px_mm, row.py_mm, row.pz_mm]) / MM_PER_M
+def _wrench(
+    body: int, row: Mapping[Hashable, Any], coms: Mapping[str, Array], shift: Array
+) -> Wrench:
+    point = np.array([row["px_mm"], row["py_mm"], row["pz_mm"]], dtype=float) / MM_PER_M
     if np.isnan(point).any():
-        point = coms[row.vertebra]
-    force = np.array([row.fx_n, row.fy_n, row.fz_n], dtype=float)
-    moment = np.array([row.mx_nm, row.my_nm, row.mz_nm], dtype=float)
+        point = coms[row["vertebra"]]
+    force = np.array([row["fx_n"], row["fy_n"], row["fz_n"]], dtype=float)
+    moment = np.array([row["mx_nm"], row["my_nm"], row["mz_nm"]], dtype=float)
     return Wrench(body, point + shift, force, moment)
 
 
 def measured_motion(
     cohort: Cohort, specimen: str, cases: Sequence[LoadCase]
 ) -> tuple[MeasuredMotion, ...]:
-    """Measured motion of each case, in the cohort's own joint frames, all NaN where there is none."""
+    """Measured motion of each case in the cohort's own joint frames, NaN where there is none."""
     joints = {name: index for index, name in enumerate(cohort.joint_names)}
     return tuple(_motion(cohort, specimen, case, joints) for case in cases)
 

@@ -136,7 +136,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Wrench:
-    """A ground-fixed force (3,) N at a body's point (3,) m (ground, neutral) and moment (3,) N m."""
+    """A ground-fixed force (3,) N at a point (3,) m (ground, neutral), and a moment (3,) N m."""
 
     body: int
     point: Array

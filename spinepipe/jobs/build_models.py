@@ -30,7 +30,8 @@ def run(root: str, study: str, landmarks: str, output: str, model: str) -> None:
 
 def _poses(cohort: Cohort, landmarks: pd.DataFrame) -> Iterator[list[dict[str, Any]]]:
     """Rows of one specimen and pose at a time."""
-    for (specimen, pose), rows in landmarks.groupby(["specimen", "pose"], sort=False):
+    for _, rows in landmarks.groupby(["specimen", "pose"], sort=False):
+        specimen, pose = str(rows["specimen"].iloc[0]), int(rows["pose"].iloc[0])
         points: dict[str, dict[str, Any]] = {}
         xyz = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
         for vertebra, name, point in zip(rows["vertebra"], rows["landmark"], xyz, strict=True):

@@ -77,7 +77,7 @@ def _fitted(
     common = {
         "specimen": specimen,
         "pose": pose,
-        **_errors(problem, found),
+        **_errors(found),
         "cost": found.cost if np.isfinite(found.cost) else None,
         "degrees_of_freedom": found.uncertainty.degrees_of_freedom,
         "iterations": found.iterations,
@@ -125,7 +125,7 @@ def _stiffness(
     return row
 
 
-def _errors(problem: Problem, found: Fit) -> dict[str, Any]:
+def _errors(found: Fit) -> dict[str, Any]:
     """Mean absolute error per coordinate over all measured readings, mm and deg."""
     nothing = {_error_column(name): None for name in COORDINATE_COLUMNS}
     if not found.status.usable:
@@ -133,7 +133,7 @@ def _errors(problem: Problem, found: Fit) -> dict[str, Any]:
     errors = np.concatenate(
         [
             np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps]) - measured.measured
-            for steps, measured in zip(found.solved, problem.cases, strict=True)
+            for steps, measured in zip(found.solved, found.cases, strict=True)
         ]
     )
     size: Array = np.abs(errors.reshape(-1, 6)) * BORDER_PER_SI

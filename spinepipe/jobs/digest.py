@@ -1,4 +1,4 @@
-"""Digests that decide what must be computed again: of code (its meaning, not its text) and of values.
+"""Digests that decide what must be computed again: of code, by its meaning, and of values.
 
 Snakemake sees neither imported modules nor parts of a configuration, so the rules carry these
 digests in their `params`.

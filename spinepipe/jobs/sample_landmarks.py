@@ -19,7 +19,7 @@ def run(root: str, study: str, output: str) -> None:
         for specimen, rows in cohort.landmarks.groupby("specimen", sort=False)
     ]
     frame = pd.concat(parts, ignore_index=True)
-    columns = {name: frame[name].to_numpy() for name in frame}
+    columns = {column.name: frame[column.name].to_list() for column in LANDMARKS.columns}
     write(to_arrow(LANDMARKS, columns), output, provenance("sample_landmarks", settings, cohort))
 
 

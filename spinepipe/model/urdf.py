@@ -56,14 +56,14 @@ _MASSLESS = [
 
 def _inertial(body: Body, frame: Pose) -> list[str]:
     """Mass and inertia in the axes of the joint frame that carries the body."""
-    inertia = frame.rotation.T @ body.inertia @ frame.rotation
+    inertia = (frame.rotation.T @ body.inertia @ frame.rotation).tolist()
     com = Pose(np.eye(3), frame.inverse().apply(body.com))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     return [
         "<inertial>",
         _origin(com),
         f'<mass value="{float(body.mass)!r}"/>',
-        f'<inertia ixx="{float(inertia[0, 0])!r}" iyy="{float(inertia[1, 1])!r}" izz="{float(inertia[2, 2])!r}" '
-        f'ixy="{float(inertia[0, 1])!r}" ixz="{float(inertia[0, 2])!r}" iyz="{float(inertia[1, 2])!r}"/>',
+        f'<inertia ixx="{xx!r}" iyy="{yy!r}" izz="{zz!r}" ixy="{xy!r}" ixz="{xz!r}" iyz="{yz!r}"/>',
         "</inertial>",
     ]
 

@@ -1,1 +1,1 @@
-"""Report: figures and pages from result tables."""
+"""Figures and generated reference pages, made from the result tables and their schemas."""

@@ -20,7 +20,7 @@ LARGEST_ROTATION = np.deg2rad(80.0)
 """Rotations beyond this are no joint motion and near the singularity of Z, X', Y''."""
 
 # Newton squares its error: once a step is below these, the next would be below rounding.
-STEP_TOLERANCE = np.tile([1e-11] * 3 + [1e-9] * 3, 1)
+STEP_TOLERANCE = np.array([1e-11] * 3 + [1e-9] * 3)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,6 @@ def _stopped(q: Array, found: _Newton | None, reached: float, iterations: int) -
 def _newton(system: System, start: Array, loading: Loading, states: States) -> _Newton | None:
     """Newton from ``start``; None unless the steps contract onto a pose within joint motion."""
     q, last = start, np.inf
-    tolerance = np.tile(STEP_TOLERANCE, system.model.n_joints)
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
         try:
@@ -110,7 +109,7 @@ def _newton(system: System, start: Array, loading: Loading, states: States) -> _
         except SingularTangent:
             return None
         step = factored.solve(-balance.residual)
-        size = float(np.max(np.abs(step) / tolerance))
+        size = float((np.abs(step).reshape(-1, 6) / STEP_TOLERANCE).max())
         q = q + step
         if not size < 4.0 * last or _beyond_motion(q):
             return None

@@ -1,4 +1,4 @@
-"""Free parameters: which numbers of a model's effects a fit or a sensitivity moves, and together."""
+"""Free parameters: which numbers of a model's effects a fit moves, and which of them together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

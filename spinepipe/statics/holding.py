@@ -19,24 +19,45 @@ States = dict[int, Array]
 
 @dataclass(frozen=True)
 class ActiveLaw:
-    """A joint or path law at work: its place in the model's effects, its joints and values."""
+    """A joint law at work: its place in the model's effects, its joints and values."""
 
     index: int
-    effect: JointLaw | PathLaw
+    effect: JointLaw
     joints: Array
     values: Array
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
-        if self.index in states:
-            return self.effect.respond_on_path(q, self.values, states[self.index], carried)  # type: ignore[union-attr]
-        return self.effect.respond(q, self.values, carried)  # type: ignore[union-attr]
+        return self.effect.respond(q, self.values, carried)
 
     def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, P) derivative by the parameters of each joint in scope."""
-        if self.index in states:
-            return self.effect.by_parameter_on_path(q, self.values, states[self.index], carried)  # type: ignore[union-attr]
-        return self.effect.by_parameter(q, self.values, carried)  # type: ignore[union-attr]
+        return self.effect.by_parameter(q, self.values, carried)
+
+
+@dataclass(frozen=True)
+class ActivePath:
+    """A path law at work; it responds with the state that the last load step left."""
+
+    index: int
+    effect: PathLaw
+    joints: Array
+    values: Array
+
+    def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
+        """Response of the joints in scope."""
+        return self.effect.respond_on_path(q, self.values, states[self.index], carried)
+
+    def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
+        """(J, 6, P) derivative by the parameters of each joint in scope."""
+        return self.effect.by_parameter_on_path(q, self.values, states[self.index], carried)
+
+    def by_state(self, q: Array, carried: Array, states: States) -> Array:
+        """(J, 6, S) derivative by the state of each joint in scope."""
+        return self.effect.by_state(q, self.values, states[self.index], carried)
+
+
+Law = ActiveLaw | ActivePath
 
 
 @dataclass(frozen=True)
@@ -47,7 +68,7 @@ class Holding:
     tangent: Array
 
 
-def hold(placed: Placed, laws: Sequence[ActiveLaw], states: States, moved: bool) -> Holding:
+def hold(placed: Placed, laws: Sequence[Law], states: States, moved: bool) -> Holding:
     """Sum of the laws, pulled back to the joints' own coordinates where geometry moved them."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     for law in laws:
@@ -78,7 +99,7 @@ class HoldingDerivatives:
     by_state: dict[int, Array]
 
 
-def differentiate(placed: Placed, laws: Sequence[ActiveLaw], states: States) -> HoldingDerivatives:
+def differentiate(placed: Placed, laws: Sequence[Law], states: States) -> HoldingDerivatives:
     """Derivatives by every parameter and internal state, geometry effects included."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     by_parameter: dict[int, Array] = {}
@@ -90,8 +111,8 @@ def differentiate(placed: Placed, laws: Sequence[ActiveLaw], states: States) -> 
             _pass_on(by_parameter, by_state, j, response.by_carried)
             tangent[j] += response.by_carried @ tangent[j]
         by_parameter[law.index] = _spread(law, law.by_parameter(here, carried, states), len(load))
-        if isinstance(law.effect, PathLaw):
-            own = law.effect.by_state(here, law.values, states[law.index], carried)
+        if isinstance(law, ActivePath):
+            own = law.by_state(here, carried, states)
             by_state[law.index] = _spread(law, own, len(load))
         tangent[j] += response.tangent
         load[j] += response.load
@@ -114,7 +135,7 @@ def _pass_on(
             derivative[joints] += np.einsum("jkl,jlrp->jkrp", by_carried, derivative[joints])
 
 
-def _spread(law: ActiveLaw, own: Array, n_joints: int) -> Array:
+def _spread(law: Law, own: Array, n_joints: int) -> Array:
     """(J, 6, R, P) from (R, 6, P): each joint in scope has its own row of parameters."""
     spread = np.zeros((n_joints, 6, len(law.joints), own.shape[2]))
     rows = np.arange(len(law.joints))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import GeometryEffect
+from spinepipe.effects import GeometryEffect, Placement
 from spinepipe.effects.contract import Array
 
 
@@ -62,7 +62,9 @@ def _then(before: Placed, active: ActiveGeometry, with_parameters: bool) -> Plac
     return Placed(q, first, second, by_parameter)
 
 
-def _push(before, j, step, pair):  # type: ignore[no-untyped-def]
+def _push(
+    before: Placed, j: Array, step: Placement, pair: tuple[Array, Array]
+) -> tuple[Array, Array]:
     """Earlier effects' parameter derivatives carried through a later placement."""
     dq, dfirst = pair[0].copy(), pair[1].copy()
     dfirst[j] = np.einsum(

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.effects import MeasurementEffect
 from spinepipe.effects.contract import Array
 from spinepipe.statics.free import FreeParameter
 from spinepipe.statics.path import SolvedStep
@@ -110,7 +109,6 @@ def observe(system: System, q: Array) -> tuple[Array, Array]:
     joints = q.reshape(-1, 6).copy()
     by_coordinate = np.tile(np.eye(6), (len(joints), 1, 1))
     for active in system.measurement:
-        assert isinstance(active.effect, MeasurementEffect)
         seen = active.effect.observe(joints[active.joints], active.values)
         joints[active.joints] = seen.q
         by_coordinate[active.joints] = seen.by_coordinate @ by_coordinate[active.joints]
@@ -124,7 +122,6 @@ def observed_by_parameters(
     joints = q.reshape(-1, 6).copy()
     by_x = dq.reshape(len(joints), 6, -1).copy()
     for active in system.measurement:
-        assert isinstance(active.effect, MeasurementEffect)
         here = joints[active.joints]
         seen = active.effect.observe(here, active.values)
         own = active.effect.by_parameter(here, active.values)

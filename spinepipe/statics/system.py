@@ -5,11 +5,20 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects import GeometryEffect, JointLaw, LoadEffect, MeasurementEffect, PathLaw
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics.holding import ActiveLaw, Holding, HoldingDerivatives, States, hold
+from spinepipe.statics.holding import (
+    ActiveLaw,
+    ActivePath,
+    Holding,
+    HoldingDerivatives,
+    Law,
+    States,
+    hold,
+)
 from spinepipe.statics.holding import differentiate as differentiate_holding
 from spinepipe.statics.loading import Loading, Slots
 from spinepipe.statics.motion import ChainMotion, cross_matrix
@@ -26,11 +35,20 @@ class Balance:
 
 
 @dataclass(frozen=True)
-class ActiveEffect:
-    """A load or measurement effect at work."""
+class ActiveLoad:
+    """A load effect at work: its place in the model's effects and its values."""
 
     index: int
-    effect: LoadEffect | MeasurementEffect
+    effect: LoadEffect
+    values: Array
+
+
+@dataclass(frozen=True)
+class ActiveMeasurement:
+    """A measurement effect at work: its place in the model's effects, its joints and values."""
+
+    index: int
+    effect: MeasurementEffect
     joints: Array
     values: Array
 
@@ -43,27 +61,28 @@ class System:
         self.slots = Slots.of(case)
         self.local_points = [chain.local_point(b, np.array(p)) for b, p in self.slots.places]
         self.geometry: list[ActiveGeometry] = []
-        self.laws: list[ActiveLaw] = []
-        self.load_effects: list[ActiveEffect] = []
-        self.measurement: list[ActiveEffect] = []
+        self.laws: list[Law] = []
+        self.load_effects: list[ActiveLoad] = []
+        self.measurement: list[ActiveMeasurement] = []
         for index, scoped in enumerate(model.effects):
             if scoped.in_scope(case.test):
                 self._activate(index, scoped.effect, np.array(scoped.joints), scoped.values)
-        self.paths = tuple(law for law in self.laws if isinstance(law.effect, PathLaw))
         self._blocks = _block_indices(model.n_joints)
         ones = np.ones((chain.n, chain.n))
         self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
         self._diagonal = np.diag_indices(chain.n)
 
     def _activate(self, index: int, effect: object, joints: Array, values: Array) -> None:
-        if isinstance(effect, JointLaw | PathLaw):
+        if isinstance(effect, JointLaw):
             self.laws.append(ActiveLaw(index, effect, joints, values))
+        elif isinstance(effect, PathLaw):
+            self.laws.append(ActivePath(index, effect, joints, values))
         elif isinstance(effect, GeometryEffect):
             self.geometry.append(ActiveGeometry(index, effect, joints, values))
         elif isinstance(effect, LoadEffect):
-            self.load_effects.append(ActiveEffect(index, effect, joints, values))
+            self.load_effects.append(ActiveLoad(index, effect, values))
         elif isinstance(effect, MeasurementEffect):
-            self.measurement.append(ActiveEffect(index, effect, joints, values))
+            self.measurement.append(ActiveMeasurement(index, effect, joints, values))
         else:
             raise TypeError(f"{effect!r} satisfies none of the five protocols of an effect")
 
@@ -73,11 +92,14 @@ class System:
         other.model = model
         other.geometry = [_renewed(active, model) for active in self.geometry]
         other.laws = [_renewed(active, model) for active in self.laws]
-        on_path = {law.index for law in self.paths}
-        other.paths = tuple(law for law in other.laws if law.index in on_path)
         other.load_effects = [_renewed(active, model) for active in self.load_effects]
         other.measurement = [_renewed(active, model) for active in self.measurement]
         return other
+
+    @property
+    def paths(self) -> list[ActivePath]:
+        """The laws with an internal state."""
+        return [law for law in self.laws if isinstance(law, ActivePath)]
 
     def initial_states(self) -> States:
         """States (J, S) of all path laws before the first step: zero."""
@@ -126,7 +148,7 @@ class System:
         tangent = above + above.T + lower * self._below
         tangent[self._diagonal] += symmetric[self._diagonal]
         for active in self.load_effects:
-            response = active.effect.apply(motion, self.slots.wrenches(loading), active.values)  # type: ignore[union-attr]
+            response = active.effect.apply(motion, self.slots.wrenches(loading), active.values)
             load += loading.share * response.load
             tangent += loading.share * response.tangent
         return load, tangent
@@ -135,24 +157,25 @@ class System:
         """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""
         return differentiate_holding(self.placed(q, with_parameters=True), self.laws, states)
 
-    def load_derivative(self, q: Array, loading: Loading, active: ActiveEffect) -> Array:
+    def load_derivative(self, q: Array, loading: Loading, active: ActiveLoad) -> Array:
         """(n, R, P) derivative of the residual by a load effect's parameters."""
         motion = ChainMotion(self.chain, q)
         wrenches = self.slots.wrenches(loading)
-        by_parameter: Array = active.effect.by_parameter(motion, wrenches, active.values)  # type: ignore[union-attr, call-arg, arg-type]
+        by_parameter: Array = active.effect.by_parameter(motion, wrenches, active.values)
         return -loading.share * by_parameter
 
 
 _NOTHING = np.empty(0)
 
-Active = TypeVar("Active", ActiveGeometry, ActiveLaw, ActiveEffect)
+Active = TypeVar("Active", bound=ActiveGeometry | Law | ActiveLoad | ActiveMeasurement)
 
 
 def _renewed(active: Active, model: SpineModel) -> Active:
+    """The same effect with the values it has in another model."""
     return replace(active, values=model.effects[active.index].values)
 
 
-def _block_indices(n_joints: int) -> tuple[Array, Array]:
+def _block_indices(n_joints: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Index arrays (J, 6, 6) of the diagonal blocks of an (n, n) matrix."""
     at = np.arange(6 * n_joints).reshape(-1, 6)
     rows = np.repeat(at[:, :, None], 6, axis=2)

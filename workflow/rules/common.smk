@@ -35,7 +35,7 @@ def selection():
         stop(error)
     for name in chosen.studies:
         try:
-            load(name)
+            check(name)
         except InputError as error:
             problems.append(f"study {name}: {error}")
     if problems:
@@ -56,17 +56,21 @@ def everything(names):
 
 
 @cache
+def check(name):
+    return studies.check(Path(ROOT), name)
+
+
 def load(name):
     """The study of that name and its cohort, validated when first asked for."""
-    return studies.check(Path(ROOT), name)
+    try:
+        return check(name)
+    except InputError as error:
+        stop(f"study {name}: {error}")
 
 
 @cache
 def layout(name):
-    try:
-        study, cohort = load(name)
-    except InputError as error:
-        stop(f"study {name}: {error}")
+    study, cohort = load(name)
     specimens = tuple(cohort.specimen_names)
     return Layout(name, specimens, study.poses, study.best_models, study.block)
 

@@ -1,0 +1,85 @@
+"""How a sample is drawn in a row: its density, the middle half, the median, the middle 90 %."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from scipy.stats import gaussian_kde
+
+Array = NDArray[np.float64]
+
+FEWEST_FOR_DENSITY = 10
+KEY = "Bar: interquartile range; white line: median; thin line: 5th to 95th percentile"
+
+
+@dataclass(frozen=True)
+class Quartiles:
+    """Median and quartiles of n values."""
+
+    low: float
+    median: float
+    high: float
+    n: int
+
+    @property
+    def iqr(self) -> float:
+        """Interquartile range."""
+        return self.high - self.low
+
+
+def finite(values: object) -> Array:
+    """The finite ones of some values as (n,) numbers."""
+    array = np.asarray(values, dtype=float).ravel()
+    return array[np.isfinite(array)]
+
+
+def quartiles(values: Array) -> Quartiles:
+    """Median and quartiles of finite values (n,), n at least 1."""
+    low, median, high = np.percentile(values, [25.0, 50.0, 75.0])
+    return Quartiles(float(low), float(median), float(high), len(values))
+
+
+def draw_bar(panel: Axes, values: Array, y: float, color: str, width_pt: float = 4.5) -> Quartiles:
+    """Middle half as a bar with the median in white, middle 90 % as a thin line."""
+    found = quartiles(values)
+    ends = np.percentile(values, [5.0, 95.0])
+    panel.plot(ends, [y, y], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
+    draw_iqr(panel, found.low, found.high, y, color, width_pt)
+    panel.plot(
+        [found.median], [y], "|", color="white", ms=width_pt + 0.8, mew=1.1, zorder=5,
+        markeredgecolor="white",
+    )  # fmt: skip
+    return found
+
+
+def draw_iqr(
+    panel: Axes, low: float, high: float, y: float, color: str, width_pt: float = 4.5
+) -> None:
+    """A bar from one quartile to the other, never too short to be seen."""
+    panel.plot([low, high], [y, y], color=color, lw=width_pt, solid_capstyle="butt", zorder=4)
+    middle = [0.5 * (low + high)]
+    panel.plot(middle, [y], "s", color=color, ms=0.8 * width_pt, mew=0, zorder=4, clip_on=True)
+
+
+def draw_density(
+    panel: Axes, values: Array, base: float, height: float, color: str, logarithmic: bool = False
+) -> None:
+    """Density of a sample as a hill on a base line; single marks where there are few values."""
+    if logarithmic:
+        values = np.log(values)
+    spread = float(np.ptp(values)) if len(values) else 0.0
+    if len(values) < FEWEST_FOR_DENSITY or spread <= 1e-9 * float(np.abs(values).max()):
+        shown = np.exp(values) if logarithmic else values
+        panel.plot(
+            shown, np.full(len(shown), base + 0.2 * height), "|", color=color, ms=5.0, mew=0.7
+        )
+        return
+    low, high = np.percentile(values, [0.5, 99.5])
+    margin = 0.1 * (high - low)
+    at = np.linspace(low - margin, high + margin, 200)
+    density = gaussian_kde(values)(at)
+    x = np.exp(at) if logarithmic else at
+    top = base + height * density / density.max()
+    panel.fill_between(x, base, top, color=color, alpha=0.3, lw=0, zorder=2)
+    panel.plot(x, top, color=color, lw=0.6, zorder=2)

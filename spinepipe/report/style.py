@@ -1,0 +1,114 @@
+"""How figures look: size, type, colours that colour-blind readers tell apart, and saving."""
+
+import io
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+BLACK, GREY, PALE = "#000000", "#767676", "#D0D0D0"
+BLUE, ORANGE, GREEN, VERMILLION, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
+"""Okabe and Ito, Color Universal Design, 2008."""
+
+WIDTH_MM = 180.0
+"""Two columns of a journal page."""
+
+TALLEST_MM = 230.0
+SMALL_PT = 6.0
+DPI = 300
+_MM_PER_INCH = 25.4
+
+# The font comes with matplotlib and text is drawn as outlines: the same picture everywhere.
+_STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 7.0,
+    "axes.labelsize": 7.0,
+    "axes.titlesize": 7.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 0.0,
+    "xtick.minor.size": 1.5,
+    "xtick.minor.width": 0.4,
+    "lines.linewidth": 0.9,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "spinepipe",
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib's settings for a figure of ours; figures are made and saved inside."""
+    with mpl.rc_context(rc={**mpl.rcParamsDefault, **_STYLE, "backend": "agg"}):
+        yield
+
+
+def blank(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
+    """An empty figure of that size whose panels make room for their labels."""
+    height = min(height_mm, TALLEST_MM)
+    return Figure(figsize=(width_mm / _MM_PER_INCH, height / _MM_PER_INCH), layout="constrained")
+
+
+def saying(message: str) -> Figure:
+    """A figure that has nothing to show and says why."""
+    figure = blank(40.0)
+    figure.text(0.5, 0.5, message, ha="center", va="center", color=GREY, fontsize=9.0)
+    return figure
+
+
+def note(panel: Axes, x: float, y: float, words: str, color: str = BLACK, **how: Any) -> None:
+    """Small text at a share of the panel's width and a row's height."""
+    across = panel.get_yaxis_transform()
+    settings = {"fontsize": SMALL_PT, "va": "center", "color": color, **how}
+    panel.text(x, y, words, transform=across, **settings)
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a picture, SVG, PNG or PDF by its name; it appears whole or not at all.
+
+    Raises
+    ------
+    ValueError
+        For any other kind of picture.
+    """
+    path = Path(path)
+    nothing: dict[str, dict[str, None]] = {
+        ".svg": {"Date": None},
+        ".png": {"Software": None},
+        ".pdf": {"CreationDate": None},
+    }
+    if path.suffix not in nothing:
+        raise ValueError(f"{path.name}: a picture is .svg, .png or .pdf")
+    picture = io.BytesIO()
+    kind = path.suffix.removeprefix(".")
+    figure.savefig(picture, format=kind, dpi=DPI, metadata=nothing[path.suffix])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(picture.getvalue())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def save_with_png(figure: Figure, svg: str | Path) -> None:
+    """Write a figure as the named SVG and as a PNG beside it."""
+    save(figure, Path(svg).with_suffix(".png"))
+    save(figure, svg)

@@ -1,0 +1,78 @@
+"""What figures call coordinates, units and numbers."""
+
+from math import floor, isfinite, log10
+
+from spinepipe.units import TRANSLATIONS
+
+AXIS = {
+    "anterior": "Anterior–posterior",
+    "superior": "Inferior–superior",
+    "right": "Right–left",
+    "extension": "Flexion–extension",
+    "right_bending": "Lateral bending",
+    "left_rotation": "Axial rotation",
+}
+"""Coordinate as a direction, without a sign."""
+
+POSITIVE = {
+    "anterior": "anterior",
+    "superior": "superior",
+    "right": "right",
+    "extension": "extension",
+    "right_bending": "to the right",
+    "left_rotation": "to the left",
+}
+"""What a positive value of the coordinate is."""
+
+_MINUS, _THIN_SPACE = "\u2212", "\u2009"
+
+
+def unit(coordinate: str) -> str:
+    """``mm`` or ``deg`` as printed."""
+    return "mm" if coordinate in TRANSLATIONS else "°"
+
+
+def stiffness_unit(coordinate: str) -> str:
+    """Unit of a stiffness as printed."""
+    return "N/m" if coordinate in TRANSLATIONS else "N m/rad"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits: 20 600, 0.0134, −1.4; very large ones as 1.2e7."""
+    if not isfinite(value):
+        return "none"
+    if value == 0.0:
+        return "0"
+    size = floor(log10(abs(value)))
+    if size >= 6 or size < -4:
+        text = f"{value:.{digits - 1}e}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
+    else:
+        rounded = round(value, digits - 1 - size)
+        text = f"{rounded:,.{max(0, digits - 1 - size)}f}".replace(",", _THIN_SPACE)
+    return text.replace("-", _MINUS)
+
+
+def fixed(value: float, decimals: int = 2) -> str:
+    """A number with so many decimals and a true minus sign."""
+    if not isfinite(value):
+        return "none"
+    text = f"{value:.{decimals}f}"
+    zero = f"{0:.{decimals}f}"
+    return zero if text == f"-{zero}" else text.replace("-", _MINUS)
+
+
+def percent(part: int, whole: int) -> str:
+    """A share as a whole percentage; a share that is not quite 0 or 100 % is not rounded to it."""
+    if not whole:
+        return "none"
+    share = 100.0 * part / whole
+    if 0.0 < share < 1.0:
+        return "<1 %"
+    if 99.0 < share < 100.0:
+        return ">99 %"
+    return f"{share:.0f} %"
+
+
+def count(n: int, one: str, many: str | None = None) -> str:
+    """``1 pose``, ``500 poses``."""
+    return f"{n:,} {one if n == 1 else many or one + 's'}".replace(",", _THIN_SPACE)
