@@ -6,9 +6,7 @@ inverse dynamics, Jacobians or the mass matrix, which are exact to rounding.
 """
 
 import contextlib
-import ctypes
 import os
-import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
@@ -22,22 +20,19 @@ from spinepipe.model.urdf import urdf
 
 
 @contextlib.contextmanager
-def _silent_stdout() -> Iterator[None]:
+def _silent_stderr() -> Iterator[None]:
     """Swallow what C code prints: PyBullet greets on import."""
-    sys.stdout.flush()
-    saved, sink = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(sink, 1)
+    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, 2)
     try:
         yield
-        sys.stdout.flush()
-        ctypes.CDLL(None).fflush(None)
     finally:
-        os.dup2(saved, 1)
+        os.dup2(saved, 2)
         os.close(saved)
         os.close(sink)
 
 
-with _silent_stdout():
+with _silent_stderr():
     import pybullet
 
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER

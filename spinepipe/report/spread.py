@@ -7,10 +7,13 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde
 
+from spinepipe.report.style import BLACK
+
 Array = NDArray[np.float64]
 
 FEWEST_FOR_DENSITY = 10
-KEY = "Bar: interquartile range; white line: median; thin line: 5th to 95th percentile"
+BAR_PT = 4.0
+KEY = "bar: interquartile range (IQR), tick: median, thin line: 5th to 95th percentile"
 
 
 @dataclass(frozen=True)
@@ -40,26 +43,20 @@ def quartiles(values: Array) -> Quartiles:
     return Quartiles(float(low), float(median), float(high), len(values))
 
 
-def draw_bar(panel: Axes, values: Array, y: float, color: str, width_pt: float = 4.5) -> Quartiles:
-    """Middle half as a bar with the median in white, middle 90 % as a thin line."""
+def draw_bar(panel: Axes, values: Array, y: float, color: str) -> Quartiles:
+    """Middle half as a bar, median as a tick that stands out of it, middle 90 % as a thin line."""
     found = quartiles(values)
     ends = np.percentile(values, [5.0, 95.0])
     panel.plot(ends, [y, y], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
-    draw_iqr(panel, found.low, found.high, y, color, width_pt)
-    panel.plot(
-        [found.median], [y], "|", color="white", ms=width_pt + 0.8, mew=1.1, zorder=5,
-        markeredgecolor="white",
-    )  # fmt: skip
+    draw_iqr(panel, found, y, color)
     return found
 
 
-def draw_iqr(
-    panel: Axes, low: float, high: float, y: float, color: str, width_pt: float = 4.5
-) -> None:
-    """A bar from one quartile to the other, never too short to be seen."""
-    panel.plot([low, high], [y, y], color=color, lw=width_pt, solid_capstyle="butt", zorder=4)
-    middle = [0.5 * (low + high)]
-    panel.plot(middle, [y], "s", color=color, ms=0.8 * width_pt, mew=0, zorder=4, clip_on=True)
+def draw_iqr(panel: Axes, found: Quartiles, y: float, color: str) -> None:
+    """Middle half as a bar, median as a tick that stands out of it."""
+    ends = [found.low, found.high]
+    panel.plot(ends, [y, y], color=color, lw=BAR_PT, solid_capstyle="butt", zorder=4)
+    panel.plot([found.median], [y], "|", color=BLACK, ms=BAR_PT + 3.0, mew=1.0, zorder=5)
 
 
 def draw_density(

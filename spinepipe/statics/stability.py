@@ -13,7 +13,6 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from spinepipe.effects.contract import Array
 from spinepipe.world import Chain
 
-
 ROUNDING = 1e-9
 """Growth slower than this share of the fastest rate is rounding error of the eigenvalues."""
 
@@ -69,7 +68,7 @@ def _decays(mass: Array, stiffness: Array) -> bool:
     """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0."""
     n = len(stiffness)
     if not mass.any():
-        return bool(np.all(eigvals(stiffness).real > 0.0))
+        return float(eigvals(stiffness).real.min()) > 0.0
     identity, nothing = np.eye(n), np.zeros((n, n))
     a = np.block([[nothing, identity], [-stiffness, -identity]])
     b = np.block([[identity, nothing], [nothing, mass]])

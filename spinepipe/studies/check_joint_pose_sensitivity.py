@@ -12,7 +12,7 @@ from spinepipe.cohort.read_yaml import Document
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS
 
 __all__ = ["check_joint_pose_sensitivity"]
 
@@ -104,9 +104,10 @@ def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> I
 def _weights(
     document: Document, study: JointPoseSensitivity, measured: pd.DataFrame
 ) -> Iterator[Problem]:
+    """Terms of what was not measured drop out of the cost; something measured must remain."""
     weights = study.calibration.weights.in_order()
-    for name, column, weight in zip(COORDINATES, COORDINATE_COLUMNS, weights, strict=True):
-        if weight > 0 and measured[column].isna().all():
-            place = _at(document, f"calibration.weights.{name}")
-            found = f"weight {weight:g} on {column}, which was not measured"
-            yield Problem(*place, found, "0 for what was not measured", f"write `{name}: 0`")
+    known = [c for c in COORDINATE_COLUMNS if measured[c].notna().any()]
+    if not any(w > 0 for w, c in zip(weights, COORDINATE_COLUMNS, strict=True) if c in known):
+        place = _at(document, "calibration.weights")
+        found = "no weight on anything that was measured"
+        yield Problem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")

@@ -64,12 +64,16 @@ class Weights(BaseModel):
 
     model_config = FORM
 
-    anterior: _Weight = Field(default=10.0, description="weight of the anterior translation, 1/mm")
-    superior: _Weight = Field(default=100.0, description="weight of the superior translation, 1/mm")
-    right: _Weight = Field(default=1.0, description="weight of the lateral translation, 1/mm")
-    extension: _Weight = Field(default=1.0, description="weight of extension, 1/deg")
-    right_bending: _Weight = Field(default=0.0, description="weight of right bending, 1/deg")
-    left_rotation: _Weight = Field(default=0.0, description="weight of left rotation, 1/deg")
+    anterior: _Weight = Field(
+        default=10.0, description="weight of anterior motion, per mm2"
+    )
+    superior: _Weight = Field(
+        default=100.0, description="weight of superior motion, per mm2"
+    )
+    right: _Weight = Field(default=1.0, description="weight of lateral motion, per mm2")
+    extension: _Weight = Field(default=1.0, description="weight of extension, per deg2")
+    right_bending: _Weight = Field(default=0.0, description="weight of right bending, per deg2")
+    left_rotation: _Weight = Field(default=0.0, description="weight of left rotation, per deg2")
 
     def in_order(self) -> tuple[float, ...]:
         """(6,) in the order of the coordinates."""

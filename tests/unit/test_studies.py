@@ -99,8 +99,7 @@ ALONE = [
 WITH_COHORT = [
     Case("unknown test", "[flexion]", "[flexion, flexon]", 5, "tests.1", "did you mean 'flexion'"),
     Case("more best than poses", "poses: 20", "poses: 5", None, "best_models", "at most the number of poses, 5"),
-    Case("weight on nothing", "right: 0", "right: 1", 8, "calibration.weights.right", "right_mm, which was not measured"),
-    Case("weight on nothing by default", ", right: 0", "", 8, "calibration.weights.right", "write `right: 0`"),
+    Case("weight on nothing", "anterior: 10, superior: 1, right: 0", "anterior: 0, superior: 0, right: 1, extension: 0", 8, "calibration.weights", "no weight on anything that was measured"),
 ]
 
 COHORT_CASES = [

@@ -21,7 +21,7 @@ best_models: 2
 block: 4
 calibration:
   weights:
-    {{anterior: 10, superior: 100, right: 0, extension: 1, right_bending: 0, left_rotation: 0}}
+    {{anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}}
 """
 
 
