@@ -53,3 +53,81 @@ def errors_figure(cohort: Cohort, simulations: pd.DataFrame) -> Figure:
     _draw_failures(axes[-1], runs)
     figure.supxlabel(_key(sets, runs, rows), fontsize=6.5, color=GREY)
     return figure
+
+
+def _column(coordinate: str) -> str:
+    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
+
+
+def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
+    """One coordinate: two bars per row, the second below the first."""
+    column = f"error_{_column(name)}"
+    axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
+    for y, frame in enumerate(rows.frames):
+        for group in sets:
+            values = finite(frame.loc[frame.index.isin(group.rows.index), column])
+            if len(values):
+                found = draw_bar(axis, values, y + group.offset, group.color)
+                if rows.with_numbers:
+                    ends = f"{fixed(found.low)} to {fixed(found.high)}"
+                    words = f"{fixed(found.median)} ({ends})"
+                    note(axis, 0.02, y + group.offset + 0.19, words, group.color)
+    axis.set_title(f"{AXIS[name]} ({unit(name)})")
+    axis.set_xlabel(f"error, + is {POSITIVE[name]}")
+    label_rows(axis, rows, below=0.45, above=0.55)
+
+
+def _failed_runs(simulations: pd.DataFrame) -> pd.DataFrame:
+    """One row per run (a test of a pose with a stiffness): did a step end without equilibrium?"""
+    usable = [status.value for status in Status if status.usable]
+    failed = ~simulations["status"].isin(usable)
+    return simulations.assign(failed=failed).groupby(_RUN, as_index=False)["failed"].any()
+
+
+def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
+    """Share of runs without equilibrium, one line per stiffness set, the own on top."""
+    names = sorted(runs["stiffness"].unique(), key=lambda name: (name == OWN, name))
+    best = sorted((name for name in names if name != OWN), reverse=True)
+    order = [*best, *(name for name in names if name == OWN)]
+    few = len(order) <= 15
+    for y, name in enumerate(order):
+        failed = runs.loc[runs["stiffness"] == name, "failed"]
+        color = BLUE if name == OWN else ORANGE
+        share = 100.0 * float(failed.mean())
+        axis.plot([0.0, share], [y, y], color=color, lw=1.0, solid_capstyle="butt")
+        axis.plot([share], [y], "o", color=color, ms=3.0, clip_on=False, zorder=5)
+        if few:
+            words = percent(int(failed.sum()), len(failed))
+            axis.annotate(words, (share, y), (5, 0), textcoords="offset points", fontsize=6.0,
+                          va="center", color=color)  # fmt: skip
+    axis.set_xlim(0.0, max(5.0, 1.25 * axis.get_xlim()[1]))
+    axis.set_title("No equilibrium")
+    axis.set_xlabel("share of runs (%)")
+    axis.set_ylim(-0.7, len(order) - 0.3)
+    shown = [y for y in range(len(order)) if few or y == len(order) - 1 or y % 10 == 0]
+    axis.set_yticks(shown, ["own" if order[y] == OWN else order[y] for y in shown])
+    axis.spines["left"].set_visible(False)
+
+
+def _key(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> str:
+    own = runs["stiffness"] == OWN
+    parts = [
+        f"blue: each pose with its own calibrated stiffness ({_readings(rows, sets[0])})",
+        f"orange: every pose with the {count(_n_best(runs), 'best set')} of its specimen "
+        f"({_readings(rows, sets[1])})",
+    ]
+    total = f"{count(int(own.sum()), 'run')} and {count(int((~own).sum()), 'run')}"
+    meaning = f"error: predicted less measured, all loaded steps together; {total}"
+    return "; ".join(parts) + "\n" + "; ".join(p for p in (meaning, rows.note, KEY) if p)
+
+
+def _n_best(runs: pd.DataFrame) -> int:
+    return len(set(runs["stiffness"]) - {OWN})
+
+
+def _readings(rows: Rows, group: _Set) -> str:
+    """How many errors a bar stands for, over all rows."""
+    numbers = [int(frame.index.isin(group.rows.index).sum()) for frame in rows.frames]
+    low, high = int(np.min(numbers)), int(np.max(numbers))
+    least = "" if low == high else f"{low:,}–"
+    return f"n = {least}{high:,} per row".replace(",", "\u2009")

@@ -122,7 +122,7 @@ def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
         _draw_row(panel, axis, y, finite(frame[panel.column]), frame, rows.with_numbers)
     if panel.paper is not None:
         draw_iqr(axis, panel.paper, -0.28, VERMILLION)
-    label_rows(axis, rows, below=0.62 if rows.with_numbers else 0.5)
+    label_rows(axis, rows, below=0.45, above=0.85)
     axis.text(1.0, 0.995, _shares(panel, solved), transform=axis.transAxes, fontsize=6.0,
               ha="right", va="top", color=GREY) if not rows.with_numbers else None  # fmt: skip
 

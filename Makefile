@@ -1,0 +1,54 @@
+# Everything a newcomer needs; only Python 3.11 with venv must be there.
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+CORES ?= 2
+
+.PHONY: all full test lint bench report env dev-env lock clean
+
+all: env  ## build the studies that config/config.yaml chooses
+	$(BIN)/snakemake -j$(CORES) all
+
+full: env  ## build the long studies too
+	$(BIN)/snakemake -j$(CORES) full
+
+test: dev-env  ## run all tests
+	$(BIN)/python -m pytest
+
+lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+
+bench: dev-env  ## measure speed side by side with OpenSim
+	$(BIN)/python -m benchmarks
+
+report: env  ## one HTML file with all figures and their captions
+	$(BIN)/snakemake --report results/report.html
+
+env: $(VENV)/runtime.done
+dev-env: $(VENV)/dev.done
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+$(VENV)/dev.done: $(VENV)/runtime.done requirements-dev.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-dev.lock
+	touch $@
+
+lock:  ## renew the lock files from requirements*.in (needs uv)
+	uv pip compile requirements.in $(LOCK) -o requirements.lock
+	uv pip compile requirements-dev.in $(LOCK) -o requirements-dev.lock
+
+LOCK := --python-version 3.11 --generate-hashes --no-emit-index-url --no-header \
+	--no-annotate --prerelease=if-necessary
+
+clean:  ## remove the environment, results and engine state
+	rm -rf $(VENV) results .snakemake

@@ -1,0 +1,1 @@
+"""Benchmarks: `python -m benchmarks` measures speed side by side with OpenSim in one run."""
