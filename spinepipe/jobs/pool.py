@@ -26,7 +26,7 @@ from types import ModuleType
 from typing import Any
 
 _JOBS = Path(__file__).resolve().parent
-_NOT_JOBS = {"__init__", "digest", "layout", "pool", "progress"}
+_NOT_JOBS = {"__init__", "digest", "layout", "pool", "progress", "provenance", "settings", "inputs"}
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
 _REMEDIES = {

@@ -14,7 +14,8 @@ _JOBS_IN_RATE = 400
 class Progress:
     """Counts finished jobs and writes a line with an estimate of the time left.
 
-    The estimate is the pace of the latest few hundred jobs, applied to all that are left.
+    The estimate is the pace of a rule's latest few hundred jobs, applied to those of the rule
+    that are left: jobs of other rules may take ten times as long or as short.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class Progress:
         self._clock = clock
         self._lock = threading.Lock()
         self._done: Counter[str] = Counter()
-        self._finished_at: deque[float] = deque(maxlen=_JOBS_IN_RATE)
+        self._finished_at: dict[str, deque[float]] = {}
         self._printed_at = clock()
 
     def finish(self, rule: str) -> None:
@@ -45,7 +46,8 @@ class Progress:
         with self._lock:
             self._done[rule] += 1
             now = self._clock()
-            self._finished_at.append(now)
+            times = self._finished_at.setdefault(rule, deque(maxlen=_JOBS_IN_RATE))
+            times.append(now)
             if now - self._printed_at >= _SECONDS_BETWEEN_LINES:
                 self._printed_at = now
                 print(self._line(rule), file=self._stream, flush=True)
@@ -58,12 +60,12 @@ class Progress:
         done, all_done = self._done[rule], sum(self._done.values())
         total = max(totals.get(rule, 0), done)
         everything = max(sum(totals.values()), all_done)
-        line = f"{rule}  {done}/{total}  ·  {all_done}/{everything} jobs in all"
-        intervals = len(self._finished_at) - 1
-        if intervals > 0 and totals:
-            pace = (self._finished_at[-1] - self._finished_at[0]) / intervals
-            line += f"  ·  {duration(pace * (everything - all_done))} left"
-        return line
+        line = f"{rule}  {done}/{total}"
+        times = self._finished_at[rule]
+        if len(times) > 1 and totals:
+            pace = (times[-1] - times[0]) / (len(times) - 1)
+            line += f"  ·  {duration(pace * (total - done))} left of these"
+        return f"{line}  ·  {all_done}/{everything} jobs in all"
 
 
 def duration(seconds: float) -> str:

@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import code_digest, value_digest
+from spinepipe.jobs.settings import relevant_settings
 from spinepipe.studies import Study
 
 _LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pybullet", "SALib", "spinepipe")
@@ -19,13 +20,16 @@ def versions() -> dict[str, str]:
 
 
 def provenance(job: str, study: Study, cohort: Cohort) -> dict[str, str]:
-    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study."""
+    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study.
+
+    ``config_digest`` covers the settings that the job depends on, no others.
+    """
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
         "cohort_digest": cohort.digest,
-        "config_digest": value_digest(study.model_dump(mode="json")),
+        "config_digest": value_digest(relevant_settings(job, study)),
         "code_digest": code_digest(f"spinepipe.jobs.{job}"),
         **versions(),
     }

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.layout import grid, label_rows, row_height
+from spinepipe.report.layout import explain, grid, head, label_rows, row_height
 from spinepipe.report.rows import Rows, rows_of
 from spinepipe.report.spread import KEY, draw_bar, finite
-from spinepipe.report.style import BLUE, GREY, ORANGE, note, saying
+from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
 from spinepipe.statics.status import Status
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
@@ -46,12 +46,14 @@ def errors_figure(cohort: Cohort, simulations: pd.DataFrame) -> Figure:
     known = simulations[simulations[columns].notna().any(axis=1)]
     rows = rows_of(known, cohort.specimen_names, cohort.joint_names)
     own = known["stiffness"] == OWN
-    sets = [_Set("own", BLUE, 0.17, known[own]), _Set("best", ORANGE, -0.23, known[~own])]
+    sets = [_Set("own", OURS, 0.17, known[own]), _Set("best", BEST, -0.23, known[~own])]
     axes, figure = grid(len(measured) + 1, rows, row_height(rows, 15.0))
-    for name, axis in zip(measured, axes, strict=False):
+    for index, (name, axis) in enumerate(zip(measured, axes, strict=False)):
+        head(axis, index, AXIS[name])
         _draw(name, axis, rows, sets)
+    head(axes[-1], len(measured), "No equilibrium")
     _draw_failures(axes[-1], runs)
-    figure.supxlabel(_key(sets, runs, rows), fontsize=6.5, color=GREY)
+    explain(figure, _bars(sets, runs, rows), _words(runs, rows))
     return figure
 
 
@@ -72,8 +74,7 @@ def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
                     ends = f"{fixed(found.low)} to {fixed(found.high)}"
                     words = f"{fixed(found.median)} ({ends})"
                     note(axis, 0.02, y + group.offset + 0.19, words, group.color)
-    axis.set_title(f"{AXIS[name]} ({unit(name)})")
-    axis.set_xlabel(f"error, + is {POSITIVE[name]}")
+    axis.set_xlabel(f"error ({unit(name)}), + is {POSITIVE[name]}")
     label_rows(axis, rows, below=0.45, above=0.55)
 
 
@@ -92,16 +93,15 @@ def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
     few = len(order) <= 15
     for y, name in enumerate(order):
         failed = runs.loc[runs["stiffness"] == name, "failed"]
-        color = BLUE if name == OWN else ORANGE
+        color = OURS if name == OWN else BEST
         share = 100.0 * float(failed.mean())
         axis.plot([0.0, share], [y, y], color=color, lw=1.0, solid_capstyle="butt")
         axis.plot([share], [y], "o", color=color, ms=3.0, clip_on=False, zorder=5)
         if few:
             words = percent(int(failed.sum()), len(failed))
             axis.annotate(words, (share, y), (5, 0), textcoords="offset points", fontsize=6.0,
-                          va="center", color=color)  # fmt: skip
+                          va="center", color=INK[color])  # fmt: skip
     axis.set_xlim(0.0, max(5.0, 1.25 * axis.get_xlim()[1]))
-    axis.set_title("No equilibrium")
     axis.set_xlabel("share of runs (%)")
     axis.set_ylim(-0.7, len(order) - 0.3)
     shown = [y for y in range(len(order)) if few or y == len(order) - 1 or y % 10 == 0]
@@ -109,16 +109,21 @@ def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
     axis.spines["left"].set_visible(False)
 
 
-def _key(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> str:
+def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> dict[str, str]:
+    """Meaning of each colour."""
+    best = f"all poses with the {count(_n_best(runs), 'best set')}"
+    return {
+        OURS: f"each pose with its own calibration ({_readings(rows, sets[0])})",
+        BEST: f"{best} of the specimen ({_readings(rows, sets[1])})",
+    }
+
+
+def _words(runs: pd.DataFrame, rows: Rows) -> str:
     own = runs["stiffness"] == OWN
-    parts = [
-        f"blue: each pose with its own calibrated stiffness ({_readings(rows, sets[0])})",
-        f"orange: every pose with the {count(_n_best(runs), 'best set')} of its specimen "
-        f"({_readings(rows, sets[1])})",
-    ]
-    total = f"{count(int(own.sum()), 'run')} and {count(int((~own).sum()), 'run')}"
-    meaning = f"error: predicted less measured, all loaded steps together; {total}"
-    return "; ".join(parts) + "\n" + "; ".join(p for p in (meaning, rows.note, KEY) if p)
+    total = f"{count(int(own.sum()), 'run')} with the own calibration, {int((~own).sum())} with"
+    meaning = "Error: predicted less measured, all measured load steps together, median (IQR)"
+    parts = (meaning, KEY, rows.note, f"{total} best sets")
+    return "; ".join(part for part in parts if part) + "."
 
 
 def _n_best(runs: pd.DataFrame) -> int:

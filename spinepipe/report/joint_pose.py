@@ -1,6 +1,6 @@
 """Figure: how far the sampled landmarks move each joint's origin and turn its axes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,19 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
-from spinepipe.report.layout import grid, label_rows, row_height
+from spinepipe.report.layout import explain, grid, head, label_rows, row_height
 from spinepipe.report.published import paper_of
 from spinepipe.report.rows import Rows, rows_of
 from spinepipe.report.spread import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
-from spinepipe.report.style import BLUE, GREY, VERMILLION, note, saying
-from spinepipe.report.words import AXIS, count, fixed, percent
+from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
+from spinepipe.report.words import AXIS, count, fixed, percent, unit
 from spinepipe.statics.status import Status
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 _ORIGIN = dict(zip(("x_mm", "y_mm", "z_mm"), TRANSLATIONS, strict=True))
 _ANGLES = {f"{name}_deg": name for name in ROTATIONS}
-COLUMNS = (*_ORIGIN, *_ANGLES)
+_NAMES = {**_ORIGIN, **_ANGLES}
+COLUMNS = tuple(_NAMES)
 
 
 def joint_pose_figure(cohort: Cohort, poses: pd.DataFrame) -> Figure:
@@ -35,11 +36,26 @@ def joint_pose_figure(cohort: Cohort, poses: pd.DataFrame) -> Figure:
     shifted = _less_nominal(sampled, nominal)
     rows = rows_of(shifted, cohort.specimen_names, cohort.joint_names)
     axes, figure = grid(len(COLUMNS), rows, row_height(rows, 17.0))
-    for column, axis in zip(COLUMNS, axes, strict=True):
+    for index, (column, axis) in enumerate(zip(COLUMNS, axes, strict=True)):
+        kind = "origin" if column in _ORIGIN else "orientation"
+        head(axis, index, f"{AXIS[_NAMES[column]]} {kind}")
         _draw(column, axis, rows, nominal, cohort)
+    _equal_reach(axes[:3])
+    _equal_reach(axes[3:])
     failed = total - len(sampled[["specimen", "pose"]].drop_duplicates())
-    figure.supxlabel(_key(cohort, total, failed, rows), fontsize=6.5, color=GREY)
+    bars = {OURS: "sampled landmarks"}
+    paper = paper_of(cohort.name)
+    if paper:
+        bars[THEIRS] = f"{paper[0]}, Tables 7 and 8, complete set (IQR drawn around the median)"
+    explain(figure, bars, _words(total, failed, rows))
     return figure
+
+
+def _equal_reach(axes: Sequence[Axes]) -> None:
+    """The same limits left and right of the nominal value in each of the panels."""
+    reach = max(abs(end) for axis in axes for end in axis.get_xlim())
+    for axis in axes:
+        axis.set_xlim(-reach, reach)
 
 
 def _nominal(cohort: Cohort) -> pd.DataFrame:
@@ -69,32 +85,28 @@ def _draw(column: str, axis: Axes, rows: Rows, nominal: pd.DataFrame, cohort: Co
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
     for y, frame in enumerate(rows.frames):
         values = finite(frame[column])
-        draw_density(axis, values, y + 0.08, 0.36, BLUE)
-        found = draw_bar(axis, values, y, BLUE)
+        draw_density(axis, values, y + 0.08, 0.36, OURS)
+        found = draw_bar(axis, values, y, OURS)
         here = nominal[nominal["joint"] == frame["joint"].iloc[0]]
         here = here[here["specimen"].isin(frame["specimen"].unique())]
         center = float(here[column].iloc[0])
         paper = _paper(cohort, frame["joint"].iloc[0], column)
         if paper is not None:
             less = Quartiles(paper.low - center, paper.median - center, paper.high - center, 0)
-            draw_iqr(axis, less, y - 0.22, VERMILLION)
+            draw_iqr(axis, less, y - 0.22, THEIRS)
         if rows.with_numbers:
             _write(axis, y, found, center, paper)
-    label_rows(axis, rows, below=0.48, above=0.68)
-    kind, unit = ("origin", "mm") if column in _ORIGIN else ("orientation", "°")
-    axis.set_title(f"{AXIS[_ORIGIN.get(column) or _ANGLES[column]]} {kind} ({unit})")
-    axis.set_xlabel(f"sampled less nominal ({unit})")
+    label_rows(axis, rows, below=0.4, above=0.7)
+    axis.set_xlabel(f"sampled less nominal ({unit(_NAMES[column])})")
 
 
-def _write(
-    axis: Axes, y: int, found: Quartiles, center: float, paper: Quartiles | None
-) -> None:
-    """Median and width of the middle half, ours above and the paper's below."""
+def _write(axis: Axes, y: int, found: Quartiles, center: float, paper: Quartiles | None) -> None:
+    """Median and width of the middle half, ours on the left and the paper's on the right."""
     ours = f"{fixed(center + found.median)} (IQR {fixed(found.iqr)})"
-    note(axis, 0.02, y + 0.54, ours, BLUE)
+    note(axis, 0.02, y + 0.55, ours, OURS)
     if paper is not None:
         theirs = f"{fixed(paper.median)} (IQR {fixed(paper.iqr)})"
-        note(axis, 0.02, y - 0.36, theirs, VERMILLION)
+        note(axis, 0.98, y + 0.55, theirs, THEIRS, ha="right")
 
 
 def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
@@ -111,13 +123,9 @@ def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
     return Quartiles(median - iqr / 2.0, median, median + iqr / 2.0, 0)
 
 
-def _key(cohort: Cohort, total: int, failed: int, rows: Rows) -> str:
+def _words(total: int, failed: int, rows: Rows) -> str:
     share = f"{percent(failed, total)} define no frame" if failed else "all define frames"
-    parts = [f"{count(total, 'landmark set')}, {share}", rows.note, KEY]
-    first = "; ".join(part for part in parts if part)
-    numbers = "numbers: median and IQR in ground axes; line at 0: landmarks as palpated"
-    paper = paper_of(cohort.name)
-    if paper:
-        tables = "Tables 7 and 8, complete set, IQR drawn around the median"
-        numbers += f"; red: {paper[0]}, {tables}"
-    return f"{first}\n{numbers}" if rows.with_numbers else first
+    numbers = "numbers: median and IQR in ground axes" if rows.with_numbers else ""
+    zero = "line at 0: landmarks as palpated"
+    parts = (f"{count(total, 'landmark set')}, {share}", rows.note, KEY, numbers, zero)
+    return "; ".join(part for part in parts if part) + "."

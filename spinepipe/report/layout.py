@@ -1,15 +1,22 @@
 """Panels side by side that share their rows."""
 
+import textwrap
+from collections.abc import Mapping
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from spinepipe.report.rows import Rows
-from spinepipe.report.style import blank
+from spinepipe.report.spread import BAR_PT
+from spinepipe.report.style import GREY, INK, blank
 
 MOST_PANELS_ACROSS = 4
 _ABOVE_AND_BELOW_MM = 14.0
-_KEY_MM = 8.0
+_KEY_MM = 14.0
 _CROWDED_MM = 3.6
+_LINE_LENGTH = 150
+_START_LINE: tuple[int, tuple[int, int]] = (0, (4, 2))
 
 
 def row_height(rows: Rows, with_numbers_mm: float) -> float:
@@ -37,3 +44,28 @@ def label_rows(axis: Axes, rows: Rows, below: float, above: float) -> None:
     place = axis.get_subplotspec()
     axis.tick_params(labelleft=place is None or place.is_first_col())
     axis.spines["left"].set_visible(False)
+
+
+def head(axis: Axes, number: int, words: str) -> None:
+    """Letter and heading of a panel."""
+    axis.set_title(f"{chr(ord('a') + number)}   {words}")
+
+
+def mark_start(axis: Axes, x: float) -> None:
+    """The dashed line of the value that a fit starts from."""
+    axis.axvline(x, color=GREY, lw=0.7, ls=_START_LINE, zorder=1)
+
+
+def explain(figure: Figure, bars: Mapping[str, str], words: str, dashed: str = "") -> None:
+    """Below the panels: what each colour is, what a dashed line is, and a few words more."""
+    handles = [
+        Line2D([], [], color=color, lw=BAR_PT, solid_capstyle="butt", label=meaning)
+        for color, meaning in bars.items()
+    ]
+    if dashed:
+        handles.append(Line2D([], [], color=GREY, lw=0.7, ls=_START_LINE, label=dashed))
+    figure.supxlabel(textwrap.fill(words, _LINE_LENGTH), fontsize=6.0, color=INK[GREY])
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=len(handles), fontsize=6.5,
+        handlelength=1.6, columnspacing=2.0, borderaxespad=0.2,
+    )  # fmt: skip

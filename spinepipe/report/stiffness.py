@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.layout import grid, label_rows, row_height
+from spinepipe.report.layout import explain, grid, head, label_rows, mark_start, row_height
 from spinepipe.report.published import paper_of
 from spinepipe.report.rows import EVERY_JOINT, Rows, rows_of
 from spinepipe.report.spread import (
@@ -24,8 +24,8 @@ from spinepipe.report.spread import (
     finite,
     quartiles,
 )
-from spinepipe.report.style import BLUE, GREY, VERMILLION, note, saying
-from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
+from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
+from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit, tick
 from spinepipe.statics.status import Status
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
@@ -33,7 +33,7 @@ from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 AT_BOUND = 1e-4
 """Relative distance below which a stiffness stands at its bound."""
 
-FARTHEST = 30.0
+FARTHEST = 10.0
 """A start or bound is on the axis if it is within this factor of what was found."""
 
 
@@ -48,12 +48,10 @@ class _Panel:
     high: float
     paper: Quartiles | None
 
-    def at_bound(self, values: Array) -> int:
-        """How many of the values stand at a bound."""
-        near = np.isclose(values, self.low, rtol=AT_BOUND) | np.isclose(
-            values, self.high, rtol=AT_BOUND
-        )
-        return int(near.sum())
+    def inside(self, values: Array) -> Array:
+        """The values that do not stand at a bound."""
+        above, below = self.low * (1.0 + AT_BOUND), self.high * (1.0 - AT_BOUND)
+        return values[(values > above) & (values < below)]
 
 
 def stiffness_figure(
@@ -69,23 +67,24 @@ def stiffness_figure(
     joints = cohort.joint_names if per_joint else (EVERY_JOINT,)
     rows = rows_of(solved, cohort.specimen_names, joints)
     panels = [_panel(study, cohort, name) for name in COORDINATES if name in study.calibration.free]
-    axes, figure = grid(len(panels), rows, row_height(rows, 20.0))
-    for panel, axis in zip(panels, axes, strict=True):
+    axes, figure = grid(len(panels), rows, row_height(rows, 22.0))
+    for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
+        head(axis, index, AXIS[panel.coordinate])
         _draw(panel, axis, rows, solved)
     found = len(solved[["specimen", "pose"]].drop_duplicates())
-    figure.supxlabel(_key(study, cohort, found, poses, rows), fontsize=6.5, color=GREY)
+    bars = {OURS: "calibrated, over all sampled joint poses"}
+    paper = paper_of(cohort.name)
+    if paper:
+        bars[THEIRS] = f"{paper[0]}, {paper[1]['counts']['pose_samples_reduced']} poses"
+    words = _words(study.calibration.bound_factor, found, poses, rows)
+    explain(figure, bars, words, dashed="start of the fit")
     return figure
 
 
-def _key(study: JointPoseSensitivity, cohort: Cohort, found: int, poses: int, rows: Rows) -> str:
-    solved = f"{count(found, 'joint pose')} of {poses:,} with a stiffness".replace(",", "\u2009")
-    parts = [solved, rows.note, KEY]
-    bounds = f"bounds: start ×/÷ {number(study.calibration.bound_factor)}"
-    second = [f"dashed: start of the fit; {bounds}"]
-    paper = paper_of(cohort.name)
-    if paper:
-        second.append(f"red: median and IQR of {paper[0]}")
-    return "; ".join(part for part in parts if part) + "\n" + "; ".join(second)
+def _words(bound_factor: float, found: int, poses: int, rows: Rows) -> str:
+    solved = f"{count(found, 'joint pose')} of {poses} with a stiffness"
+    parts = (solved, rows.note, KEY, f"bounds: start times and divided by {number(bound_factor)}")
+    return "; ".join(part for part in parts if part) + "."
 
 
 def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Panel:
@@ -110,33 +109,47 @@ def _paper(cohort: Cohort, column: str) -> Quartiles | None:
 
 def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
     axis.set_xscale("log")
-    axis.set_title(f"{AXIS[panel.coordinate]} stiffness ({stiffness_unit(panel.coordinate)})")
+    axis.set_xlabel(f"stiffness ({stiffness_unit(panel.coordinate)})")
     values = finite(solved[panel.column])
     _limit(axis, panel, values)
-    if _shown(axis, panel.start):
-        axis.axvline(panel.start, color=GREY, lw=0.7, ls=(0, (4, 2)), zorder=1)
+    mark_start(axis, panel.start)
     for bound in (panel.low, panel.high):
-        if _shown(axis, bound):
-            axis.axvline(bound, color=GREY, lw=0.9, ls=":", zorder=1)
+        axis.axvline(bound, color=GREY, lw=0.9, ls=":", zorder=1)
     for y, frame in enumerate(rows.frames):
-        _draw_row(panel, axis, y, finite(frame[panel.column]), frame, rows.with_numbers)
+        _draw_row(panel, axis, y, frame, rows.with_numbers)
     if panel.paper is not None:
-        draw_iqr(axis, panel.paper, -0.28, VERMILLION)
-    label_rows(axis, rows, below=0.45, above=0.85)
-    axis.text(1.0, 0.995, _shares(panel, solved), transform=axis.transAxes, fontsize=6.0,
-              ha="right", va="top", color=GREY) if not rows.with_numbers else None  # fmt: skip
+        draw_iqr(axis, panel.paper, _PAPER_Y, THEIRS)
+        note(axis, 0.02, _PAPER_Y - 0.15, _median_and_iqr(panel.paper), THEIRS)
+    label_rows(axis, rows, below=0.55 if panel.paper else 0.35, above=0.9)
+    if not rows.with_numbers:
+        note(axis, 0.02, len(rows) - 0.2, _shares(panel, solved), GREY)
+    _tell_far_bound(panel, axis, values)
 
 
-def _draw_row(
-    panel: _Panel, axis: Axes, y: float, values: Array, frame: pd.DataFrame, with_numbers: bool
-) -> None:
-    inside = values[(values > panel.low * (1 + AT_BOUND)) & (values < panel.high * (1 - AT_BOUND))]
-    draw_density(axis, inside, y + 0.1, 0.45, BLUE, logarithmic=True)
-    found = draw_bar(axis, values, y, BLUE)
+_PAPER_Y = -0.26
+
+
+def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool) -> None:
+    values = finite(frame[panel.column])
+    draw_density(axis, panel.inside(values), y + 0.1, 0.42, OURS, logarithmic=True)
+    found = draw_bar(axis, values, y, OURS)
     if with_numbers:
-        middle = f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
-        note(axis, 0.02, y + 0.72, middle, BLUE)
-        note(axis, 0.02, y + 0.60, _shares(panel, frame), GREY)
+        note(axis, 0.02, y + 0.78, _median_and_iqr(found), OURS)
+        note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
+
+
+def _median_and_iqr(found: Quartiles) -> str:
+    return f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
+
+
+def _tell_far_bound(panel: _Panel, axis: Axes, values: Array) -> None:
+    """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
+    for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
+        there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
+        if there and not _shown(axis, bound):
+            told = words.format(percent(there, len(values)), number(bound))
+            side = "right" if x else "left"
+            note(axis, x, 0.13, told, OURS, ha=side)
 
 
 def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
@@ -144,15 +157,16 @@ def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
     values = finite(frame[panel.column])
     flags = frame[f"{panel.coordinate}_identifiable"]
     lost = int((flags == False).sum())  # noqa: E712  (None: held fixed)
-    at = percent(panel.at_bound(values), len(values))
+    at = percent(len(values) - len(panel.inside(values)), len(values))
     return f"at a bound {at}, not identifiable {percent(lost, len(values))}, n = {len(values)}"
 
 
 def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     """Limits around the middle 98 % of what was found, start and paper as far as they are near."""
-    low, high = np.percentile(values, [1.0, 99.0])
+    inside = panel.inside(values)
+    low, high = np.percentile(inside if len(inside) else values, [1.0, 99.0])
     middle = quartiles(values)
-    reach = FARTHEST * max(1.0, middle.high / middle.low)
+    reach = FARTHEST * middle.high / middle.low
     low, high = max(low, middle.low / reach), min(high, middle.high * reach)
     near: list[Any] = [panel.start]
     if panel.paper is not None:
@@ -163,7 +177,7 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     axis.set_xlim(low / margin, high * margin)
     axis.xaxis.set_major_locator(LogLocator(subs=_ticks(low / margin, high * margin)))
     axis.xaxis.set_minor_locator(LogLocator(subs=range(1, 10)))
-    axis.xaxis.set_major_formatter(lambda x, _: number(x))
+    axis.xaxis.set_major_formatter(lambda x, _: tick(x))
     axis.xaxis.set_minor_formatter(NullFormatter())
 
 

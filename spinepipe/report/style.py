@@ -11,9 +11,15 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-BLACK, GREY, PALE = "#000000", "#767676", "#D0D0D0"
-BLUE, ORANGE, GREEN, VERMILLION, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
+BLACK, GREY = "#000000", "#767676"
+BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
 """Okabe and Ito, Color Universal Design, 2008."""
+
+INK = {BLUE: "#005A8E", GREEN: "#00694D", VERMILLION: "#A84A00", GREY: "#555555"}
+"""Darker tones of some of them, for small print."""
+
+OURS, BEST, THEIRS = BLUE, GREEN, VERMILLION
+"""Each pose's own results, the best sets, and the paper's numbers, in every figure."""
 
 WIDTH_MM = 180.0
 """Two columns of a journal page."""
@@ -49,7 +55,7 @@ _STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "spinepipe",
     "figure.constrained_layout.h_pad": 0.03,
-    "figure.constrained_layout.w_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.06,
 }
 
 
@@ -76,8 +82,9 @@ def saying(message: str) -> Figure:
 def note(panel: Axes, x: float, y: float, words: str, color: str = BLACK, **how: Any) -> None:
     """Small text at a share of the panel's width and a row's height."""
     across = panel.get_yaxis_transform()
-    settings = {"fontsize": SMALL_PT, "va": "center", "color": color, **how}
-    panel.text(x, y, words, transform=across, **settings)
+    settings = {"fontsize": SMALL_PT, "va": "center", "color": INK.get(color, color), **how}
+    behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4}
+    panel.text(x, y, words, transform=across, bbox=behind, **settings)
 
 
 def save(figure: Figure, path: str | Path) -> None:

@@ -52,6 +52,13 @@ def number(value: float, digits: int = 3) -> str:
     return text.replace("-", _MINUS)
 
 
+def tick(value: float) -> str:
+    """A number at an axis, no longer than it needs to be: 20, 0.5, 300 000, 1e7."""
+    if abs(value) >= 1e6 or 0.0 < abs(value) < 1e-3:
+        return f"{value:.0e}".replace("e+0", "e").replace("e-0", "e-").replace("-", _MINUS)
+    return f"{value:,.10g}".replace(",", _THIN_SPACE).replace("-", _MINUS)
+
+
 def fixed(value: float, decimals: int = 2) -> str:
     """A number with so many decimals and a true minus sign."""
     if not isfinite(value):

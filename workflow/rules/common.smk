@@ -6,24 +6,12 @@ from pathlib import Path
 from spinepipe import studies
 from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.jobs.layout import Layout
+from spinepipe.jobs.settings import relevant_settings
 from spinepipe.problems import InputError
 
 ROOT = os.getcwd()
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
-# Parts of a study that a job does not look at: changing them keeps its results. Everything
-# else counts, so that a setting added later is never overlooked.
-UNUSED = {
-    "sample_landmarks": {
-        *("tests", "load_point_shift_mm", "stiffness", "damping", "loading"),
-        *("settle_time_s", "calibration", "best_models", "block"),
-    },
-    "build_models": {"calibration", "loading", "settle_time_s", "best_models", "block"},
-    "calibrate": {"best_models", "block"},
-    "rank": {"block"},
-    "simulate": {"best_models", "block"},
-    "figures": {"block"},
-}
 
 
 def selection():
@@ -82,7 +70,7 @@ def digests(job, name=None):
     if name is None:
         return code
     study, cohort = load(name)
-    settings = study.model_dump(mode="json", exclude=UNUSED[job])
+    settings = relevant_settings(job, study)
     return value_digest(code, settings, cohort.digest)
 
 
