@@ -33,7 +33,9 @@ def cpu_seconds(call: Callable[[], object], repeats: int, warm_up: int = 1) -> T
 
 def machine() -> dict[str, str]:
     """Processor, cores, memory and system, as a reader of the figures needs them."""
-    lines = Path("/proc/cpuinfo").read_text().splitlines() if os.path.exists("/proc/cpuinfo") else []
+    lines = (
+        Path("/proc/cpuinfo").read_text().splitlines() if os.path.exists("/proc/cpuinfo") else []
+    )
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return {

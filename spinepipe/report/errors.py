@@ -7,11 +7,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, grid, head, label_rows, row_height
 from spinepipe.report.rows import Rows, rows_of
-from spinepipe.report.spread import KEY, draw_bar, finite
+from spinepipe.report.spread import BAR_PT, KEY, THIN_BAR_PT, draw_bar, finite
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
 from spinepipe.statics.status import Status
@@ -47,7 +48,7 @@ def errors_figure(cohort: Cohort, simulations: pd.DataFrame) -> Figure:
     rows = rows_of(known, cohort.specimen_names, cohort.joint_names)
     own = known["stiffness"] == OWN
     sets = [_Set("own", OURS, 0.17, known[own]), _Set("best", BEST, -0.23, known[~own])]
-    axes, figure = grid(len(measured) + 1, rows, row_height(rows, 15.0))
+    axes, figure = grid(len(measured) + 1, rows, row_height(rows, 15.0), 4)
     for index, (name, axis) in enumerate(zip(measured, axes, strict=False)):
         head(axis, index, AXIS[name])
         _draw(name, axis, rows, sets)
@@ -65,11 +66,13 @@ def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
     """One coordinate: two bars per row, the second below the first."""
     column = f"error_{_column(name)}"
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
+    axis.xaxis.set_major_locator(MaxNLocator(5))
+    thick = BAR_PT if rows.with_numbers else THIN_BAR_PT
     for y, frame in enumerate(rows.frames):
         for group in sets:
             values = finite(frame.loc[frame.index.isin(group.rows.index), column])
             if len(values):
-                found = draw_bar(axis, values, y + group.offset, group.color)
+                found = draw_bar(axis, values, y + group.offset, group.color, thick)
                 if rows.with_numbers:
                     ends = f"{fixed(found.low)} to {fixed(found.high)}"
                     words = f"{fixed(found.median)} ({ends})"

@@ -9,12 +9,11 @@ from matplotlib.lines import Line2D
 
 from spinepipe.report.rows import Rows
 from spinepipe.report.spread import BAR_PT
-from spinepipe.report.style import GREY, INK, blank
+from spinepipe.report.style import GREY, blank
 
-MOST_PANELS_ACROSS = 4
 _ABOVE_AND_BELOW_MM = 14.0
-_KEY_MM = 14.0
-_CROWDED_MM = 3.6
+_KEY_MM = 17.0
+_CROWDED_MM = 4.2
 _LINE_LENGTH = 150
 _START_LINE: tuple[int, tuple[int, int]] = (0, (4, 2))
 
@@ -24,9 +23,9 @@ def row_height(rows: Rows, with_numbers_mm: float) -> float:
     return with_numbers_mm if rows.with_numbers else _CROWDED_MM
 
 
-def grid(n: int, rows: Rows, row_mm: float) -> tuple[list[Axes], Figure]:
-    """``n`` panels of the same rows, at most four side by side, and their figure."""
-    down = -(-n // MOST_PANELS_ACROSS)
+def grid(n: int, rows: Rows, row_mm: float, most_across: int = 3) -> tuple[list[Axes], Figure]:
+    """``n`` panels of the same rows, so many side by side at most, and their figure."""
+    down = -(-n // most_across)
     across = -(-n // down)
     height = down * (len(rows) * row_mm + _ABOVE_AND_BELOW_MM) + _KEY_MM
     figure = blank(max(height, 45.0))
@@ -64,8 +63,15 @@ def explain(figure: Figure, bars: Mapping[str, str], words: str, dashed: str = "
     ]
     if dashed:
         handles.append(Line2D([], [], color=GREY, lw=0.7, ls=_START_LINE, label=dashed))
-    figure.supxlabel(textwrap.fill(words, _LINE_LENGTH), fontsize=6.0, color=INK[GREY])
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=len(handles), fontsize=6.5,
-        handlelength=1.6, columnspacing=2.0, borderaxespad=0.2,
-    )  # fmt: skip
+    legend = figure.legend(
+        handles=handles,
+        title=textwrap.fill(words, _LINE_LENGTH),
+        loc="outside lower center",
+        ncols=len(handles),
+        fontsize=6.5,
+        title_fontsize=6.0,
+        handlelength=1.6,
+        columnspacing=2.0,
+        borderaxespad=0.2,
+    )
+    legend.get_title().set_multialignment("center")

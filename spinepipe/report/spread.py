@@ -12,7 +12,7 @@ from spinepipe.report.style import BLACK
 Array = NDArray[np.float64]
 
 FEWEST_FOR_DENSITY = 10
-BAR_PT = 4.0
+BAR_PT, THIN_BAR_PT = 4.0, 2.5
 KEY = "bar: interquartile range (IQR), tick: median, thin line: 5th to 95th percentile"
 
 
@@ -43,20 +43,22 @@ def quartiles(values: Array) -> Quartiles:
     return Quartiles(float(low), float(median), float(high), len(values))
 
 
-def draw_bar(panel: Axes, values: Array, y: float, color: str) -> Quartiles:
+def draw_bar(
+    panel: Axes, values: Array, y: float, color: str, thick_pt: float = BAR_PT
+) -> Quartiles:
     """Middle half as a bar, median as a tick that stands out of it, middle 90 % as a thin line."""
     found = quartiles(values)
     ends = np.percentile(values, [5.0, 95.0])
     panel.plot(ends, [y, y], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
-    draw_iqr(panel, found, y, color)
+    draw_iqr(panel, found, y, color, thick_pt)
     return found
 
 
-def draw_iqr(panel: Axes, found: Quartiles, y: float, color: str) -> None:
+def draw_iqr(panel: Axes, found: Quartiles, y: float, color: str, thick_pt: float = BAR_PT) -> None:
     """Middle half as a bar, median as a tick that stands out of it."""
     ends = [found.low, found.high]
-    panel.plot(ends, [y, y], color=color, lw=BAR_PT, solid_capstyle="butt", zorder=4)
-    panel.plot([found.median], [y], "|", color=BLACK, ms=BAR_PT + 3.0, mew=1.0, zorder=5)
+    panel.plot(ends, [y, y], color=color, lw=thick_pt, solid_capstyle="butt", zorder=4)
+    panel.plot([found.median], [y], "|", color=BLACK, ms=1.6 * thick_pt + 0.6, mew=1.0, zorder=5)
 
 
 def draw_density(

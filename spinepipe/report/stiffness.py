@@ -120,10 +120,11 @@ def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
     if panel.paper is not None:
         draw_iqr(axis, panel.paper, _PAPER_Y, THEIRS)
         note(axis, 0.02, _PAPER_Y - 0.15, _median_and_iqr(panel.paper), THEIRS)
-    label_rows(axis, rows, below=0.55 if panel.paper else 0.35, above=0.9)
+    label_rows(
+        axis, rows, below=0.55 if panel.paper else 0.35, above=0.9 if rows.with_numbers else 1.7
+    )
     if not rows.with_numbers:
-        note(axis, 0.02, len(rows) - 0.2, _shares(panel, solved), GREY)
-    _tell_far_bound(panel, axis, values)
+        note(axis, 0.02, len(rows) + 0.25, _shares(panel, solved), GREY)
 
 
 _PAPER_Y = -0.26
@@ -136,20 +137,21 @@ def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbe
     if with_numbers:
         note(axis, 0.02, y + 0.78, _median_and_iqr(found), OURS)
         note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
+        _tell_far_bound(panel, axis, values, y - 0.125)
 
 
 def _median_and_iqr(found: Quartiles) -> str:
     return f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
 
 
-def _tell_far_bound(panel: _Panel, axis: Axes, values: Array) -> None:
+def _tell_far_bound(panel: _Panel, axis: Axes, values: Array, y: float) -> None:
     """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
     for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
         there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
         if there and not _shown(axis, bound):
             told = words.format(percent(there, len(values)), number(bound))
             side = "right" if x else "left"
-            note(axis, x, 0.13, told, OURS, ha=side)
+            note(axis, x, y, told, OURS, ha=side)
 
 
 def _shares(panel: _Panel, frame: pd.DataFrame) -> str:

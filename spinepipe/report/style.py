@@ -84,7 +84,7 @@ def note(panel: Axes, x: float, y: float, words: str, color: str = BLACK, **how:
     across = panel.get_yaxis_transform()
     settings = {"fontsize": SMALL_PT, "va": "center", "color": INK.get(color, color), **how}
     behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4}
-    panel.text(x, y, words, transform=across, bbox=behind, **settings)
+    panel.text(x, y, words, transform=across, bbox=behind, in_layout=False, **settings)
 
 
 def save(figure: Figure, path: str | Path) -> None:

@@ -7,7 +7,7 @@ from spinepipe.statics.loading import Loading, Slots
 from spinepipe.statics.path import SolvedStep, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
 from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
-from spinepipe.statics.settle import Program, Settled, settle
+from spinepipe.statics.settling import Program, Settled, settle
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import Balance, System
 from spinepipe.world import Chain

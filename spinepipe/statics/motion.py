@@ -54,21 +54,10 @@ class ChainMotion:
         """Generalised load (n,) of a ground-fixed wrench and its tangent (n, n)."""
         velocities, angular = self.velocities(body, point), self.angular(body)
         load = velocities @ force + angular @ moment
-        return AppliedLoad(
-            load, force_tangent(self.axes, velocities, force) + moment_tangent(angular, moment)
-        )
+        products = (self.axes @ cross_matrix(force).T) @ velocities.T
+        tangent = np.triu(products) + np.triu(products, 1).T
+        tangent += np.tril(angular @ (angular @ cross_matrix(moment).T).T, -1)
+        return AppliedLoad(load, tangent)
 
     def _jacobian(self, body: int, local_point: Array) -> tuple[Array, Array]:
         return self.chain.jacobian(self.q, body, local_point)
-
-
-def force_tangent(axes: Array, velocities: Array, force: Array) -> Array:
-    """(n, n) tangent of the generalised load of a constant force (3,)."""
-    products = (axes @ cross_matrix(force).T) @ velocities.T
-    upper = np.triu(products)
-    return upper + np.triu(products, 1).T
-
-
-def moment_tangent(angular: Array, moment: Array) -> Array:
-    """(n, n) tangent of the generalised load of a constant moment (3,): not symmetric."""
-    return np.tril(angular @ (angular @ cross_matrix(moment).T).T, -1)

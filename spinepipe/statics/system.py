@@ -7,7 +7,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.effects import GeometryEffect, JointLaw, LoadEffect, MeasurementEffect, PathLaw
+from spinepipe.effects import (
+    AppliedLoad,
+    GeometryEffect,
+    JointLaw,
+    LoadEffect,
+    MeasurementEffect,
+    PathLaw,
+)
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics.holding import (
@@ -68,6 +75,7 @@ class System:
             if scoped.in_scope(case.test):
                 self._activate(index, scoped.effect, np.array(scoped.joints), scoped.values)
         self._blocks = _block_indices(model.n_joints)
+        self._heavy = bool(np.any(model.gravity))
         ones = np.ones((chain.n, chain.n))
         self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
         self._diagonal = np.diag_indices(chain.n)
@@ -124,34 +132,66 @@ class System:
             return hold(unmoved, self.laws, states, moved=False)
         return hold(self.placed(q, with_parameters=False), self.laws, states, moved=True)
 
+    def residual(self, q: Array, loading: Loading, states: States) -> Array:
+        """Residual alone at q (n,), at half the price of a balance."""
+        motion = ChainMotion(self.chain, q)
+        applied = self._applied(motion, loading, self._slot_velocities(motion, loading))
+        for active in self.load_effects:
+            applied += loading.share * self._effect(active, motion, loading).load
+        return self._hold(q, states).load.ravel() - applied
+
+    def _slot_velocities(self, motion: ChainMotion, loading: Loading) -> list[Array | None]:
+        """(n, 3) velocities of the slots that carry a force, None for the others."""
+        return [
+            self.chain.jacobian(motion.q, body, point)[0] if force.any() else None
+            for (body, _), point, force in zip(
+                self.slots.places, self.local_points, loading.forces, strict=True
+            )
+        ]
+
+    def _applied(
+        self, motion: ChainMotion, loading: Loading, velocities: list[Array | None]
+    ) -> Array:
+        """(n,) generalised load of weight and wrenches."""
+        load = np.zeros(self.chain.n)
+        if self._heavy:
+            load += motion.mass_velocity @ (loading.share * self.model.gravity)
+        for slot, (body, _) in enumerate(self.slots.places):
+            velocity, moment = velocities[slot], loading.moments[slot]
+            if velocity is not None:
+                load += velocity @ loading.forces[slot]
+            if moment.any():
+                load += motion.angular(body) @ moment
+        return load
+
     def _apply(self, motion: ChainMotion, loading: Loading) -> tuple[Array, Array]:
         """Generalised applied load (n,) and its tangent (n, n)."""
-        gravity = loading.share * self.model.gravity
-        load = np.zeros(self.chain.n)
-        symmetric = np.zeros((self.chain.n, self.chain.n))
-        lower = np.zeros_like(symmetric)
+        velocities = self._slot_velocities(motion, loading)
+        load = self._applied(motion, loading, velocities)
+        forces = np.zeros((self.chain.n, self.chain.n))
+        moments = np.zeros_like(forces)
         axes = motion.axes
-        if np.any(gravity):
-            load += motion.mass_velocity @ gravity
-            symmetric += (axes @ cross_matrix(gravity).T) @ motion.mass_velocity.T
+        if self._heavy:
+            weight = cross_matrix(loading.share * self.model.gravity)
+            forces += (axes @ weight.T) @ motion.mass_velocity.T
         for slot, (body, _) in enumerate(self.slots.places):
-            force, moment = loading.forces[slot], loading.moments[slot]
-            if force.any():
-                velocities = self.chain.jacobian(motion.q, body, self.local_points[slot])[0]
-                load += velocities @ force
-                symmetric += (axes @ cross_matrix(force).T) @ velocities.T
+            velocity, moment = velocities[slot], loading.moments[slot]
+            if velocity is not None:
+                forces += (axes @ cross_matrix(loading.forces[slot]).T) @ velocity.T
             if moment.any():
                 angular = motion.angular(body)
-                load += angular @ moment
-                lower += angular @ (angular @ cross_matrix(moment).T).T
-        above = symmetric * self._above
-        tangent = above + above.T + lower * self._below
-        tangent[self._diagonal] += symmetric[self._diagonal]
+                moments += angular @ (angular @ cross_matrix(moment).T).T
+        above = forces * self._above
+        tangent = above + above.T + moments * self._below
+        tangent[self._diagonal] += forces[self._diagonal]
         for active in self.load_effects:
-            response = active.effect.apply(motion, self.slots.wrenches(loading), active.values)
+            response = self._effect(active, motion, loading)
             load += loading.share * response.load
             tangent += loading.share * response.tangent
         return load, tangent
+
+    def _effect(self, active: ActiveLoad, motion: ChainMotion, loading: Loading) -> AppliedLoad:
+        return active.effect.apply(motion, self.slots.wrenches(loading), active.values)
 
     def derivatives(self, q: Array, states: States) -> HoldingDerivatives:
         """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""

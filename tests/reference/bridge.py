@@ -7,8 +7,7 @@ from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import Equilibrium, System, follow
-
-from .peers.chain import Array, Chain
+from tests.reference.peers.chain import Array, Chain
 
 
 def spine_model(chain: Chain) -> SpineModel:

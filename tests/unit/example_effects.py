@@ -159,9 +159,9 @@ class FollowerLoad:
 class JointCentreOffset:
     """Geometry: the laws act about a centre displaced in the joint frame, forwards and up."""
 
+    per_joint: bool = True
     name: ClassVar[str] = "joint_centre_offset"
     kind: ClassVar[Kind] = Kind.GEOMETRY
-    per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = (
         number("forward", "m", -0.05, 0.05, 0.0, prior_scale=0.005),
         number("up", "m", -0.05, 0.05, 0.0, prior_scale=0.005),
@@ -169,7 +169,8 @@ class JointCentreOffset:
 
     def place(self, q: Array, parameters: Array) -> Placement:
         rotation, first, second = _rotations(q[:, 3:])
-        centre = np.column_stack([parameters, np.zeros(len(q))])
+        centre = np.column_stack([parameters, np.zeros(len(parameters))])
+        centre = np.broadcast_to(centre, (len(q), 3))
         moved, by_coordinate = q.copy(), np.tile(np.eye(6), (len(q), 1, 1))
         by_coordinates = np.zeros((len(q), 6, 6, 6))
         moved[:, :3] += np.einsum("jxy,jy->jx", rotation - np.eye(3), centre)

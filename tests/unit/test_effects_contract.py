@@ -227,6 +227,7 @@ def test_an_object_of_no_kind_is_refused() -> None:
 @pytest.mark.xfail(strict=True, reason="only the first joint's derivative is taken")
 @pytest.mark.parametrize("effects", [
     pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),
+    pytest.param((scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),), id="geometry"),
     pytest.param((scoped(MarkerError(per_joint=False), (0, 1, 2), (1.1, 0.02)),), id="measurement"),
 ])  # fmt: skip
 def test_one_row_of_parameters_for_all_joints(effects) -> None:

@@ -1,0 +1,212 @@
+"""Equilibria against closed forms, what has no equilibrium, and models that are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from example_effects import NOWHERE, bushing, loaded, spine
+from scipy.optimize import brentq
+
+from spinepipe.effects import Wrench
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
+from spinepipe.statics import Chain, SolvedStep, Status, System, follow
+from spinepipe.world import StaleChain
+
+ROUND_OFF = 1e-13
+"""m and rad: loads are good to 1e-13 of their size, motion is of order 0.1."""
+
+
+def upright(n: int, stiffness: tuple[float, ...], mass: float = 0.0, arm=(0.0, 0.02, 0.0),
+            inertia: float = 0.0) -> SpineModel:  # fmt: skip
+    """n upright joints 30 mm apart; the masses stand ``arm`` off their joint's centre."""
+    origins = [np.array([0.0, 0.03 * j, 0.0]) for j in range(n)]
+    scope = bushing(n)
+    return SpineModel(
+        specimen="upright",
+        joints=tuple(f"L{n - j}L{n - j + 1}" for j in range(n)),
+        frames=tuple(Pose(np.eye(3), origin) for origin in origins),
+        bodies=tuple(
+            Body(f"L{n - j}", mass, origins[j] + arm, inertia * np.eye(3)) for j in range(n)
+        ),
+        gravity=np.array([0.0, -9.81, 0.0]) if mass else np.zeros(3),
+        damping=np.tile([200.0] * 3 + [1.0] * 3, (n, 1)),
+        effects=(scope.with_values(np.tile(stiffness, (n, 1))),),
+    )
+
+
+SPRINGS = (1e5, 3e5, 1e5, 51.0, 40.0, 90.0)
+
+
+def under(model: SpineModel, *wrenches: Wrench) -> SolvedStep:
+    """The equilibrium of a model under wrenches, all in one step."""
+    case = LoadCase("test", 1, (LoadStep(0, wrenches),))
+    return follow(System(Chain(model), model, case))[0]
+
+
+def moment(body: int, *components: float) -> Wrench:
+    return Wrench(body, NOWHERE, NOWHERE, np.array(components))
+
+
+@pytest.mark.parametrize("coordinate", range(6))
+def test_one_coordinate_moves_by_load_over_stiffness(coordinate: int) -> None:
+    model = spine(1, gravity=False)
+    axis = model.frames[0].rotation[:, (0, 1, 2, 2, 0, 1)[coordinate]]
+    force, turning = (80.0 * axis, NOWHERE) if coordinate < 3 else (NOWHERE, 5.0 * axis)
+    solved = under(model, Wrench(0, model.frames[0].origin, force, turning))
+    expected = np.zeros(6)
+    stiffness = model.effects[0].values[0, coordinate]
+    expected[coordinate] = (80.0 if coordinate < 3 else 5.0) / stiffness
+    np.testing.assert_allclose(solved.equilibrium.q, expected, rtol=0, atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize("n", [6, 20])
+def test_a_pure_flexion_moment_bends_every_level_alike(n: int) -> None:
+    solved = under(upright(n, SPRINGS), moment(n - 1, 0.0, 0.0, -7.5))
+    expected = np.zeros((n, 6))
+    expected[:, 3] = -7.5 / 51.0
+    assert solved.equilibrium.status is Status.CONVERGED
+    np.testing.assert_allclose(solved.equilibrium.q.reshape(n, 6), expected, atol=ROUND_OFF)
+    assert np.rad2deg(expected[0, 3]) == pytest.approx(-8.42585, abs=5e-6)
+
+
+def test_a_weight_in_front_of_one_joint() -> None:
+    """k angle = -m g arm(angle); translations do not change the arm."""
+    mass, arm = 8.0, np.array([0.05, 0.10, 0.0])
+
+    def missing(angle: float) -> float:
+        return 51.0 * angle + mass * 9.81 * (arm[0] * np.cos(angle) - arm[1] * np.sin(angle))
+
+    expected = [0, -mass * 9.81 / 3e5, 0, brentq(missing, -1, 1, xtol=1e-15), 0, 0]
+    solved = under(upright(1, SPRINGS, mass, tuple(arm)))
+    np.testing.assert_allclose(solved.equilibrium.q, expected, rtol=0, atol=ROUND_OFF)
+
+
+def test_a_solved_pose_leaves_no_load_over() -> None:
+    model = spine(3)
+    system = System(Chain(model), model, loaded(model))
+    for step in follow(system):
+        residual = system.balance(step.equilibrium.q, step.loading, step.states).residual
+        assert np.abs(residual).max() < 1e-10  # loads are of order 100
+        assert step.equilibrium.message == ""
+        assert step.equilibrium.reached == 1.0
+
+
+def test_a_large_load_is_reached_by_continuation() -> None:
+    model = spine(3, gravity=False)
+    solved = under(model, moment(2, 10.0, 12.0, -16.0))
+    assert solved.equilibrium.status is Status.CONVERGED
+    halves = [moment(2, *(share * np.array([10.0, 12.0, -16.0]))) for share in (0.25, 0.5, 0.75, 1)]
+    case = LoadCase("slowly", 1, tuple(LoadStep(i, (w,)) for i, w in enumerate(halves)))
+    slowly = follow(System(Chain(model), model, case))[-1]
+    np.testing.assert_allclose(solved.equilibrium.q, slowly.equilibrium.q, rtol=0, atol=1e-12)
+
+
+def test_a_pose_that_is_stable_though_the_symmetric_part_is_not_positive() -> None:
+    """Six joints of 20 N m/rad under an axial moment of 10.5 N m."""
+    soft = (1e5, 3e5, 1e5, 20.0, 20.0, 20.0)
+    solved = under(upright(6, soft, inertia=1e-4), moment(5, 0.0, 0.0, 10.5))
+    assert solved.equilibrium.status is Status.CONVERGED
+    np.testing.assert_allclose(solved.equilibrium.q.reshape(6, 6)[:, 3], 10.5 / 20.0)
+
+
+TIPPING = {
+    "in one direction": (1e5, 3e5, 1e5, 5.0, 50.0, 90.0),
+    "in two directions at once": (1e5, 3e5, 1e5, 5.0, 5.0, 90.0),
+}
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-5, 1e-3])
+@pytest.mark.parametrize("springs", TIPPING.values(), ids=TIPPING)
+def test_a_weight_that_tips_the_upright_pose(springs, inertia: float) -> None:
+    """m g h = 9.81 N m/rad against 5: upright is an equilibrium, but not a stable one."""
+    solved = under(upright(1, springs, 10.0, (0.0, 0.1, 0.0), inertia))
+    assert solved.equilibrium.status is Status.UNSTABLE
+    assert not solved.usable
+    assert solved.equilibrium.factored is None
+    assert 0.4 < solved.equilibrium.reached < 0.6  # 5 / 9.81
+    assert np.isfinite(solved.equilibrium.q).all()
+    assert "stability" in solved.equilibrium.message
+
+
+@pytest.mark.xfail(strict=True, reason="growth below a billionth of the fastest rate passes")
+def test_a_tiny_inertia_hides_no_tipping() -> None:
+    solved = under(upright(1, TIPPING["in two directions at once"], 7.0, (0.0, 0.1, 0.0), 1e-10))
+    assert solved.equilibrium.status is Status.UNSTABLE
+
+
+def test_the_same_weight_stands_on_stiffer_springs() -> None:
+    solved = under(upright(1, (1e5, 3e5, 1e5, 9.9, 9.9, 90.0), 10.0, (0.0, 0.1, 0.0), 1e-4))
+    assert solved.equilibrium.status is Status.CONVERGED
+
+
+def test_a_weight_off_centre_tips_over_without_another_pose() -> None:
+    solved = under(upright(2, (1e5, 3e5, 1e5, 5.0, 50.0, 90.0), 10.0, (0.01, 0.1, 0.0), 1e-3))
+    assert solved.equilibrium.status is Status.UNSTABLE
+    assert "%" in solved.equilibrium.message
+    assert np.abs(solved.equilibrium.q).max() < np.deg2rad(80.0)
+
+
+def test_a_chain_is_not_used_after_another_was_loaded() -> None:
+    model = spine(2)
+    chain = Chain(model)
+    Chain(spine(1))
+    with pytest.raises(StaleChain):
+        follow(System(chain, model, loaded(model)))
+
+
+def test_models_loaded_one_after_the_other_do_not_mix() -> None:
+    models = [spine(2), spine(3), replace(spine(2), gravity=np.zeros(3))]
+    first = [follow(System(Chain(m), m, loaded(m)))[-1].equilibrium.q for m in models]
+    again = [follow(System(Chain(m), m, loaded(m)))[-1].equilibrium.q for m in reversed(models)]
+    for one, other in zip(first, reversed(again), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert not np.array_equal(first[0], first[2])
+
+
+def spoiled(**changes: object) -> SpineModel:
+    return replace(spine(2), **changes)
+
+
+def test_no_and_too_many_joints_are_refused() -> None:
+    with pytest.raises(RefusedModel, match="21 joints; 1 to 20"):
+        upright(21, SPRINGS)
+    with pytest.raises(RefusedModel, match="0 joints"):
+        spoiled(joints=(), frames=(), bodies=(), damping=np.zeros((0, 6)), effects=())
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"frames": spine(1).frames}, "differ in number"),
+        ({"frames": (Pose(np.eye(3), np.full(3, np.nan)),) * 2}, "L2L3 is not finite"),
+        ({"bodies": (replace(spine(1).bodies[0], mass=0.0),) * 2}, "no mass, but gravity is on"),
+        ({"bodies": (replace(spine(1).bodies[0], mass=-1.0),) * 2}, "not negative"),
+        ({"bodies": (replace(spine(1).bodies[0], com=np.full(3, np.inf)),) * 2}, "finite"),
+        ({"effects": (bushing(2).with_values(np.ones((1, 6))),)}, "values must be 2 x 6"),
+        ({"effects": (bushing(2).with_values(np.zeros((2, 6))),)}, r"is 0 N/m, allowed 1 to"),
+        ({"effects": (bushing(2).with_values(np.full((2, 6), np.nan)),)}, "is nan"),
+    ],
+)
+def test_models_no_solver_should_see_are_refused(changes, said) -> None:
+    with pytest.raises(RefusedModel, match=said):
+        spoiled(**changes)
+
+
+@pytest.mark.xfail(strict=True, reason="not looked at")
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gravity": np.array([0.0, np.nan, 0.0])},
+        {"damping": np.zeros((2, 6))},
+        {"damping": np.full((2, 6), np.nan)},
+        {"frames": (Pose(np.diag([1.0, 1.0, -1.0]), np.zeros(3)),) * 2},
+        {"frames": (Pose(2.0 * np.eye(3), np.zeros(3)),) * 2},
+        {"bodies": (replace(spine(1).bodies[0], inertia=-np.eye(3)),) * 2},
+        {"effects": (ScopedEffect(bushing(2).effect, (0, 5), bushing(2).values),)},
+    ],
+    ids=["gravity", "no damping", "damping", "mirrored frame", "long axes", "inertia", "joint"],
+)
+def test_these_models_should_be_refused_too(changes) -> None:
+    with pytest.raises(RefusedModel):
+        spoiled(**changes)
