@@ -46,7 +46,7 @@ def _moments(chain: PeerChain) -> list[PeerChain]:
 
 
 def _largest_difference(ours: np.ndarray, peer: np.ndarray) -> str:
-    return f"{np.rad2deg(np.abs(ours - peer)[:, 3:].max()):.1e} deg"
+    return f"{np.rad2deg(np.abs(ours - peer.reshape(-1, 6))[:, 3:].max()):.1e} deg"
 
 
 def equilibria() -> Iterator[Result]:

@@ -174,7 +174,7 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
         bounds=(problem.lower, problem.upper),
         method="dogbox",
         ftol=1e-11,
-        xtol=1e-9,
+        xtol=1e-7,
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
     )

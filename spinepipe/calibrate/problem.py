@@ -112,7 +112,7 @@ class Evaluator:
     def _residual(self, number: int, system: System, poses: Sequence[Array]) -> Array:
         """(N,) weighted residuals of the readings of one case that enter the cost."""
         measured = self.problem.cases[number]
-        seen = np.stack([observe(system, q)[0] for q in poses])
+        seen = np.stack([observe(system, q) for q in poses])
         seen = seen - seen[0] if measured.zeroed else seen
         error: Array = (seen - measured.measured) * self._scale
         return error[self._used[number]]

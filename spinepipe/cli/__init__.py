@@ -1,0 +1,5 @@
+"""The command line: `spinepipe check`, `show`, `doctor`, `export` and `docs`."""
+
+from spinepipe.cli.program import main
+
+__all__ = ["main"]

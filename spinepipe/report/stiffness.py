@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, grid, head, label_rows, mark_start, row_height
@@ -177,20 +177,21 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     low, high = min([low, *near]), max([high, *near])
     margin = 10 ** max(0.06, 0.07 * log10(high / low))
     axis.set_xlim(low / margin, high * margin)
-    axis.xaxis.set_major_locator(LogLocator(subs=_ticks(low / margin, high * margin)))
-    axis.xaxis.set_minor_locator(LogLocator(subs=range(1, 10)))
+    _ticks(axis, low / margin, high * margin)
+
+
+def _ticks(axis: Axes, low: float, high: float) -> None:
+    """Few ticks with plain numbers: even ones within half a decade, else 1, 2, 5 or decades."""
+    decades = log10(high / low)
+    if decades < 0.5:
+        even = [x for x in MaxNLocator(4).tick_values(low, high) if low <= x <= high]
+        axis.xaxis.set_major_locator(FixedLocator(even))
+        axis.xaxis.set_minor_locator(NullLocator())
+    else:
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,)))
+        axis.xaxis.set_minor_locator(LogLocator(subs=range(1, 10)))
     axis.xaxis.set_major_formatter(lambda x, _: tick(x))
     axis.xaxis.set_minor_formatter(NullFormatter())
-
-
-def _ticks(low: float, high: float) -> tuple[float, ...]:
-    decades = log10(high / low)
-    if decades < 0.7:
-        return tuple(float(x) for x in range(1, 10)) if decades > 0.3 else _FINE
-    return (1.0, 2.0, 5.0) if decades < 1.7 else (1.0,)
-
-
-_FINE = tuple(1.0 + 0.2 * step for step in range(45))
 
 
 def _shown(axis: Axes, x: float) -> bool:

@@ -104,15 +104,12 @@ def _placement_by_x(
     return result
 
 
-def observe(system: System, q: Array) -> tuple[Array, Array]:
-    """Reported coordinates (J, 6) at pose q (n,), and their derivative (J, 6, 6) by the true."""
+def observe(system: System, q: Array) -> Array:
+    """Reported coordinates (J, 6) at pose q (n,): what the measurement effects make of it."""
     joints = q.reshape(-1, 6).copy()
-    by_coordinate = np.tile(np.eye(6), (len(joints), 1, 1))
     for active in system.measurement:
-        seen = active.effect.observe(joints[active.joints], active.values)
-        joints[active.joints] = seen.q
-        by_coordinate[active.joints] = seen.by_coordinate @ by_coordinate[active.joints]
-    return joints, by_coordinate
+        joints[active.joints] = active.effect.observe(joints[active.joints], active.values).q
+    return joints
 
 
 def observed_by_parameters(

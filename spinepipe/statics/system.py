@@ -2,15 +2,17 @@
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects import (
     AppliedLoad,
+    Effect,
     GeometryEffect,
     JointLaw,
+    Kind,
     LoadEffect,
     MeasurementEffect,
     PathLaw,
@@ -80,19 +82,20 @@ class System:
         self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
         self._diagonal = np.diag_indices(chain.n)
 
-    def _activate(self, index: int, effect: object, joints: Array, values: Array) -> None:
-        if isinstance(effect, JointLaw):
-            self.laws.append(ActiveLaw(index, effect, joints, values))
-        elif isinstance(effect, PathLaw):
-            self.laws.append(ActivePath(index, effect, joints, values))
-        elif isinstance(effect, GeometryEffect):
-            self.geometry.append(ActiveGeometry(index, effect, joints, values))
-        elif isinstance(effect, LoadEffect):
-            self.load_effects.append(ActiveLoad(index, effect, values))
-        elif isinstance(effect, MeasurementEffect):
-            self.measurement.append(ActiveMeasurement(index, effect, joints, values))
-        else:
-            raise TypeError(f"{effect!r} satisfies none of the five protocols of an effect")
+    def _activate(self, index: int, effect: Effect, joints: Array, values: Array) -> None:
+        match effect.kind:
+            case Kind.JOINT_LAW:
+                self.laws.append(ActiveLaw(index, cast(JointLaw, effect), joints, values))
+            case Kind.PATH:
+                self.laws.append(ActivePath(index, cast(PathLaw, effect), joints, values))
+            case Kind.GEOMETRY:
+                geometry = cast(GeometryEffect, effect)
+                self.geometry.append(ActiveGeometry(index, geometry, joints, values))
+            case Kind.LOAD:
+                self.load_effects.append(ActiveLoad(index, cast(LoadEffect, effect), values))
+            case Kind.MEASUREMENT:
+                measurement = cast(MeasurementEffect, effect)
+                self.measurement.append(ActiveMeasurement(index, measurement, joints, values))
 
     def with_model(self, model: SpineModel) -> "System":
         """The same chain, case and effects with the parameter values of another model."""

@@ -30,8 +30,8 @@ def full(system: System) -> Program:
     return Program.constant(system.slots.loading(system.case.steps[0].wrenches))
 
 
-@pytest.mark.parametrize("damping", [0.35, 1.0, 0.05])
-def test_one_joint_follows_its_closed_form(damping: float) -> None:
+@pytest.mark.parametrize(("damping", "share_off"), [(0.35, 2e-3), (1.0, 2e-3), (0.05, 1e-2)])
+def test_one_joint_follows_its_closed_form(damping: float, share_off: float) -> None:
     """inertia a'' + damping a' + stiffness a = moment from rest, over- and underdamped."""
     system, inertia, stiffness = one_joint(damping)
     times = np.array([0.001, 0.005, 0.02, 0.1])
@@ -39,8 +39,9 @@ def test_one_joint_follows_its_closed_form(damping: float) -> None:
     share = (one * np.exp(other * times) - other * np.exp(one * times)) / (one - other)
     found = settle(system, full(system), 0.1, times)
     expected = 5.0 / stiffness * (1.0 - share.real)
-    # relative tolerance 3e-4 a step, errors of which an underdamped run collects some
-    np.testing.assert_allclose(found.history[:, 3], expected, rtol=0, atol=2e-3 * 5.0 / stiffness)
+    # relative tolerance 3e-4 a step, of which errors an underdamped run collects some thirty
+    off = share_off * 5.0 / stiffness
+    np.testing.assert_allclose(found.history[:, 3], expected, rtol=0, atol=off)
     assert found.status is Status.CONVERGED
 
 

@@ -1,0 +1,102 @@
+"""`spinepipe check`: every problem of studies and cohorts, before anything runs."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from spinepipe import cohort as cohorts
+from spinepipe import studies
+from spinepipe.cli.find import cohort_names, study_names, unknown
+from spinepipe.cohort import Cohort
+from spinepipe.problems import InputError, Problem
+from spinepipe.report.words import count
+from spinepipe.studies.study import COHORTS
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Names of studies or cohorts."""
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="STUDY",
+        help="studies or cohorts; all of config/ when none is named",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print one line for what is sound and all problems of what is not."""
+    root: Path = options.root
+    told: set[Problem] = set()
+    sound = [_tell(title, look, told) for title, look in _tasks(root, options.names)]
+    if told:
+        print(f"\n{count(len(told), 'problem')} in all; nothing was changed.")
+    return 0 if all(sound) else 1
+
+
+Task = tuple[str, Callable[[], str]]
+
+
+def _tasks(root: Path, names: list[str]) -> list[Task]:
+    """What is looked at: its title, and a function that describes it or raises."""
+    known_studies, known_cohorts = study_names(root), cohort_names(root)
+    if not known_studies and not known_cohorts:
+        allowed = "a folder with config/studies and config/cohorts"
+        remedy = "go there or pass --root"
+        raise InputError([Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)])
+    if not names:
+        tasks: list[Task] = [("config/config.yaml", lambda: _selection(root))]
+        tasks += [_study_task(root, name) for name in known_studies]
+        return tasks + [_cohort_task(root, name) for name in known_cohorts]
+    tasks = []
+    for name in names:
+        if name in known_studies:
+            tasks.append(_study_task(root, name))
+        elif name in known_cohorts:
+            tasks.append(_cohort_task(root, name))
+        else:
+            raise InputError([unknown("study", name, [*known_studies, *known_cohorts])])
+    return tasks
+
+
+def _study_task(root: Path, name: str) -> Task:
+    def look() -> str:
+        study, cohort = studies.check(root, name)
+        return f"{study.kind} on cohort {cohort.name}"
+
+    return f"study {name}", look
+
+
+def _cohort_task(root: Path, name: str) -> Task:
+    return f"cohort {name}", lambda: _described(cohorts.read(root / COHORTS / name))
+
+
+def _selection(root: Path) -> str:
+    selection = studies.read_selection(root)
+    return f"a plain run builds {', '.join(selection.studies)}"
+
+
+def _described(cohort: Cohort) -> str:
+    readings = 0 if cohort.motion is None else len(cohort.motion)
+    parts = (
+        count(len(cohort.specimen_names), "specimen"),
+        count(len(cohort.joint_names), "joint"),
+        count(len(cohort.tests), "test"),
+        count(readings, "row of motion", "rows of motion"),
+    )
+    return ", ".join(parts)
+
+
+def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:
+    """Print how one thing is; a problem that was told before is not told again."""
+    try:
+        print(f"ok    {title}: {look()}")
+    except InputError as error:
+        new = [problem for problem in error.problems if problem not in told]
+        known = len(error.problems) - len(new)
+        above = f" ({count(known, 'problem')} of these told above)" if known else ""
+        print(f"FAIL  {title}{above}")
+        for problem in new:
+            print(f"      {problem}")
+        told.update(new)
+        return False
+    return True

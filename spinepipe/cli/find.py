@@ -1,0 +1,62 @@
+"""What a name on the command line means: a study, a cohort, or the folder of one."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from spinepipe import cohort as cohorts
+from spinepipe import studies
+from spinepipe.cohort import Cohort
+from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.study import COHORTS
+
+STUDIES = Path("config") / "studies"
+
+
+def study_names(root: Path) -> list[str]:
+    """Names of all study files."""
+    return sorted(path.stem for path in (root / STUDIES).glob("*.yaml"))
+
+
+def cohort_names(root: Path) -> list[str]:
+    """Names of all cohort folders."""
+    return sorted(path.name for path in (root / COHORTS).glob("*") if path.is_dir())
+
+
+def study_or_cohort(name: str, root: Path) -> tuple[JointPoseSensitivity | None, Cohort]:
+    """A study with its cohort, or a cohort alone; a study comes first if both have the name.
+
+    Raises
+    ------
+    InputError
+        When there is neither, or with every problem found in them.
+    """
+    if name in study_names(root):
+        study, cohort = studies.check(root, name)
+        return (study if isinstance(study, JointPoseSensitivity) else None), cohort
+    if name in cohort_names(root):
+        return None, cohorts.read(root / COHORTS / name)
+    if (root / name).is_dir() and "/" in name:
+        return None, cohorts.read(root / name)
+    raise InputError([unknown("name", name, [*study_names(root), *cohort_names(root)])])
+
+
+def unknown(what: str, name: str, known: Sequence[str]) -> Problem:
+    """A name on the command line that nothing has."""
+    remedy = did_you_mean(name, known, "correct the name, or the folder with --root")
+    return Problem("command line", None, None, f"unknown {what} '{name}'", one_of(known), remedy)
+
+
+def specimen_of(cohort: Cohort, name: str | None) -> str:
+    """A specimen of a cohort; the first one where no name is given.
+
+    Raises
+    ------
+    InputError
+        When the cohort has no such specimen.
+    """
+    if name is None:
+        return str(cohort.specimen_names[0])
+    if name not in cohort.specimen_names:
+        raise InputError([unknown("specimen", name, cohort.specimen_names)])
+    return name

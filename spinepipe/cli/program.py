@@ -1,0 +1,86 @@
+"""The program `spinepipe`: finds the command, and turns errors into one clear message.
+
+A command is imported when it is called for, so that `doctor` works where a library is missing.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+COMMANDS = {
+    "check": "say everything that is wrong with studies and cohorts",
+    "show": "print a specimen and draw it",
+    "doctor": "test whether this computer can run the studies",
+    "export": "write a specimen's model as an OpenSim file",
+    "docs": "write the generated parts of the documentation",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code: 0 well, 1 a problem, 2 wrong usage."""
+    parser = argparse.ArgumentParser(
+        prog="spinepipe",
+        description="Spine models calibrated on measured motion.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="commands:\n" + "\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
+        + "\n\n`spinepipe COMMAND --help` says more.",
+    )  # fmt: skip
+    _add_root(parser, Path.cwd())
+    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="see below")
+    parser.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    found = parser.parse_args(arguments)
+    return _run(found.command, found.rest, found.root)
+
+
+def _add_root(parser: argparse.ArgumentParser, default: Path) -> None:
+    parser.add_argument(
+        "--root",
+        type=Path,
+        default=default,
+        metavar="FOLDER",
+        help="folder of the Snakefile (default: where you are)",
+    )
+
+
+def _run(command: str, rest: Sequence[str], root: Path) -> int:
+    try:
+        module = import_module(f"spinepipe.cli.{command}")
+    except ImportError as error:
+        return _fail(command, f"{error}; `spinepipe doctor` says what is missing")
+    parser = argparse.ArgumentParser(f"spinepipe {command}", description=COMMANDS[command])
+    _add_root(parser, root)
+    module.add_arguments(parser)
+    options = parser.parse_args(rest)
+    options.root = options.root.resolve()
+    try:
+        code: int = module.run(options)
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if not _is_for_people(error):
+            raise
+        return _fail(command, _message(error))
+    return code
+
+
+def _is_for_people(error: Exception) -> bool:
+    """Whether the error says what the user can mend; any other is a fault of ours."""
+    from spinepipe.model.spine import RefusedModel
+    from spinepipe.problems import InputError
+
+    return isinstance(error, InputError | RefusedModel | OSError | ImportError)
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
+def _fail(command: str, message: str) -> int:
+    print(f"spinepipe {command}: {message}", file=sys.stderr)
+    return 1

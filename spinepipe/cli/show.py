@@ -1,0 +1,45 @@
+"""`spinepipe show`: one specimen as text and as a picture."""
+
+import argparse
+from pathlib import Path
+
+from spinepipe.cli.find import specimen_of, study_or_cohort
+from spinepipe.problems import InputError, Problem
+from spinepipe.report.specimen import draw_specimen
+from spinepipe.report.specimen_text import describe
+from spinepipe.report.specimen_view import view_of
+from spinepipe.report.style import save, style
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to show and where to draw it."""
+    parser.add_argument("name", metavar="STUDY_OR_COHORT", help="name of a study or cohort")
+    parser.add_argument("specimen", nargs="?", metavar="SPECIMEN", help="the first if left out")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="picture, .png, .svg or .pdf (default: results/show/<name>.png)",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print and draw."""
+    name = Path(options.name).name
+    chosen = f"{name}-{options.specimen}" if options.specimen else name
+    output = options.output or options.root / "results" / "show" / f"{chosen}.png"
+    if output.suffix not in PICTURES:
+        allowed = ", ".join(PICTURES)
+        problem = Problem("command line", None, "-o", output.name, allowed, "rename the picture")
+        raise InputError([problem])
+    study, cohort = study_or_cohort(options.name, options.root)
+    specimen = specimen_of(cohort, options.specimen)
+    view = view_of(cohort, specimen, study)
+    print(describe(cohort, view))
+    with style():
+        save(draw_specimen(cohort, view), output)
+    print(f"\npicture: {output}")
+    return 0
