@@ -102,10 +102,21 @@ class Chain:
         """(3, 3) principal axes of inertia in the joint frame.
 
         PyBullet measures a Jacobian's local point from the link's origin, but along these axes.
+
+        Raises
+        ------
+        RefusedModel
+            When PyBullet has put zero in place of an inertia that no body can have.
         """
         info = pybullet.getDynamicsInfo(
             self._body, 6 * body + _LAST_LINK, physicsClientId=self._client.id
         )
+        given = self.model.bodies[body]
+        if not np.isclose(sum(info[2]), np.trace(given.inertia), rtol=1e-9, atol=0.0):
+            raise RefusedModel(
+                f"body {given.name}: no body has this inertia; each principal moment must be "
+                "smaller than the sum of the other two"
+            )
         return np.array(pybullet.getMatrixFromQuaternion(info[4])).reshape(3, 3)
 
     def _set_gravity(self, gravity: Array) -> None:

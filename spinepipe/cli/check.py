@@ -42,7 +42,9 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
     if not known_studies and not known_cohorts:
         allowed = "a folder with config/studies and config/cohorts"
         remedy = "go there or pass --root"
-        raise InputError([Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)])
+        raise InputError(
+            [Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
+        )
     if not names:
         tasks: list[Task] = [("config/config.yaml", lambda: _selection(root))]
         tasks += [_study_task(root, name) for name in known_studies]

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -24,6 +25,9 @@ from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, to_si
 
 Landmarks = Mapping[str, Mapping[str, Array]]
 """Points in m, ground: vertebra to landmark to (3,)."""
+
+STRICTLY_INSIDE = 1e-6
+"""Share of the largest moment by which an inertia keeps off the limit: PyBullet needs some."""
 
 _POINT = ["x_mm", "y_mm", "z_mm"]
 _INERTIA = ["ixx_kg_m2", "iyy_kg_m2", "izz_kg_m2", "ixy_kg_m2", "ixz_kg_m2", "iyz_kg_m2"]
@@ -85,8 +89,12 @@ def joint_frames(cohort: Cohort, specimen: str) -> tuple[Pose, ...]:
     )
 
 
+@lru_cache(maxsize=256)
 def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
-    """Moving vertebrae; massless where the cohort lists no bodies, points without inertia."""
+    """Moving vertebrae; massless where the cohort lists no bodies, points without inertia.
+
+    Kept per cohort object: thousands of models of one specimen share them.
+    """
     names = cohort.vertebrae[1:]
     if cohort.bodies is None:
         return tuple(Body(name, 0.0, np.zeros(3), np.zeros((3, 3))) for name in names)
@@ -99,7 +107,22 @@ def _body(name: str, row: pd.DataFrame) -> Body:
     com = row[["com_x_mm", "com_y_mm", "com_z_mm"]].to_numpy(float)[0] / MM_PER_M
     xx, yy, zz, xy, xz, yz = np.nan_to_num(row[_INERTIA].to_numpy(float)[0])
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Body(name, float(row["mass_kg"].iloc[0]), com, inertia)
+    return Body(name, float(row["mass_kg"].iloc[0]), com, _possible(inertia))
+
+
+def _possible(inertia: Array) -> Array:
+    """The inertia (3, 3), lifted onto what a body can have where rounding left it just off.
+
+    Flat bodies and rods sit exactly on the limit (one principal moment the sum of the others),
+    and figures in files are rounded; the reader has refused what is further off than that.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    short = moments[2] * (1.0 + STRICTLY_INSIDE) - moments[0] - moments[1]
+    if short <= 0.0:
+        return inertia
+    lifted = moments + np.array([short, short, 0.0]) / 2.0
+    possible: Array = axes @ np.diag(np.maximum(lifted, 0.0)) @ axes.T
+    return possible
 
 
 def spine_model(

@@ -280,6 +280,7 @@ def scoped(effect: Effect, joints: tuple[int, ...], *rows: tuple[float, ...]) ->
 
 
 SPRINGS = ((1.1e5, 3.3e5, 0.9e5, 41.0, 34.0, 77.0), (0.8e5, 2.9e5, 1.2e5, 36.0, 45.0, 88.0))
+CENTRE = np.array([0.012, 0.02, 0.003])
 POINTS = ((0.01, 0.04, 0.002), (0.015, 0.08, -0.003), (0.01, 0.13, 0.004))
 
 
@@ -297,7 +298,7 @@ def spine(n: int = 3, gravity: bool = True, effects: tuple[ScopedEffect, ...] = 
         for j in range(n)
     )
     bodies = tuple(
-        Body(f"L{n - j}", 0.8, frames[j].origin + [0.012, 0.02, 0.003], np.diag([3e-4, 4e-4, 5e-4]))
+        Body(f"L{n - j}", 0.8, frames[j].origin + CENTRE, np.diag([3e-4, 4e-4, 5e-4]))
         for j in range(n)
     )
     return SpineModel(
@@ -314,7 +315,7 @@ def spine(n: int = 3, gravity: bool = True, effects: tuple[ScopedEffect, ...] = 
 def loaded(model: SpineModel, steps: int = 3, test: str = "all ways") -> LoadCase:
     """Moment and force on the top, and a force below it, that grow, fall and take 2 s a step."""
     top, low = model.n_joints - 1, max(model.n_joints - 2, 0)
-    upper, lower = model.bodies[top].com + [0.0, 0.02, 0.01], model.bodies[low].com
+    upper, lower = model.bodies[top].com + np.array([0.0, 0.02, 0.01]), model.bodies[low].com
     sizes = [(0.6, 1.0, 0.3)[step % 3] for step in range(steps)]
     return LoadCase(
         test,

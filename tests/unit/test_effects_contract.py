@@ -310,4 +310,6 @@ def test_a_linear_bushing_is_six_springs() -> None:
     np.testing.assert_array_equal(response.load, scope.values * q)
     np.testing.assert_array_equal(np.einsum("jab,jb->ja", response.tangent, q), response.load)
     by_parameter = scope.effect.by_parameter(q, scope.values, np.zeros((2, 6)))
-    np.testing.assert_array_equal(np.einsum("jab,jb->ja", by_parameter, scope.values), response.load)
+    np.testing.assert_array_equal(
+        np.einsum("jab,jb->ja", by_parameter, scope.values), response.load
+    )

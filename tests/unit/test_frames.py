@@ -47,9 +47,7 @@ def test_units_at_the_border_round_trip() -> None:
     np.testing.assert_allclose(to_si(from_si(q)), q, rtol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("angles", "axis"), [((0.3, 0, 0), 2), ((0, 0.3, 0), 0), ((0, 0, 0.3), 1)]
-)
+@pytest.mark.parametrize(("angles", "axis"), [((0.3, 0, 0), 2), ((0, 0.3, 0), 0), ((0, 0, 0.3), 1)])
 def test_each_angle_turns_about_its_axis(angles, axis) -> None:
     vector = 0.3 * np.eye(3)[axis]
     expected = Rotation.from_rotvec(vector).as_matrix()

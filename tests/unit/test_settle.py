@@ -88,7 +88,8 @@ def test_path_effects_and_massless_chains_are_refused() -> None:
 
 def tipping() -> tuple[System, SpineModel]:
     model = spine(1)
-    heavy = replace(model.bodies[0], mass=60.0, com=model.frames[0].origin + [0.002, 0.1, 0.0])
+    above = model.frames[0].origin + np.array([0.002, 0.1, 0.0])
+    heavy = replace(model.bodies[0], mass=60.0, com=above)
     model = replace(model, bodies=(heavy,))
     return System(Chain(model), model, loaded(model, 1)), model
 

@@ -8,7 +8,17 @@ import pyarrow.parquet as pq
 import pytest
 
 from spinepipe.statics import Status
-from spinepipe.tables import TABLES, BadTable, Column, Table, join, read, read_frame, to_arrow, write
+from spinepipe.tables import (
+    TABLES,
+    BadTable,
+    Column,
+    Table,
+    join,
+    read,
+    read_frame,
+    to_arrow,
+    write,
+)
 from spinepipe.tables.columns import MESSAGE, SPECIMEN, status
 
 TABLE = Table(
@@ -121,7 +131,7 @@ def test_a_written_table_reads_back_with_its_metadata(tmp_path: Path) -> None:
 
 def test_the_same_rows_are_the_same_bytes(tmp_path: Path) -> None:
     for name, order in (("one", ("a", "b")), ("two", ("b", "a"))):
-        write(to_arrow(TABLE, ROWS), tmp_path / name, {key: "1" for key in order})
+        write(to_arrow(TABLE, ROWS), tmp_path / name, dict.fromkeys(order, "1"))
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 

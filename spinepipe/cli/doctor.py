@@ -1,0 +1,155 @@
+"""`spinepipe doctor`: can this computer run the studies? Only the standard library is needed."""
+
+import argparse
+import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, metadata, version
+from pathlib import Path
+
+LOCK = "requirements.lock"
+PROFILE = Path("profiles") / "default" / "config.yaml"
+TUNED = {"force-use-threads": "true", "scheduler": "greedy"}
+"""Options without which a run takes many times longer."""
+
+PRESENT = ("max-jobs-per-timespan", "scheduler-subsample")
+LARGEST_ERROR = 1e-9
+"""Relative; Newton ends below 1e-9 rad of the closed form."""
+
+SECONDS_FOR_ENGINE = 120
+_PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^\s;\\]+)", re.MULTILINE)
+
+
+class Trouble(Exception):
+    """A finding that keeps studies from running, and the remedy."""
+
+    def __init__(self, found: str, remedy: str) -> None:
+        super().__init__(f"{found}; {remedy}")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The doctor asks nothing."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print one line per examination; 1 if any of them failed."""
+    checks: dict[str, Callable[[Path], str]] = {
+        "python": check_python,
+        "libraries": check_libraries,
+        "engine": check_engine,
+        "profile": check_profile,
+        "results": check_results,
+        "cores": check_cores,
+    }
+    sound = [_examine(name, check, options.root) for name, check in checks.items()]
+    return 0 if all(sound) else 1
+
+
+def _examine(name: str, check: Callable[[Path], str], root: Path) -> bool:
+    try:
+        print(f"ok    {name:10} {check(root)}", flush=True)
+    except (Trouble, OSError) as trouble:
+        print(f"FAIL  {name:10} {trouble}", flush=True)
+        return False
+    return True
+
+
+def check_python(root: Path) -> str:
+    """Whether this Python is one the package was made for."""
+    wanted = metadata("spinepipe")["Requires-Python"] or ""
+    for sign, number in re.findall(r"(>=|<)\s*([0-9.]+)", wanted):
+        limit = tuple(int(part) for part in number.split("."))
+        here = sys.version_info[: len(limit)]
+        if (here < limit) if sign == ">=" else (here >= limit):
+            remedy = f"make the environment with a Python {wanted}"
+            raise Trouble(f"Python {platform.python_version()}, needed {wanted}", remedy)
+    return f"{platform.python_version()} ({wanted})"
+
+
+def check_libraries(root: Path) -> str:
+    """Whether each library has the version that the lock file pins."""
+    lock = root / LOCK
+    if not lock.is_file():
+        raise Trouble(f"no {LOCK} in {root}", "go to the folder of the Snakefile or pass --root")
+    pins = dict(_PIN.findall(lock.read_text(encoding="utf-8")))
+    wrong = [told for name, wanted in pins.items() if (told := _deviation(name, wanted))]
+    if wrong:
+        remedy = f"run `pip install --require-hashes -r {LOCK}`"
+        raise Trouble(", ".join(wrong), remedy)
+    return f"{len(pins)} have the versions of {LOCK}"
+
+
+def _deviation(name: str, wanted: str) -> str:
+    try:
+        found = version(name)
+    except PackageNotFoundError:
+        return f"{name} is missing"
+    return "" if found == wanted else f"{name} is {found}, not {wanted}"
+
+
+def check_engine(root: Path) -> str:
+    """Whether the engine loads a model and finds M / k; in a process of its own, it may crash."""
+    command = [sys.executable, "-m", "spinepipe.cli.engine"]
+    remedy = f"reinstall pybullet, numpy and scipy from {LOCK} on this computer"
+    ended = subprocess.run(
+        command, capture_output=True, text=True, timeout=SECONDS_FOR_ENGINE, check=False
+    )
+    if ended.returncode < 0:
+        raise Trouble(f"the engine crashed ({signal.Signals(-ended.returncode).name})", remedy)
+    lines = ended.stdout.split()
+    if ended.returncode or not lines:
+        last = (ended.stderr.strip().splitlines() or ["no output"])[-1]
+        raise Trouble(f"the engine failed: {last}", remedy)
+    error = float(lines[-1])
+    if not error < LARGEST_ERROR:
+        raise Trouble(f"an equilibrium is {error:.1e} from the closed form M/k", remedy)
+    return f"pybullet loads a model; equilibrium within {error:.0e} of the closed form M/k"
+
+
+def check_profile(root: Path) -> str:
+    """Whether Snakemake will find the options that make thousands of short jobs fast."""
+    path = root / PROFILE
+    if not path.is_file():
+        remedy = "restore it from the repository, or go to the folder of the Snakefile"
+        raise Trouble(f"no {PROFILE.as_posix()} in {root}", remedy)
+    options = _options(path.read_text(encoding="utf-8"))
+    missing = [f"{key}: {value}" for key, value in TUNED.items() if options.get(key) != value]
+    missing += [key for key in PRESENT if key not in options]
+    if missing:
+        raise Trouble(f"{PROFILE.as_posix()} lacks {', '.join(missing)}", "add it")
+    return f"{PROFILE.as_posix()} has the tuned options"
+
+
+def _options(text: str) -> dict[str, str]:
+    """Top-level `key: value` lines of a profile."""
+    pairs = re.findall(r"^([a-z-]+):\s*([^#\n]*)", text, re.MULTILINE)
+    return {key: value.strip().strip("\"'").lower() for key, value in pairs}
+
+
+def check_results(root: Path) -> str:
+    """Whether results can be written, and the room there is."""
+    folder = root / "results"
+    place = folder if folder.exists() else root
+    try:
+        with tempfile.TemporaryFile(dir=place) as probe:
+            probe.write(b"1")
+    except OSError as error:
+        remedy = "make room, change its permissions, or work in another folder"
+        raise Trouble(f"{place} cannot be written: {error.strerror}", remedy) from None
+    free = shutil.disk_usage(place).free / 1e9
+    return f"{folder} can be written, {free:.1f} GB free"
+
+
+def check_cores(root: Path) -> str:
+    """How many cores this process may use."""
+    try:
+        cores = len(os.sched_getaffinity(0))
+    except AttributeError:  # only Linux tells which cores a process may use
+        cores = os.cpu_count() or 1
+    return f"{cores}; run `snakemake --cores {cores}`"

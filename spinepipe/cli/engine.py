@@ -1,0 +1,32 @@
+"""One joint under a pure moment: prints how far its equilibrium is from the closed form M/k."""
+
+import numpy as np
+
+from spinepipe.effects import Wrench, create
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.statics import Chain, System, follow
+
+MOMENT_NM = 7.5
+STIFFNESS = np.array([1e5, 1e6, 1e5, 50.0, 60.0, 70.0])
+"""N/m and N m/rad."""
+
+
+def relative_error() -> float:
+    """Relative error of the extension angle under a moment about the joint's first axis."""
+    point = np.array([0.0, 0.03, 0.0])
+    body = Body("L4", 0.1, point, np.eye(3) * 1e-5)
+    bushing = ScopedEffect(create("linear_bushing"), (0,), STIFFNESS[None, :])
+    frame = Pose(np.eye(3), np.zeros(3))
+    weightless, damping = np.zeros(3), np.array([[1e3, 1e3, 1e3, 1.4, 1.4, 1.4]])
+    model = SpineModel("doctor", ("L4L5",), (frame,), (body,), weightless, damping, (bushing,))
+    wrench = Wrench(0, point, np.zeros(3), np.array([0.0, 0.0, MOMENT_NM]))
+    case = LoadCase("extension", 1, (LoadStep(0, (wrench,)),))
+    q = follow(System(Chain(model), model, case))[0].equilibrium.q
+    expected = np.zeros(6)
+    expected[3] = MOMENT_NM / STIFFNESS[3]
+    return float(np.abs(q - expected).max() / expected[3])
+
+
+if __name__ == "__main__":
+    print(relative_error())

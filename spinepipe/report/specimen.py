@@ -1,0 +1,197 @@
+"""Figure: one specimen from its right side and from behind, with frames, landmarks and loads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array, Wrench
+from spinepipe.model import LoadCase
+from spinepipe.report.specimen_view import SpecimenView
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, blank
+from spinepipe.report.words import count
+from spinepipe.units import MM_PER_M
+
+AXIS_COLORS = {"anterior": VERMILLION, "superior": GREEN, "right": BLUE}
+"""Colours of the x, y and z axes of joint frames."""
+
+_LINES = (
+    ("inferior_endplate_centre", "superior_endplate_centre"),
+    ("left_pedicle_base", "right_pedicle_base"),
+)
+_ARROW_SHARE = 0.16
+_TRIAD_SHARE = 0.3
+_HEIGHT_MM, _WIDTH_MM = 150.0, 140.0
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A direction of view: ground axes that run across and up, and which moment turns in it.
+
+    Attributes
+    ----------
+    turn : +1 where a positive moment about the normal turns counterclockwise in the picture.
+    """
+
+    title: str
+    across: int
+    label: str
+    normal: int
+    turn: int
+
+    def flat(self, points: Array) -> Array:
+        """(…, 2) of points or directions (…, 3)."""
+        return points[..., [self.across, 1]]
+
+
+SAGITTAL = _Side("Sagittal, from the right", 0, "x, anterior (mm)", 2, 1)
+FRONTAL = _Side("Frontal, from behind", 2, "z, right (mm)", 0, -1)
+
+
+def draw_specimen(cohort: Cohort, view: SpecimenView) -> Figure:
+    """Both views at one scale; of every test the step with the largest load is drawn."""
+    figure = blank(_HEIGHT_MM, _WIDTH_MM)
+    low, high = _extent(view)
+    size = float((high - low)[1])
+    for axis, side in zip(figure.subplots(1, 2, sharey=True), (SAGITTAL, FRONTAL), strict=True):
+        axis.set_title(side.title)
+        axis.set_xlabel(side.label)
+        axis.set_aspect("equal", adjustable="box")
+        _landmarks(axis, side, view)
+        _bodies(axis, side, view)
+        _frames(axis, side, cohort, view)
+        _loads(axis, side, view, size)
+        axis.margins(0.12)
+        axis.spines["left"].set_visible(True)
+        axis.tick_params(axis="y", size=2.5)
+    figure.axes[0].set_ylabel("y, superior (mm)")
+    _legend(figure, cohort, view)
+    return figure
+
+
+def _extent(view: SpecimenView) -> tuple[Array, Array]:
+    """Lowest and highest of all points that are drawn, mm."""
+    points = [frame.origin for frame in view.frames] + [body.com for body in view.bodies]
+    points += [point for named in view.points.values() for point in named.values()]
+    points += [w.point for case in view.cases for s in case.steps for w in s.wrenches]
+    every = np.array(points) * MM_PER_M
+    return every.min(axis=0), np.maximum(every.max(axis=0), every.min(axis=0) + 30.0)
+
+
+def _landmarks(axis: Axes, side: _Side, view: SpecimenView) -> None:
+    for named in view.points.values():
+        flat = {name: side.flat(point * MM_PER_M) for name, point in named.items()}
+        for start, end in _LINES:
+            if start in flat and end in flat:
+                axis.plot(*np.array([flat[start], flat[end]]).T, color=GREY, lw=0.8, zorder=1)
+        axis.plot(*np.array(list(flat.values())).T, "o", color=GREY, ms=2.5, mew=0, zorder=2)
+
+
+def _bodies(axis: Axes, side: _Side, view: SpecimenView) -> None:
+    for body in view.bodies:
+        at = side.flat(body.com * MM_PER_M)
+        axis.plot(*at, "o", mfc="white", mec=BLACK, ms=5.0, mew=0.7, zorder=2)
+        axis.plot(*at, "+", color=BLACK, ms=5.0, mew=0.7, zorder=2)
+        axis.annotate(
+            body.name, at, (5, 0), textcoords="offset points", fontsize=7.5, weight="bold",
+            va="center", zorder=6,
+        )  # fmt: skip
+
+
+def _frames(axis: Axes, side: _Side, cohort: Cohort, view: SpecimenView) -> None:
+    """Three axes per joint, as they are seen from this side, and the joint's name."""
+    origins = np.array([frame.origin for frame in view.frames]) * MM_PER_M
+    gaps = np.linalg.norm(np.diff(origins, axis=0), axis=1)
+    length = _TRIAD_SHARE * (float(gaps.min()) if len(gaps) else 30.0)
+    for joint, frame, origin in zip(cohort.joint_names, view.frames, origins, strict=True):
+        start = side.flat(origin)
+        for direction, color in zip(frame.rotation.T, AXIS_COLORS.values(), strict=True):
+            end = start + length * side.flat(direction)
+            axis.annotate("", end, start, arrowprops=_arrow(color, 1.2, 5.0), zorder=4)
+            axis.update_datalim([end])
+        axis.plot(*start, "o", color=BLACK, ms=2.0, zorder=5)
+        name_at = start + length * np.array([-0.4, -0.4])
+        axis.annotate(joint, name_at, fontsize=6.5, ha="right", va="top", zorder=6)
+
+
+def _loads(axis: Axes, side: _Side, view: SpecimenView, size: float) -> None:
+    """The largest load of each test: force as an arrow, moment in this plane as an arc."""
+    chosen = [(case, wrench) for case in view.cases for wrench in _largest(case)]
+    forces = [float(np.linalg.norm(wrench.force)) for _, wrench in chosen]
+    most = max(forces, default=0.0)
+    words: dict[tuple[float, ...], list[str]] = {}
+    for case, wrench in chosen:
+        at = side.flat(wrench.point * MM_PER_M)
+        force, moment = side.flat(wrench.force), float(wrench.moment[side.normal])
+        told = []
+        if np.linalg.norm(force) > 1e-9:
+            tail = at - _ARROW_SHARE * size * force / most
+            axis.annotate("", at, tail, arrowprops=_arrow(BLACK, 1.6, 9.0), zorder=7)
+            axis.update_datalim([tail])
+            told.append(f"{float(np.linalg.norm(force)):.4g} N")
+        if abs(moment) > 1e-9:
+            _arc(axis, at, side.turn * moment, 0.45 * _ARROW_SHARE * size)
+            told.append(f"{abs(moment):.4g} N m")
+        if told:
+            place = tuple(np.round(at, 6))
+            words.setdefault(place, []).append(f"{case.test}: {', '.join(told)}")
+    for place, lines in words.items():
+        told_once = "\n".join(dict.fromkeys(lines))
+        axis.annotate(
+            told_once, place, (7, 7), textcoords="offset points", fontsize=6.5, zorder=8,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+        )  # fmt: skip
+        axis.update_datalim([np.add(place, (0.35 * size, 0.05 * size))])
+
+
+def _largest(case: LoadCase) -> tuple[Wrench, ...]:
+    """Loads of the step of a test with the largest forces, or moments where there is no force."""
+
+    def total(wrenches: tuple[Wrench, ...]) -> tuple[float, float]:
+        force = sum(float(np.linalg.norm(wrench.force)) for wrench in wrenches)
+        moment = sum(float(np.linalg.norm(wrench.moment)) for wrench in wrenches)
+        return round(force, 9), moment
+
+    return max((step.wrenches for step in case.steps), key=total)
+
+
+def _arc(axis: Axes, at: Array, moment: float, radius: float) -> None:
+    """Three quarters of a circle with an arrow head, counterclockwise where positive."""
+    angles = np.deg2rad(np.linspace(-45.0, 225.0, 60))[:: 1 if moment > 0.0 else -1]
+    path = at + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    axis.plot(*path.T, color=BLACK, lw=1.2, zorder=7)
+    axis.annotate("", path[-1], path[-4], arrowprops=_arrow(BLACK, 1.2, 8.0), zorder=7)
+
+
+def _arrow(color: str, width_pt: float, head_pt: float) -> dict[str, object]:
+    return {
+        "arrowstyle": "-|>",
+        "color": color,
+        "lw": width_pt,
+        "mutation_scale": head_pt,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+    }
+
+
+def _legend(figure: Figure, cohort: Cohort, view: SpecimenView) -> None:
+    handles = [
+        Line2D([], [], color=color, lw=1.2, label=f"joint axis, {name}")
+        for name, color in AXIS_COLORS.items()
+    ]
+    if view.points:
+        marker = {"marker": "o", "ms": 3.0, "mew": 0.0}
+        handles.append(Line2D([], [], color=GREY, lw=0.8, label="landmarks", **marker))  # type: ignore[arg-type]
+    if view.bodies:
+        label = "centre of mass"
+        handles.append(
+            Line2D([], [], color="none", marker="o", mfc="white", mec=BLACK, ms=5.0, label=label)
+        )
+    steps = count(sum(len(case.steps) for case in view.cases), "load step")
+    title = f"{cohort.name}, {view.specimen}, neutral pose; largest load of each test ({steps})"
+    figure.legend(
+        handles=handles, title=title, loc="outside lower center", ncols=3, title_fontsize=6.5
+    )
