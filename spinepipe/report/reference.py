@@ -78,7 +78,7 @@ def cohort_table(form: cohort_columns.TableForm) -> str:
             c.kind,
             c.range_text,
             c.meaning,
-            "not allowed" if c.required else "not measured",
+            "not allowed" if c.required else "allowed",
         )
         for c in form.columns
     ]
