@@ -85,7 +85,7 @@ def _failed_runs(simulations: pd.DataFrame) -> pd.DataFrame:
     """One row per run (a test of a pose with a stiffness): did a step end without equilibrium?"""
     usable = [status.value for status in Status if status.usable]
     failed = ~simulations["status"].isin(usable)
-    return simulations.assign(failed=failed).groupby(_RUN, as_index=False)["failed"].any()
+    return simulations.assign(failed=failed).groupby(_RUN)["failed"].any().reset_index()
 
 
 def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from spinepipe.report.markdown import code, table
 
 Schema = Mapping[str, Any]
-_WORDS = {
+_WORDS: dict[str, str] = {
     "string": "text",
     "number": "number",
     "integer": "integer",
@@ -64,7 +64,7 @@ def _choices(field: Schema) -> list[Schema]:
 def _type(whole: Schema, field: Schema) -> str:
     words = []
     for choice in _choices(field):
-        kind = choice.get("type", "string" if "const" in choice or "enum" in choice else "any")
+        kind: str = choice.get("type", "string" if "const" in choice or "enum" in choice else "any")
         if kind == "array":
             inner = _type(whole, _resolved(whole, choice.get("items", {})))
             words.append(f"list of {inner}")

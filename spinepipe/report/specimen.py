@@ -24,6 +24,9 @@ _LINES = (
 )
 _ARROW_SHARE = 0.16
 _TRIAD_SHARE = 0.3
+_LABEL_X, _LABEL_Y = 0.04, 0.085
+"""Where a load is described, beside its arrow, as shares of the height."""
+
 _HEIGHT_MM, _WIDTH_MM = 150.0, 140.0
 
 
@@ -42,9 +45,9 @@ class _Side:
     normal: int
     turn: int
 
-    def flat(self, points: Array) -> Array:
-        """(…, 2) of points or directions (…, 3)."""
-        return points[..., [self.across, 1]]
+    def flat(self, point: Array) -> Array:
+        """(2,) of a point or direction (3,)."""
+        return point[[self.across, 1]]
 
 
 SAGITTAL = _Side("Sagittal, from the right", 0, "x, anterior (mm)", 2, 1)
@@ -68,8 +71,18 @@ def draw_specimen(cohort: Cohort, view: SpecimenView) -> Figure:
         axis.spines["left"].set_visible(True)
         axis.tick_params(axis="y", size=2.5)
     figure.axes[0].set_ylabel("y, superior (mm)")
+    _one_scale(figure)
     _legend(figure, cohort, view)
     return figure
+
+
+def _one_scale(figure: Figure) -> None:
+    """The same width of both views, so that equal heights are equal lengths."""
+    ends = [axis.get_xlim() for axis in figure.axes]
+    half = max(high - low for low, high in ends) / 2.0
+    for axis, (low, high) in zip(figure.axes, ends, strict=True):
+        middle = (low + high) / 2.0
+        axis.set_xlim(middle - half, middle + half)
 
 
 def _extent(view: SpecimenView) -> tuple[Array, Array]:
@@ -96,8 +109,8 @@ def _bodies(axis: Axes, side: _Side, view: SpecimenView) -> None:
         axis.plot(*at, "o", mfc="white", mec=BLACK, ms=5.0, mew=0.7, zorder=2)
         axis.plot(*at, "+", color=BLACK, ms=5.0, mew=0.7, zorder=2)
         axis.annotate(
-            body.name, at, (5, 0), textcoords="offset points", fontsize=7.5, weight="bold",
-            va="center", zorder=6,
+            body.name, _spot(at), (-4, -3), textcoords="offset points", fontsize=7.5, weight="bold",
+            ha="right", va="top", zorder=6,
         )  # fmt: skip
 
 
@@ -110,11 +123,13 @@ def _frames(axis: Axes, side: _Side, cohort: Cohort, view: SpecimenView) -> None
         start = side.flat(origin)
         for direction, color in zip(frame.rotation.T, AXIS_COLORS.values(), strict=True):
             end = start + length * side.flat(direction)
-            axis.annotate("", end, start, arrowprops=_arrow(color, 1.2, 5.0), zorder=4)
+            axis.annotate(
+                "", _spot(end), _spot(start), arrowprops=_arrow(color, 1.2, 5.0), zorder=4
+            )
             axis.update_datalim([end])
         axis.plot(*start, "o", color=BLACK, ms=2.0, zorder=5)
         name_at = start + length * np.array([-0.4, -0.4])
-        axis.annotate(joint, name_at, fontsize=6.5, ha="right", va="top", zorder=6)
+        axis.annotate(joint, _spot(name_at), fontsize=6.5, ha="right", va="top", zorder=6)
 
 
 def _loads(axis: Axes, side: _Side, view: SpecimenView, size: float) -> None:
@@ -122,29 +137,32 @@ def _loads(axis: Axes, side: _Side, view: SpecimenView, size: float) -> None:
     chosen = [(case, wrench) for case in view.cases for wrench in _largest(case)]
     forces = [float(np.linalg.norm(wrench.force)) for _, wrench in chosen]
     most = max(forces, default=0.0)
-    words: dict[tuple[float, ...], list[str]] = {}
+    words: dict[tuple[float, float], list[str]] = {}
     for case, wrench in chosen:
         at = side.flat(wrench.point * MM_PER_M)
         force, moment = side.flat(wrench.force), float(wrench.moment[side.normal])
         told = []
         if np.linalg.norm(force) > 1e-9:
             tail = at - _ARROW_SHARE * size * force / most
-            axis.annotate("", at, tail, arrowprops=_arrow(BLACK, 1.6, 9.0), zorder=7)
+            axis.annotate("", _spot(at), _spot(tail), arrowprops=_arrow(BLACK, 1.6, 9.0), zorder=7)
             axis.update_datalim([tail])
             told.append(f"{float(np.linalg.norm(force)):.4g} N")
         if abs(moment) > 1e-9:
             _arc(axis, at, side.turn * moment, 0.45 * _ARROW_SHARE * size)
             told.append(f"{abs(moment):.4g} N m")
+        if abs(wrench.moment[1]) > 1e-9:
+            told.append(f"{abs(float(wrench.moment[1])):.4g} N m about y")
         if told:
-            place = tuple(np.round(at, 6))
+            place = _spot(np.round(at, 6))
             words.setdefault(place, []).append(f"{case.test}: {', '.join(told)}")
     for place, lines in words.items():
-        told_once = "\n".join(dict.fromkeys(lines))
-        axis.annotate(
-            told_once, place, (7, 7), textcoords="offset points", fontsize=6.5, zorder=8,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
-        )  # fmt: skip
-        axis.update_datalim([np.add(place, (0.35 * size, 0.05 * size))])
+        corner = _spot(np.add(place, (_LABEL_X * size, _LABEL_Y * size)))
+        axis.annotate("\n".join(dict.fromkeys(lines)), corner, fontsize=6.5, va="bottom", zorder=8)
+        axis.update_datalim([np.add(corner, (0.3 * size, 0.05 * size))])
+
+
+def _spot(point: Array) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _largest(case: LoadCase) -> tuple[Wrench, ...]:
@@ -163,7 +181,9 @@ def _arc(axis: Axes, at: Array, moment: float, radius: float) -> None:
     angles = np.deg2rad(np.linspace(-45.0, 225.0, 60))[:: 1 if moment > 0.0 else -1]
     path = at + radius * np.column_stack([np.cos(angles), np.sin(angles)])
     axis.plot(*path.T, color=BLACK, lw=1.2, zorder=7)
-    axis.annotate("", path[-1], path[-4], arrowprops=_arrow(BLACK, 1.2, 8.0), zorder=7)
+    axis.annotate(
+        "", _spot(path[-1]), _spot(path[-4]), arrowprops=_arrow(BLACK, 1.2, 8.0), zorder=7
+    )
 
 
 def _arrow(color: str, width_pt: float, head_pt: float) -> dict[str, object]:

@@ -62,7 +62,9 @@ _STYLE = {
 @contextmanager
 def style() -> Iterator[None]:
     """Matplotlib's settings for a figure of ours; figures are made and saved inside."""
-    with mpl.rc_context(rc={**mpl.rcParamsDefault, **_STYLE, "backend": "agg"}):
+    settings: dict[str, Any] = dict(mpl.rcParamsDefault.items())
+    settings.update(_STYLE, backend="agg")
+    with mpl.rc_context(rc=settings):  # type: ignore[arg-type]
         yield
 
 

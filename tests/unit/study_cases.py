@@ -159,7 +159,12 @@ def _simulations(size: Size, rng: np.random.Generator) -> list[dict[str, object]
                 stands = size.solved and (name == "calibrated" or rng.random() < 0.8)
                 for step in (0, 1):
                     for joint in size.joints:
-                        key = {"specimen": specimen, "pose": pose, "stiffness": name, "joint": joint}
+                        key = {
+                            "specimen": specimen,
+                            "pose": pose,
+                            "stiffness": name,
+                            "joint": joint,
+                        }
                         case = {"test": "flexion", "cycle": 1, "step": step}
                         rows.append({**key, **case, **_motion(stands, step, rng)})
     return rows

@@ -78,7 +78,7 @@ def test_exact_data_give_the_truth_from_any_start(grouping: str) -> None:
     rng = np.random.default_rng(3)
     truth = rng.uniform(-0.3, 0.6, len(free))
     problem = problem_of(model, free, truth)
-    for _ in range(4):
+    for _ in range(3):
         shift = rng.uniform(-1.5, 2.0, len(free))
         start = replace(
             problem,
@@ -137,7 +137,7 @@ def test_bounds_are_hit_from_many_places_without_a_stumble() -> None:
     free = rotations(model)
     measured = problem_of(model, free, np.array([2.0, -1.2, 2.0])).cases
     rng = np.random.default_rng(0)
-    for _ in range(25):
+    for _ in range(15):
         lower, upper = -rng.uniform(0.1, 0.8, 3), rng.uniform(0.1, 0.8, 3)
         found = fit(Problem(model, measured, free, np.ones(6), lower, upper))
         assert found.at_bound.tolist() == [1, -1, 1]
@@ -314,12 +314,12 @@ def test_the_covariance_is_that_of_many_noisy_experiments() -> None:
     # millimetres and degrees weighed by their noise: what least squares is best at
     problem = replace(problem, weights=np.array([2.0] * 3 + [0.3] * 3))
     rng = np.random.default_rng(8)
-    fits = [fit(noisy(problem, rng), noise=READING_SD) for _ in range(100)]
+    fits = [fit(noisy(problem, rng), noise=READING_SD) for _ in range(80)]
     found = np.cov(np.array([f.x for f in fits]).T)
     expected = fits[0].uncertainty.covariance
     scale = np.sqrt(np.outer(np.diagonal(expected), np.diagonal(expected)))
-    # a variance from 100 draws is known to 14 %: three of these
-    np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=0.42)
+    # a variance from 80 draws is known to 16 %: three of these
+    np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=0.48)
     inside = [np.abs(f.x) < 1.96 * f.uncertainty.standard_error for f in fits]
     assert 0.90 < np.mean(inside) < 0.99
 

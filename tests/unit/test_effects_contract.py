@@ -216,14 +216,6 @@ def test_effects_out_of_a_tests_scope_do_nothing() -> None:
         assert not by_x.any()
 
 
-def test_an_object_of_no_kind_is_refused() -> None:
-    class Nothing:
-        name, kind, per_joint, parameters = "nothing", Kind.LOAD, True, ()
-
-    with pytest.raises(TypeError, match="five protocols"):
-        system_of((ScopedEffect(Nothing(), (0, 1, 2), np.zeros((3, 0))),))
-
-
 @pytest.mark.xfail(strict=True, reason="only the first joint's derivative is taken")
 @pytest.mark.parametrize("effects", [
     pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),

@@ -112,8 +112,13 @@ def pose_slopes(model: SpineModel, case: LoadCase, joint: int) -> Array:
     return np.stack(columns, axis=1)
 
 
-@pytest.mark.parametrize("gravity", [True, False])
-@pytest.mark.parametrize("effects", EFFECTS)
+@pytest.mark.parametrize(
+    ("effects", "gravity"),
+    [
+        pytest.param((), False, id="weightless springs"),
+        pytest.param(LAWS, True, id="laws and geometry with weight"),
+    ],
+)
 def test_joint_poses(effects: tuple[ScopedEffect, ...], gravity: bool) -> None:
     model = spine(3, gravity, effects)
     case = loaded(model, 2)

@@ -1,0 +1,271 @@
+"""The command line: what it prints, what it writes, how it ends."""
+
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from cohort_cases import swap, text, without, write
+from study_cases import STUDY, Size, project, results
+
+from spinepipe.cli import doctor, main
+from spinepipe.cli.engine import relative_error
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command."""
+    code = main([str(argument) for argument in arguments])
+    told = capsys.readouterr()
+    assert "Traceback" not in told.err
+    return code, told.out, told.err
+
+
+def test_check_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path, Size())
+    code, out, _ = run(capsys, "--root", tmp_path, "check")
+    assert code == 0
+    assert out.splitlines() == [
+        "ok    config/config.yaml: a plain run builds probe",
+        "ok    study probe: joint_pose_sensitivity on cohort straight",
+        "ok    cohort straight: 2 specimens, 2 joints, 1 test, 8 rows of motion",
+    ]
+
+
+def test_check_tells_each_problem_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path, Size())
+    write(tmp_path / "config/cohorts/small", swap("bodies.csv", "a,L3,0.06", "a,L3,-1"))
+    path = tmp_path / "config/studies/probe.yaml"
+    path.write_text(path.read_text().replace("straight", "small") + "sed: 4\n")
+    code, out, _ = run(capsys, "check", "--root", tmp_path)
+    assert code == 1
+    assert out.count("bodies.csv, line 2, mass_kg") == 1
+    assert "probe.yaml, line 10, sed" in out
+    assert "FAIL  cohort small (1 problem of these told above)" in out
+    assert "ok    cohort straight" in out
+    assert "2 problems in all" in out
+
+
+def test_check_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path, Size())
+    code, out, _ = run(capsys, "--root", tmp_path, "check", "straight", "probe")
+    assert (code, len(out.splitlines())) == (0, 2)
+    code, _, err = run(capsys, "--root", tmp_path, "check", "prob")
+    assert code == 1
+    assert "unknown study 'prob'" in err
+    assert "did you mean 'probe'?" in err
+
+
+def test_check_in_the_wrong_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "--root", tmp_path, "check")
+    assert code == 1
+    assert "pass --root" in err
+
+
+@pytest.mark.parametrize("name", ["probe", "straight", "./config/cohorts/straight"])
+def test_show(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    project(tmp_path, Size())
+    code, out, _ = run(capsys, "--root", tmp_path, "show", name, "b")
+    assert code == 0
+    assert "specimen   b (2 of 2)" in out
+    assert "  V2V3   " in out
+    assert "flexion      1     1  V1           0   -20" in out
+    assert (tmp_path / "results" / "show" / f"{Path(name).name}-b.png").stat().st_size > 10_000
+
+
+def test_show_without_landmarks_bodies_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+    rows = "".join(f"{s},{j}\n" for s in "ab" for j in ("L3L4,0,5,0,-3,0,0", "L2L3,0,41,0,4,0,0"))
+    changes = [text("joints.csv", frame + rows), swap("cohort.yaml", "true", "false")]
+    changes += [without(f"{name}.csv") for name in ("landmarks", "bodies", "loads", "motion")]
+    write(tmp_path / "config/cohorts/small", *changes)
+    picture = tmp_path / "a.svg"
+    code, out, _ = run(capsys, "--root", tmp_path, "show", "small", "-o", picture)
+    assert code == 0
+    assert "bodies: none" in out
+    assert "measured motion: none" in out
+    assert picture.read_text().startswith("<?xml")
+
+
+def test_show_moments_of_several_tests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    header = "specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm"
+    tests = {"flexion": "0,0,-7.5", "right_bending": "7.5,0,0", "left_rotation": "0,7.5,0"}
+    rows = [f"*,{test},{step},L2,0,0,0,{moment if step else '0,0,0'}"
+            for test, moment in tests.items() for step in (0, 1)]  # fmt: skip
+    loads = text("loads.csv", "\n".join([header, *rows]) + "\n")
+    write(tmp_path / "config/cohorts/small", loads, without("motion.csv"))
+    code, out, _ = run(capsys, "--root", tmp_path, "show", "small")
+    assert code == 0
+    assert "left_rotation" in out
+    assert (tmp_path / "results" / "show" / "small.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["straigt"], "did you mean 'straight'?"),
+        (["straight", "z"], "unknown specimen 'z'; allowed: one of a, b"),
+        (["straight", "-o", "x.bmp"], "found x.bmp; allowed: .png, .svg, .pdf"),
+    ],
+)
+def test_show_of_what_is_not_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
+) -> None:
+    project(tmp_path, Size())
+    code, _, err = run(capsys, "--root", tmp_path, "show", *arguments)
+    assert code == 1
+    assert says in err
+
+
+def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("spinepipe.model.osim")
+    results(project(tmp_path, Size()), Size())
+    file = tmp_path / "out" / "a.osim"
+    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "-o", file)
+    assert code == 0
+    assert "joint pose nominal, stiffness: start of the study" in out
+    nominal = file.read_text()
+    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "--pose", 3, "-o", file)
+    assert code == 0
+    assert "joint pose 0003, stiffness: calibrated for this pose" in out
+    assert file.read_text() != nominal
+
+
+@pytest.mark.parametrize(
+    ("computed", "arguments", "says"),
+    [
+        (False, [STUDY, "a", "--pose", "1", "-o", "a.osim"], "run `snakemake results/probe/poses"),
+        (True, [STUDY, "a", "--pose", "99", "-o", "a.osim"], "found pose 99; allowed: 0 to 11"),
+        (True, [STUDY, "z", "-o", "a.osim"], "unknown specimen 'z'"),
+        (True, ["prob", "a", "-o", "a.osim"], "did you mean 'probe'?"),
+        (True, [STUDY, "a", "-o", "a.xml"], "allowed: FILE.osim"),
+    ],
+)
+def test_export_of_what_is_not_there(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    computed: bool,
+    arguments: list[str],
+    says: str,
+) -> None:
+    project(tmp_path, Size())
+    if computed:
+        results(tmp_path, Size())
+    code, _, err = run(capsys, "--root", tmp_path, "export", *arguments)
+    assert code == 1
+    assert says in err
+
+
+def test_engine_agrees_with_the_closed_form() -> None:
+    assert relative_error() < doctor.LARGEST_ERROR
+
+
+def healthy(root: Path) -> Path:
+    """A folder with which the doctor has no quarrel but the engine, which is not asked."""
+    (root / "profiles" / "default").mkdir(parents=True)
+    shipped = (ROOT / "profiles/default/config.yaml").read_text()
+    (root / "profiles/default/config.yaml").write_text(shipped)
+    (root / "requirements.lock").write_text((ROOT / "requirements.lock").read_text())
+    return root
+
+
+def test_doctor_on_a_sound_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "check_engine", lambda root: "not asked")
+    monkeypatch.setattr(doctor, "check_libraries", lambda root: "not asked")
+    code, out, _ = run(capsys, "--root", healthy(tmp_path), "doctor")
+    assert code == 0
+    assert [line.split()[:2] for line in out.splitlines()] == [
+        ["ok", name] for name in ("python", "libraries", "engine", "profile", "results", "cores")
+    ]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["profiles", "requirements.lock"]
+
+
+def test_doctor_finds_wrong_libraries(tmp_path: Path) -> None:
+    (tmp_path / "requirements.lock").write_text("numpy==0.1 \\\n    --hash=x\nno-such-lib==2\n")
+    with pytest.raises(doctor.Trouble, match=r"numpy is .*, not 0\.1, no-such-lib is missing"):
+        doctor.check_libraries(tmp_path)
+    with pytest.raises(doctor.Trouble, match="pass --root"):
+        doctor.check_libraries(tmp_path / "elsewhere")
+
+
+def test_doctor_finds_a_slow_profile(tmp_path: Path) -> None:
+    path = healthy(tmp_path) / "profiles/default/config.yaml"
+    assert "tuned" in doctor.check_profile(tmp_path)
+    path.write_text(path.read_text().replace("force-use-threads: true", "force-use-threads: false"))
+    with pytest.raises(doctor.Trouble, match="lacks force-use-threads: true; add it"):
+        doctor.check_profile(tmp_path)
+    path.unlink()
+    with pytest.raises(doctor.Trouble, match="no profiles/default"):
+        doctor.check_profile(tmp_path)
+
+
+def test_doctor_finds_results_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "results").write_text("a file in the way")
+    with pytest.raises(doctor.Trouble, match="cannot be written"):
+        doctor.check_results(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("code", "out", "says"),
+    [(-11, "", r"crashed \(SIGSEGV\)"), (1, "", "engine failed: no pybullet"),
+     (0, "0.5\n", "5.0e-01 from the closed form"), (0, "nan\n", "nan from the closed form")],
+)  # fmt: skip
+def test_doctor_finds_an_unsound_engine(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, code: int, out: str, says: str
+) -> None:
+    ended = SimpleNamespace(returncode=code, stdout=out, stderr="Traceback\nno pybullet\n")
+    monkeypatch.setattr(doctor.subprocess, "run", lambda *_, **__: ended)
+    with pytest.raises(doctor.Trouble, match=says):
+        doctor.check_engine(tmp_path)
+
+
+def test_doctor_ends_with_1_when_something_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "check_engine", lambda root: "not asked")
+    code, out, _ = run(capsys, "--root", tmp_path, "doctor")
+    assert code == 1
+    assert "FAIL  profile" in out
+    assert "ok    cores" in out
+
+
+def test_docs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "docs" / "page.md"
+    page.parent.mkdir()
+    page.write_text("<!-- generated: effects -->\n<!-- end of generated -->\n")
+    assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 1
+    code, out, _ = run(capsys, "--root", tmp_path, "docs")
+    assert (code, out) == (0, "wrote docs/page.md\n")
+    assert "linear_bushing" in page.read_text()
+    assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 0
+
+
+def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, code in ((["--help"], 0), (["chek"], 2), ([], 2), (["check", "--help"], 0)):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert ended.value.code == code
+    told = capsys.readouterr()
+    assert "doctor" in told.out
+    assert "invalid choice: 'chek'" in told.err
+
+
+def test_a_broken_library_is_one_message(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "spinepipe.cli.check", None)
+    code, _, err = run(capsys, "check")
+    assert code == 1
+    assert "`spinepipe doctor` says what is missing" in err
+
+
+def test_as_a_program() -> None:
+    command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr

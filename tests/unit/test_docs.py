@@ -1,0 +1,64 @@
+"""Generated parts of the documentation: complete, up to date, and derived from the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from spinepipe.problems import InputError
+from spinepipe.report.reference import END, generators, names_in, outdated, pages, refreshed
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_pages_are_up_to_date() -> None:
+    assert outdated(ROOT) == [], "run `spinepipe docs`"
+
+
+def test_every_part_stands_on_some_page() -> None:
+    shown = {name for path in pages(ROOT) for name in names_in(path.read_text())}
+    assert shown == set(generators())
+
+
+def test_links_lead_somewhere() -> None:
+    for path in pages(ROOT):
+        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", path.read_text()):
+            assert target.startswith("http") or (path.parent / target).exists(), (path, target)
+
+
+def test_a_part_is_replaced_between_its_markers_only() -> None:
+    text = f"before\n\n<!-- generated: table poses -->\nold\n{END}\n\nafter\n"
+    new = refreshed(text, "page.md")
+    assert new.startswith("before\n\n<!-- generated: table poses -->\n")
+    assert new.endswith(f"{END}\n\nafter\n")
+    assert "old" not in new
+    assert "| `specimen` | text |" in new
+    assert refreshed(new, "page.md") == new
+
+
+def test_unknown_and_open_markers_are_told() -> None:
+    with pytest.raises(InputError, match=r"page\.md.*'table pose'.*did you mean 'table poses'"):
+        refreshed(f"<!-- generated: table pose -->\n{END}", "page.md")
+    with pytest.raises(InputError, match="a marker without an end"):
+        refreshed("<!-- generated: table poses -->\n", "page.md")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "| `poses` | integer | `500` | at least 2; at most 20000 |",
+        "| `calibration.weights.superior` | number | `100` |",
+        "| `landmark_sd_mm` | number or null | `null` | above 0; at most 20 |",
+        "| `loading` | text | `equilibrium` | `equilibrium`, `settle` |",
+        "| `cohort` | text | **required** |",
+    ],
+)
+def test_keys_of_a_study(line: str) -> None:
+    assert line in generators()["keys joint_pose_sensitivity"]()
+
+
+def test_bars_in_cells_are_escaped() -> None:
+    for name, part in generators().items():
+        tables = [line for line in part().splitlines() if line.startswith("|")]
+        widths = {len(re.findall(r"(?<!\\)\|", line)) for line in tables if tables}
+        assert len(widths) <= 1 or name == "effects", name

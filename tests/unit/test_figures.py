@@ -1,0 +1,153 @@
+"""Figures: there for every kind of result, the same bytes twice, and honest about nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+from study_cases import STUDY, Size, project, results
+
+from spinepipe.jobs import figures
+from spinepipe.report.published import paper_of
+from spinepipe.report.rows import MOST_ROWS, rows_of
+from spinepipe.report.spread import quartiles
+from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
+from spinepipe.report.words import fixed, number, percent, tick
+from spinepipe.units import COORDINATES
+
+NAMES = ("stiffness", "errors", "joint_pose")
+
+SIZES = {
+    "two specimens": Size(),
+    "one joint": Size(("a",), 1, 12, ("extension",)),
+    "few poses": Size(("a",), 2, 3),
+    "joint by joint": Size(("a", "b"), 3, 12, grouping="per_joint"),
+    "twenty joints": Size(("a", "b", "c"), 20, 4, COORDINATES, "per_joint"),
+    "no solved row": Size(solved=False),
+}
+
+
+def draw(root: Path, size: Size) -> Path:
+    """Figures of made-up results; returns their folder."""
+    folder = results(project(root, size), size)
+    tables = [str(folder / f"{name}.parquet") for name in ("poses", "calibrations", "simulations")]
+    pictures = [str(folder / "figures" / f"{name}.svg") for name in NAMES]
+    figures.run(str(root), STUDY, *tables, *pictures)
+    return folder / "figures"
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+def test_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
+    folder = draw(tmp_path, size)
+    files = {path.name for path in folder.iterdir()}
+    assert files == {f"{name}.{kind}" for name in NAMES for kind in ("svg", "png")}
+    for name in NAMES:
+        with Image.open(folder / f"{name}.png") as picture:
+            assert picture.width == int(WIDTH_MM / 25.4 * DPI)
+            assert np.asarray(picture.convert("L")).min() < 128, "nothing is drawn"
+
+
+def test_same_bytes_twice(tmp_path: Path) -> None:
+    first, second = draw(tmp_path / "1", Size()), draw(tmp_path / "2", Size())
+    for path in first.iterdir():
+        assert path.read_bytes() == (second / path.name).read_bytes(), path.name
+
+
+def test_no_date_and_no_font_from_the_computer(tmp_path: Path) -> None:
+    text = (draw(tmp_path, Size()) / "errors.svg").read_text()
+    assert "<dc:date>" not in text
+    assert "<text" not in text, "letters are outlines"
+
+
+def test_what_cannot_be_shown_is_said(tmp_path: Path) -> None:
+    folder = draw(tmp_path, Size(solved=False))
+    assert "No stiffness was found for any of 24 joint poses." in comments(folder / "stiffness.svg")
+    assert "none of 72 simulations" in comments(folder / "errors.svg")
+
+
+def comments(svg: Path) -> str:
+    """Words of an SVG; matplotlib notes them beside the outlines."""
+    text = svg.read_text()
+    return " ".join(part.split("-->")[0] for part in text.split("<!--")[1:])
+
+
+def test_shares_and_medians_are_written_in_the_panels(tmp_path: Path) -> None:
+    size = Size(("a",), 2, 40)
+    words = comments(draw(tmp_path, size) / "stiffness.svg")
+    frame = pd.read_parquet(tmp_path / "results" / STUDY / "calibrations.parquet")
+    lost = int((frame["extension_identifiable"] == False).sum())  # noqa: E712
+    at_bound = int((frame["extension_nm_per_rad"] > 36_999).sum())
+    assert at_bound > 0
+    told = f"at a bound {percent(at_bound, 40)}, not identifiable {percent(lost, 40)}, n = 40"
+    assert told in words
+    assert f"median {number(frame['extension_nm_per_rad'].median())} (IQR" in words
+
+
+def test_share_without_equilibrium_counts_runs_not_rows(tmp_path: Path) -> None:
+    size = Size(("a",), 2, 12)
+    words = comments(draw(tmp_path, size) / "errors.svg")
+    frame = pd.read_parquet(tmp_path / "results" / STUDY / "simulations.parquet")
+    best = frame[frame["stiffness"] == "best01"]
+    failed = int((best.groupby("pose")["status"].first() != "converged").sum())
+    assert 0 < failed < 12
+    assert percent(failed, 12) in words
+
+
+def test_only_the_rebuilt_cohort_has_a_paper_beside_it() -> None:
+    assert paper_of("straight") is None
+    found = paper_of("palanca_l1l4")
+    assert found is not None
+    assert found[1]["doi"] == "10.3389/fbioe.2024.1304334"
+
+
+def test_specimens_are_pooled_only_when_there_is_no_room() -> None:
+    specimens, joints = tuple("abcdef"), tuple(f"J{n}" for n in range(20))
+    frame = pd.DataFrame([(s, j) for s in specimens for j in joints], columns=["specimen", "joint"])
+    few = rows_of(frame, specimens[:2], joints)
+    assert len(few) == 40 <= MOST_ROWS
+    assert not few.note
+    assert few.labels[:2] == ("b  J0", "a  J0"), "from below, the first specimen above the second"
+    many = rows_of(frame, specimens, joints)
+    assert many.labels == joints
+    assert many.note == "6 specimens pooled"
+    assert all(len(part) == 6 for part in many.frames)
+
+
+def test_quartiles_of_a_known_sample() -> None:
+    found = quartiles(np.arange(1.0, 6.0))
+    assert (found.low, found.median, found.high, found.n) == (2.0, 3.0, 4.0, 5)
+    assert found.iqr == 2.0
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(20640.0, "20\u2009600"), (0.01344, "0.0134"), (-1.4, "\u22121.40"), (2.46e7, "2.46e7"),
+     (0.0, "0"), (999.6, "1\u2009000"), (float("nan"), "none")],
+)  # fmt: skip
+def test_numbers_as_printed(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+def test_other_numbers_as_printed() -> None:
+    assert fixed(-0.001) == "0.00"
+    assert fixed(-1.234) == "\u22121.23"
+    assert (tick(20.0), tick(300000.0), tick(1e7), tick(0.5)) == (
+        "20",
+        "300\u2009000",
+        "1e7",
+        "0.5",
+    )
+    assert (percent(0, 5), percent(1, 500), percent(499, 500)) == ("0 %", "<1 %", ">99 %")
+    assert percent(0, 0) == "none"
+
+
+def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    with style():
+        figure = saying("nothing")
+        with pytest.raises(ValueError, match=r"picture\.bmp: a picture is"):
+            save(figure, tmp_path / "picture.bmp")
+        (tmp_path / "picture.png").mkdir()
+        with pytest.raises(OSError, match=r"picture\.png"):
+            save(figure, tmp_path / "picture.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["picture.png"]
