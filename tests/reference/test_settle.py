@@ -16,6 +16,9 @@ TIMES = np.array([0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.45, 0.6, 1.0, 1.5])
 SHARE_OF_PEAK = 1e-3
 """Largest error, in the largest excursion of any joint in the same unit (m or rad)."""
 
+PEER_ACCURACY = 1e-6
+"""A hundredth of the error looked for; at 1e-7 CPodes never ends on some of these chains."""
+
 TRANSLATION_FLOOR_M = 1e-7
 """Translations below 0.1 mm: the integrator's absolute tolerance rules, 3e-8 m a step."""
 
@@ -64,7 +67,7 @@ def peak(history: Array, kind: slice) -> float:
 def test_the_way_is_that_of_opensim(name: str, ramp_s: float) -> None:
     peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     chain = chain_and_loads(name)
-    expected = peer.settle(chain, 1.5, times=TIMES, accuracy=1e-7, ramp_time=ramp_s)
+    expected = peer.settle(chain, 1.5, times=TIMES, accuracy=PEER_ACCURACY, ramp_time=ramp_s)
     system = bridge.system(chain)
     found = settle(system, program(system, ramp_s), 1.5, TIMES.tolist())
     assert found.status is Status.CONVERGED
