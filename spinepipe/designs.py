@@ -18,7 +18,7 @@ def latin_hypercube_normal(means: Array, sds: Array, n: int, seed: int) -> Array
     ValueError
         For a negative SD or fewer than two points.
     """
-    if np.any(sds < 0.0) or n < 2:
+    if not np.all(sds >= 0.0) or n < 2:
         raise ValueError("a Latin hypercube needs SDs that are not negative and at least 2 points")
     free = np.flatnonzero(sds > 0.0)
     points = np.tile(np.asarray(means, dtype=float), (n, 1))

@@ -148,7 +148,8 @@ def joint_pose(lower: Mapping[str, Array], upper: Mapping[str, Array]) -> Pose:
     """
     for name, side in (("inferior_endplate_centre", upper), ("superior_endplate_centre", lower)):
         if name not in side:
-            raise ValueError(f"{name} of the {'upper' if side is upper else 'lower'} vertebra")
+            which = "upper" if side is upper else "lower"
+            raise ValueError(f"{name} of the {which} vertebra is missing")
     complete = [side for side in (lower, upper) if all(n in side for n in FRAME_LANDMARKS)]
     if not complete:
         raise ValueError(f"neither vertebra has all of {', '.join(FRAME_LANDMARKS)}")

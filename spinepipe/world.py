@@ -113,10 +113,7 @@ class Chain:
         )
         given = self.model.bodies[body]
         if not np.isclose(sum(info[2]), np.trace(given.inertia), rtol=1e-9, atol=0.0):
-            raise RefusedModel(
-                f"body {given.name}: no body has this inertia; each principal moment must be "
-                "smaller than the sum of the other two"
-            )
+            raise RefusedModel(f"body {given.name}: PyBullet does not take its inertia")
         return np.array(pybullet.getMatrixFromQuaternion(info[4])).reshape(3, 3)
 
     def _set_gravity(self, gravity: Array) -> None:

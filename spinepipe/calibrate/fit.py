@@ -21,10 +21,11 @@ START_SPREAD = 30.0
 """Further starts are drawn within this factor of the first, inside the bounds."""
 
 SAME_OPTIMUM = 1e-3
-"""Optima whose identifiable unknowns agree to this (logarithm) are one."""
+"""Optima whose identifiable unknowns agree to this (logarithms, or prior SDs) are one."""
 
 COST_TIE = 1e-6
 AT_BOUND = 1e-6
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,12 @@ def fit(
 
     Parameters
     ----------
-    identifiable_below : largest standard error of an unknown (of its logarithm where it is
-        logarithmic) at which it still counts as identified.
+    identifiable_below : largest standard error of an unknown at which it still counts as
+        identified: of its logarithm where it is logarithmic, else in prior SDs.
     noise : (6,) m and rad, SD of one reading; None takes it from the residuals.
     """
     evaluator = Evaluator(problem)
+    problem = evaluator.problem
     optima = [_descend(evaluator, x) for x in _start_points(problem, starts, seed)]
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
@@ -103,7 +105,7 @@ def fit(
         message=best.message,
         iterations=best.iterations,
         evaluations=evaluator.evaluations,
-        n_optima=_distinct(optima, found.identifiable),
+        n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
         cases=evaluator.problem.cases,
         solved=best.evaluation.solved,
@@ -122,7 +124,7 @@ def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
     m = len(problem.free)
     points = [np.zeros(m)]
     if starts > 1:
-        spread = np.log(START_SPREAD)
+        spread = np.log(START_SPREAD) * problem.scale
         low, high = np.maximum(problem.lower, -spread), np.minimum(problem.upper, spread)
         unit = qmc.LatinHypercube(m, rng=np.random.default_rng(seed)).random(starts - 1)
         points += list(low + unit * (high - low))
@@ -145,10 +147,12 @@ def _descend(evaluator: Evaluator, start: Array) -> Optimum:
 def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
     """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
     problem, stiffened = evaluator.problem, 0
+    stiffness = np.array([parameter.logarithmic for parameter in problem.free])
+    step = np.where(stiffness, np.log(STIFFENING), 0.0)
     while evaluator.at(start).residual is None:
-        if np.all(start >= problem.upper):
+        if np.all(start[stiffness] >= problem.upper[stiffness]):
             return None, stiffened
-        start = np.minimum(start + np.log(STIFFENING), problem.upper)
+        start = np.minimum(start + step, problem.upper)
         stiffened += 1
     return start, stiffened
 
@@ -159,11 +163,12 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
     seen: dict[bytes, Evaluation] = {}
 
     def residual(x: Array) -> Array:
+        x = _on_bounds(problem, x)
         seen[x.tobytes()] = here = evaluator.at(x)
         return np.full(size, np.nan) if here.residual is None else here.residual
 
     def jacobian(x: Array) -> Array:
-        found = seen[x.tobytes()].jacobian
+        found = seen[_on_bounds(problem, x).tobytes()].jacobian
         assert found is not None
         return found
 
@@ -173,22 +178,31 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
         jac=jacobian,
         bounds=(problem.lower, problem.upper),
         method="dogbox",
+        x_scale=problem.scale,
         ftol=1e-11,
         xtol=1e-7,
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
     )
-    at_bound = _bounds_reached(problem, result.x)
+    x = _on_bounds(problem, result.x)
+    at_bound = _bounds_reached(problem, x)
     status, message = _verdict(problem, bool(result.success), at_bound)
-    evaluation = seen[result.x.tobytes()]
+    evaluation = seen[x.tobytes()]
     return Optimum(
-        result.x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
+        x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
     )
+
+
+def _on_bounds(problem: Problem, x: Array) -> Array:
+    """The point with unknowns that are at a bound but for rounding put exactly there."""
+    x = np.where(x - problem.lower < ROUNDING, problem.lower, x)
+    return np.where(problem.upper - x < ROUNDING, problem.upper, x)
 
 
 def _bounds_reached(problem: Problem, x: Array) -> Array:
     """(m,) -1 at the lower, 1 at the upper bound, else 0."""
-    low, high = x - problem.lower < AT_BOUND, problem.upper - x < AT_BOUND
+    near = AT_BOUND * problem.scale
+    low, high = x - problem.lower < near, problem.upper - x < near
     return high.astype(int) - low.astype(int)
 
 
@@ -216,16 +230,16 @@ def _values(problem: Problem, x: Array) -> Array:
     )
 
 
-def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_]) -> int:
+def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_], scale: Array) -> int:
     """Number of different optima among the starts that ended, told by what is identifiable."""
     kept: list[Optimum] = []
     for optimum in (o for o in optima if o.status.usable):
-        if not any(_same(optimum, other, identifiable) for other in kept):
+        if not any(_same(optimum, other, identifiable, scale) for other in kept):
             kept.append(optimum)
     return len(kept)
 
 
-def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_]) -> bool:
-    close = np.abs(one.x - other.x)[identifiable] < SAME_OPTIMUM
+def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_], scale: Array) -> bool:
+    close = (np.abs(one.x - other.x) / scale)[identifiable] < SAME_OPTIMUM
     tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
     return bool(close.all()) and tie

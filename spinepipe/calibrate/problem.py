@@ -2,19 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, SpineModel
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.statics import (
     Chain,
     FreeParameter,
     SolvedStep,
     System,
     by_parameters,
+    declared,
     follow,
     moved,
     observe,
@@ -55,6 +57,15 @@ class Problem:
     lower: Array
     upper: Array
 
+    @cached_property
+    def scale(self) -> Array:
+        """(m,) size of a typical change of each unknown: 1 for a logarithm, else a prior SD."""
+        sizes = [
+            1.0 if parameter.logarithmic else declared(self.model, parameter).prior_scale
+            for parameter in self.free
+        ]
+        return np.array(sizes)
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -75,9 +86,18 @@ class Evaluator:
     """Evaluates a problem; the chain is loaded once, neighbouring solutions are reused."""
 
     def __init__(self, problem: Problem) -> None:
+        """Load the chain.
+
+        Raises
+        ------
+        RefusedModel
+            When nothing that was measured has a weight, or the engine refuses the model.
+        """
         cases = (_needed(problem, case) for case in problem.cases)
         problem = replace(problem, cases=tuple(case for case in cases if case.case.steps))
-        self.problem = problem
+        if not problem.cases:
+            raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
+        self.problem = _within_declared(problem)
         chain = Chain(problem.model)
         self._systems = [System(chain, problem.model, m.case) for m in problem.cases]
         self._used = [_used(m.measured, problem.weights) for m in problem.cases]
@@ -101,7 +121,7 @@ class Evaluator:
         poses = [[step.equilibrium.q for step in case] for case in solved]
         free = self.problem.free
         by_x = [by_parameters(s, c, free) for s, c in zip(systems, solved, strict=True)]
-        self._last = _Neighbour(x.copy(), poses, by_x)
+        self._last = _Neighbour(x.copy(), self.problem.scale, poses, by_x)
         numbers = range(len(systems))
         residual = np.concatenate([self._residual(n, systems[n], poses[n]) for n in numbers])
         jacobian = np.concatenate(
@@ -133,19 +153,38 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class _Neighbour:
-    """The last solved point: poses (n,) and their derivatives (n, m) by case and step."""
+    """The last solved point: poses (n,) and their derivatives (n, m) by case and step.
+
+    ``reach`` (m,) is how far first order is trusted.
+    """
 
     x: Array
+    reach: Array
     poses: list[list[Array]]
     by_x: list[list[Array]]
 
     def guesses(self, x: Array) -> list[list[Array]]:
-        """Poses to start from at another point, to first order; far away the poses themselves."""
-        change = np.clip(x - self.x, -1.0, 1.0)
+        """Poses to start from at another point, to first order."""
+        change = np.clip(x - self.x, -self.reach, self.reach)
         return [
             [q + dq @ change for q, dq in zip(case, by_x, strict=True)]
             for case, by_x in zip(self.poses, self.by_x, strict=True)
         ]
+
+
+def _within_declared(problem: Problem) -> Problem:
+    """The problem with its bounds drawn in to what the effects declare for their parameters."""
+    lower, upper = problem.lower.copy(), problem.upper.copy()
+    for index, parameter in enumerate(problem.free):
+        limits = declared(problem.model, parameter)
+        values = problem.model.effects[parameter.effect].values
+        for value in values[list(parameter.rows), parameter.column]:
+            low, high = limits.low - value, limits.high - value
+            if parameter.logarithmic:
+                low = np.log(limits.low / value) if limits.low > 0.0 else -np.inf
+                high = np.log(limits.high / value)
+            lower[index], upper[index] = max(lower[index], low), min(upper[index], high)
+    return replace(problem, lower=lower, upper=upper)
 
 
 def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:

@@ -22,7 +22,7 @@ class Uncertainty:
 
     Attributes
     ----------
-    covariance : (m, m); infinite for unknowns at a bound.
+    covariance : (m, m); infinite for unknowns at a bound or without a trace in the data.
     standard_error : (m,); infinite where the data do not constrain the unknown.
     identifiable : (m,) bool.
     degrees_of_freedom : readings less unknowns; the scatter comes from them.
@@ -62,7 +62,7 @@ def uncertainty(
         covariance = infinite.copy()
         covariance[np.ix_(inside, inside)] = inner
         error[inside] = np.where(known, np.sqrt(np.diagonal(inner)), np.inf)
-    return Uncertainty(covariance, error, error < identifiable_below, freedom)
+    return Uncertainty(covariance, error, error < identifiable_below * problem.scale, freedom)
 
 
 def _deviation(
@@ -79,14 +79,18 @@ def _deviation(
     return np.full(len(residual), np.sqrt(residual @ residual / freedom))
 
 
-def _covariance(jacobian: Array, deviation: Array) -> tuple[Array, Array]:
+def _covariance(jacobian: Array, deviation: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Covariance (m, m) of the unknowns and which of them (m,) the data determine at all."""
     if jacobian.shape[1] == 0:
         return np.zeros((0, 0)), np.zeros(0, dtype=bool)
+    m = jacobian.shape[1]
     left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    if not (len(singular) and singular[0] > 0.0):
+        return np.full((m, m), np.inf), np.zeros(m, dtype=bool)
     seen = singular > RANK_TOLERANCE * singular[0]
-    if not singular[0] > 0.0:
-        return np.zeros((len(right), len(right))), np.zeros(len(right), dtype=bool)
     gain = (right[seen].T / singular[seen]) @ left[:, seen].T * deviation
-    unseen = np.linalg.norm(right[~seen], axis=0)
-    return gain @ gain.T, unseen < UNSEEN_SHARE
+    unseen = np.linalg.norm(np.eye(m) - right[seen].T @ right[seen], axis=0)
+    known = unseen < UNSEEN_SHARE
+    covariance = gain @ gain.T
+    covariance[~known], covariance[:, ~known] = np.inf, np.inf
+    return covariance, known

@@ -16,7 +16,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.frames import Pose
+
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 class Kind(StrEnum):
@@ -124,6 +127,17 @@ class Motion(Protocol):
     def axes(self) -> Array:
         """(n, 3) axis of each rotational coordinate in ground, zero for translations."""
 
+    @property
+    def joint_origins(self) -> Array:
+        """(J, 3) origins of the joint frames in ground, neutral pose, m."""
+
+    @property
+    def centres_of_mass(self) -> Array:
+        """(J, 3) centres of mass of the vertebrae in ground, neutral pose, m."""
+
+    def displacement(self, body: int) -> Pose:
+        """Displacement of a body from the neutral pose, in ground; body -1 is ground itself."""
+
     def velocities(self, body: int, point: Array) -> Array:
         """(n, 3) velocity in ground of a body's point (neutral position, ground, m) by rate."""
 
@@ -170,13 +184,18 @@ class JointLaw(Effect, Protocol):
 
 @runtime_checkable
 class LoadEffect(Effect, Protocol):
-    """A load on the chain besides those listed in the cohort."""
+    """A load on the chain besides those listed in the cohort.
 
-    def apply(self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array) -> AppliedLoad:
+    ``joints`` are the joints in scope; the vertebra a joint carries has the same index.
+    """
+
+    def apply(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
+    ) -> AppliedLoad:
         """Load applied at this pose, given the step's listed wrenches and parameters (R, P)."""
 
     def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> Array:
         """(n, R, P) derivative of the applied load by the parameters at fixed pose."""
 
@@ -200,16 +219,18 @@ class PathLaw(Effect, Protocol):
     def n_states(self) -> int: ...
 
     def respond_on_path(
-        self, q: Array, parameters: Array, state: Array, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> JointResponse:
-        """Response with the state (J, S) as the last load step left it."""
+        """Response in a step of that duration with the state (J, S) as the last step left it."""
 
     def by_parameter_on_path(
-        self, q: Array, parameters: Array, state: Array, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> Array:
         """(J, 6, P) derivative of the load by the parameters at fixed q and state."""
 
-    def by_state(self, q: Array, parameters: Array, state: Array, carried: Array) -> Array:
+    def by_state(
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+    ) -> Array:
         """(J, 6, S) derivative of the load by the state."""
 
     def advance(self, q: Array, parameters: Array, state: Array, seconds: float) -> Advance:

@@ -11,6 +11,15 @@ from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 _DIAGONAL = np.arange(6)
 
+_MEANING = {
+    "anterior": "resistance to anterior-posterior translation",
+    "superior": "resistance to compression and traction",
+    "right": "resistance to right-left translation",
+    "extension": "resistance to flexion-extension",
+    "right_bending": "resistance to lateral bending",
+    "left_rotation": "resistance to axial rotation",
+}
+
 # Bounds span what is published for any level and direction (Gould 2024a Table 1: 3e4 to 3e6 N/m,
 # 9 to 1250 N m/rad) by three decades on each side, so that a fit and not the library decides.
 _TRANSLATION = {"unit": "N/m", "low": 1.0, "high": 1e10, "default": 1e5}
@@ -24,7 +33,7 @@ def _stiffness(coordinate: str, column: str) -> Parameter:
         **numbers,  # type: ignore[arg-type]
         prior_scale=1.0,
         logarithmic=True,
-        meaning=f"resistance to {coordinate.replace('_', ' ')}",
+        meaning=_MEANING[coordinate],
     )
 
 

@@ -1,5 +1,6 @@
 """Job: stiffness of one specimen with one sampled joint pose."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from spinepipe.jobs.inputs import (
 )
 from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics import Status, free_parameters, moved
+from spinepipe.statics import SolvedStep, Status, free_parameters, moved
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.tables import CALIBRATIONS, to_arrow, write
 from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
@@ -132,7 +133,7 @@ def _errors(found: Fit) -> dict[str, Any]:
         return nothing
     errors = np.concatenate(
         [
-            np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps]) - measured.measured
+            _predicted(measured, steps) - measured.measured
             for steps, measured in zip(found.solved, found.cases, strict=True)
         ]
     )
@@ -141,6 +142,12 @@ def _errors(found: Fit) -> dict[str, Any]:
         _error_column(name): float(np.nanmean(column)) if np.isfinite(column).any() else None
         for name, column in zip(COORDINATE_COLUMNS, size.T, strict=True)
     }
+
+
+def _predicted(measured: MeasuredCase, steps: Sequence[SolvedStep]) -> Array:
+    """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
+    q = np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps])
+    return q - q[0] if measured.zeroed else q
 
 
 def _error_column(column: str) -> str:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,7 @@ def run(
     rows = [
         {**row, "stiffness": stiffness, "joint": cohort.joint_names[row["joint"]]}
         for case, motion, steps in zip(inputs.cases, motions, ended, strict=True)
-        for row in _case_rows(case, motion, steps)
+        for row in _case_rows(case, motion, _zeroed(steps) if cohort.zeroed_at_step_0 else steps)
     ]
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
     write(to_arrow(TABLE, columns), output, provenance("simulate", settings, cohort))
@@ -121,6 +121,14 @@ def _settle(settings: JointPoseSensitivity, system: System) -> list[_Ended]:
         pose = end.q if end.status.usable else None
         ended.append(_Ended(pose, end.status, end.message, end.remaining))
     return ended
+
+
+def _zeroed(ended: list[_Ended]) -> list[_Ended]:
+    """Poses less that of step 0, as the cohort's readings are; none where step 0 has none."""
+    first = ended[0].q
+    return [
+        replace(end, q=None if first is None or end.q is None else end.q - first) for end in ended
+    ]
 
 
 def _case_rows(

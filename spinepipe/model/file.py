@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
@@ -38,6 +38,17 @@ class Values(BaseModel):
     specimen: str = Field(default="*", description="specimen, or * for all")
     joint: str = Field(default="*", description="joint, or * for all")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers(cls, data: Any) -> Any:
+        """YAML reads 1e5 as text: what looks like a number is one."""
+        if not isinstance(data, dict):
+            return data
+        return {
+            key: value if key in cls.model_fields else _as_number(value)
+            for key, value in data.items()
+        }
+
     @property
     def parameters(self) -> dict[str, Any]:
         """Parameter name to value, SI."""
@@ -63,6 +74,13 @@ class ModelFile(BaseModel):
     model: str = Field(description="name of the model")
     cohort: str = Field(description="cohort the model was made for")
     effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
+
+
+def _as_number(value: Any) -> Any:
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
 
 
 def write_model(model: ModelFile, path: str | Path) -> None:
@@ -110,8 +128,8 @@ def _check(file: str, number: int, entry: EffectEntry) -> list[Problem]:
     place = f"effects.{number}"
     try:
         effect = create(entry.effect, entry.options)
-    except ValueError as error:
-        return [Problem(file, None, place, entry.effect, str(error), "choose one of these")]
+    except (TypeError, ValueError) as error:
+        return [Problem(file, None, place, entry.effect, str(error), "correct it")]
     declared = {parameter.name: parameter for parameter in effect.parameters}
     problems = []
     for row in entry.values:
@@ -132,7 +150,17 @@ def _within(value: Any, low: float, high: float) -> bool:
 
 
 def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple[ScopedEffect, ...]:
-    """The effects of a model file that act on a specimen with these joints."""
+    """The effects of a model file that act on a specimen with these joints.
+
+    Raises
+    ------
+    InputError
+        For joints in a scope or in values that the specimen does not have, and for values per
+        joint of an effect that has one set for all.
+    """
+    problems = [p for n, entry in enumerate(model.effects) for p in _strangers(n, entry, joints)]
+    if problems:
+        raise InputError(problems)
     scoped = []
     for entry in model.effects:
         if entry.scope.specimens == ("*",) or specimen in entry.scope.specimens:
@@ -145,6 +173,25 @@ def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple
             values = _values(entry, effect, specimen, [joints[index] for index in chosen])
             scoped.append(ScopedEffect(effect, chosen, values, entry.scope.tests))
     return tuple(scoped)
+
+
+def _strangers(number: int, entry: EffectEntry, joints: Sequence[str]) -> list[Problem]:
+    """Joints that the specimen does not have or that the effect cannot tell apart."""
+    file, allowed = "model file", f"*, {', '.join(joints)}"
+    named = [("scope.joints", joint) for joint in entry.scope.joints]
+    named += [("values.joint", row.joint) for row in entry.values]
+    problems = [
+        Problem(file, None, f"effects.{number}.{place}", joint, allowed, "correct the joint")
+        for place, joint in named
+        if joint != "*" and joint not in joints
+    ]
+    if not create(entry.effect, entry.options).per_joint:
+        problems += [
+            Problem(file, None, f"effects.{number}.values.joint", row.joint, "*", "one set for all")
+            for row in entry.values
+            if row.joint != "*"
+        ]
+    return problems
 
 
 def _values(entry: EffectEntry, effect: Effect, specimen: str, joints: Sequence[str]) -> Array:

@@ -16,6 +16,10 @@ MOST_JOINTS = 20
 """Beyond 120 coordinates PyBullet's answers are silently wrong."""
 
 
+ORTHONORMAL = 1e-9
+ROUNDING = 1e-9
+
+
 class RefusedModel(ValueError):
     """A model that no solver should be given; the message says what and why."""
 
@@ -78,6 +82,12 @@ class LoadCase:
     cycle: int
     steps: tuple[LoadStep, ...]
 
+    def __post_init__(self) -> None:
+        for step in self.steps:
+            for load in step.wrenches:
+                if not np.isfinite([*load.point, *load.force, *load.moment]).all():
+                    raise RefusedModel(f"test {self.test}, step {step.step}: a load is not finite")
+
 
 @dataclass(frozen=True)
 class SpineModel:
@@ -125,10 +135,21 @@ def _problem(model: SpineModel) -> str | None:
         return f"{n} joints; 1 to {MOST_JOINTS} are allowed (PyBullet is wrong beyond)"
     if not len(model.frames) == len(model.bodies) == len(model.damping) == n:
         return "joints, frames, bodies and damping differ in number"
+    if not np.isfinite(model.gravity).all():
+        return "gravity is not finite"
+    if not (np.isfinite(model.damping).all() and np.all(model.damping > 0.0)):
+        return "damping must be positive: it decides what is stable"
+    return _frame_problem(model) or _body_problem(model) or _effect_problem(model)
+
+
+def _frame_problem(model: SpineModel) -> str | None:
     for joint, frame in zip(model.joints, model.frames, strict=True):
         if not (np.isfinite(frame.origin).all() and np.isfinite(frame.rotation).all()):
             return f"the frame of joint {joint} is not finite"
-    return _body_problem(model) or _effect_problem(model)
+        unit = frame.rotation.T @ frame.rotation
+        if np.abs(unit - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(frame.rotation) < 0.0:
+            return f"the frame of joint {joint} is not a right-handed rotation"
+    return None
 
 
 def _body_problem(model: SpineModel) -> str | None:
@@ -136,6 +157,15 @@ def _body_problem(model: SpineModel) -> str | None:
         numbers = np.concatenate([[body.mass], body.com, body.inertia.ravel()])
         if not np.isfinite(numbers).all() or body.mass < 0.0:
             return f"body {body.name}: mass, centre and inertia must be finite, mass not negative"
+        moments = np.linalg.eigvalsh(body.inertia)
+        slack = ROUNDING * abs(moments[2])
+        if np.abs(body.inertia - body.inertia.T).max() > slack:
+            return f"body {body.name}: its inertia is not symmetric"
+        if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
+            return (
+                f"body {body.name}: no body has this inertia; principal moments are not negative, "
+                "and none is larger than the sum of the others"
+            )
         if body.mass == 0.0 and np.any(model.gravity):
             return f"body {body.name} has no mass, but gravity is on"
     return None
@@ -143,6 +173,8 @@ def _body_problem(model: SpineModel) -> str | None:
 
 def _effect_problem(model: SpineModel) -> str | None:
     for scoped in model.effects:
+        if not set(scoped.joints) <= set(range(len(model.joints))):
+            return f"effect {scoped.effect.name}: joints {scoped.joints} are not all in the model"
         rows = len(scoped.joints) if scoped.effect.per_joint else 1
         declared = scoped.effect.parameters
         if scoped.values.shape != (rows, len(declared)):

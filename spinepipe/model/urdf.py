@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from itertools import pairwise
-from math import atan2, hypot
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from spinepipe.units import COORDINATES
 
 AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 1", "1 0 0", "0 1 0")
 """Axis of each coordinate: translations x, y, z, then the rotations z, x', y''."""
+
+INSIDE_LIMIT = 1e-12
+"""A flat body's largest moment is the sum of the others; PyBullet drops it if rounding adds to it."""
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 
@@ -55,15 +58,19 @@ _MASSLESS = [
 
 
 def _inertial(body: Body, frame: Pose) -> list[str]:
-    """Mass and inertia in the axes of the joint frame that carries the body."""
-    inertia = (frame.rotation.T @ body.inertia @ frame.rotation).tolist()
-    com = Pose(np.eye(3), frame.inverse().apply(body.com))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
+    """Mass and principal inertia, placed in the joint frame that carries the body.
+
+    PyBullet's own search for principal axes stops at 1e-8, so they are found here.
+    """
+    moments, axes = np.linalg.eigh(frame.rotation.T @ body.inertia @ frame.rotation)
+    axes[:, 0] *= np.linalg.det(axes)
+    xx, yy = moments[:2].tolist()
+    zz = min(float(moments[2]), (xx + yy) * (1.0 - INSIDE_LIMIT))
     return [
         "<inertial>",
-        _origin(com),
+        _origin(Pose(axes, frame.inverse().apply(body.com))),
         f'<mass value="{float(body.mass)!r}"/>',
-        f'<inertia ixx="{xx!r}" iyy="{yy!r}" izz="{zz!r}" ixy="{xy!r}" ixz="{xz!r}" iyz="{yz!r}"/>',
+        f'<inertia ixx="{xx!r}" iyy="{yy!r}" izz="{zz!r}" ixy="0" ixz="0" iyz="0"/>',
         "</inertial>",
     ]
 
@@ -78,8 +85,10 @@ def _origin(pose: Pose) -> str:
 
 def _roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
     """URDF's angles in rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``."""
-    (xx, _, _), (yx, _, _), (zx, zy, zz) = rotation.tolist()
-    return atan2(zy, zz), atan2(-zx, hypot(zy, zz)), atan2(yx, xx)
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = rotation.tolist()
+    yaw = atan2(yx, xx)
+    roll = atan2(sin(yaw) * xz - cos(yaw) * yz, cos(yaw) * yy - sin(yaw) * xy)
+    return roll, atan2(-zx, hypot(xx, yx)), yaw
 
 
 def _numbers(values: Iterable[float]) -> str:

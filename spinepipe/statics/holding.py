@@ -4,27 +4,42 @@ Laws act in the model's order; a law may depend on the load of those before it (
 derivatives of earlier laws pass through later ones.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from spinepipe.effects import JointLaw, JointResponse, PathLaw
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.placement import Placed
 
-States = dict[int, Array]
-"""Internal state (J, S) of each path law, by its place in the model's effects."""
+
+@dataclass(frozen=True)
+class States:
+    """Internal states of the path laws during one load step.
+
+    Attributes
+    ----------
+    of : (J, S) state of each path law as the last step left it, by its place in the effects.
+    seconds : duration of the step; zero where the test records no time.
+    """
+
+    of: Mapping[int, Array]
+    seconds: float = 0.0
+
+
+NO_STATES = States({})
 
 
 @dataclass(frozen=True)
 class ActiveLaw:
     """A joint law at work: its place in the model's effects, its joints and values."""
 
-    index: int
     effect: JointLaw
-    joints: Array
+    index: int
+    joints: Indices
     values: Array
+    per_joint: bool
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
@@ -39,22 +54,27 @@ class ActiveLaw:
 class ActivePath:
     """A path law at work; it responds with the state that the last load step left."""
 
-    index: int
     effect: PathLaw
-    joints: Array
+    index: int
+    joints: Indices
     values: Array
+    per_joint: bool
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
-        return self.effect.respond_on_path(q, self.values, states[self.index], carried)
+        return self.effect.respond_on_path(
+            q, self.values, states.of[self.index], states.seconds, carried
+        )
 
     def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, P) derivative by the parameters of each joint in scope."""
-        return self.effect.by_parameter_on_path(q, self.values, states[self.index], carried)
+        return self.effect.by_parameter_on_path(
+            q, self.values, states.of[self.index], states.seconds, carried
+        )
 
     def by_state(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, S) derivative by the state of each joint in scope."""
-        return self.effect.by_state(q, self.values, states[self.index], carried)
+        return self.effect.by_state(q, self.values, states.of[self.index], states.seconds, carried)
 
 
 Law = ActiveLaw | ActivePath
@@ -110,7 +130,8 @@ def differentiate(placed: Placed, laws: Sequence[Law], states: States) -> Holdin
         if response.by_carried is not None:
             _pass_on(by_parameter, by_state, j, response.by_carried)
             tangent[j] += response.by_carried @ tangent[j]
-        by_parameter[law.index] = _spread(law, law.by_parameter(here, carried, states), len(load))
+        own = _spread(law, law.by_parameter(here, carried, states), len(load))
+        by_parameter[law.index] = own if law.per_joint else own.sum(axis=2, keepdims=True)
         if isinstance(law, ActivePath):
             own = law.by_state(here, carried, states)
             by_state[law.index] = _spread(law, own, len(load))
@@ -127,7 +148,7 @@ def differentiate(placed: Placed, laws: Sequence[Law], states: States) -> Holdin
 
 
 def _pass_on(
-    by_parameter: dict[int, Array], by_state: dict[int, Array], joints: Array, by_carried: Array
+    by_parameter: dict[int, Array], by_state: dict[int, Array], joints: Indices, by_carried: Array
 ) -> None:
     """Earlier laws' derivatives also act through a later law that reads the carried load."""
     for derivatives in (by_parameter, by_state):

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from spinepipe.effects.contract import AppliedLoad, Array
+from spinepipe.frames import Pose, transform_of
 from spinepipe.world import Chain
 
 
@@ -39,6 +40,27 @@ class ChainMotion:
     def mass_velocity(self) -> Array:
         """(n, 3) kg: generalised weight per unit of gravity along each axis."""
         return self.chain.mass_velocity(self.q)
+
+    @property
+    def joint_origins(self) -> Array:
+        """(J, 3) origins of the joint frames in ground, neutral pose, m."""
+        return np.array([frame.origin for frame in self.chain.model.frames])
+
+    @property
+    def centres_of_mass(self) -> Array:
+        """(J, 3) centres of mass of the vertebrae in ground, neutral pose, m."""
+        return np.array([body.com for body in self.chain.model.bodies])
+
+    def displacement(self, body: int) -> Pose:
+        """Displacement of a body from the neutral pose, in ground; body -1 is ground itself."""
+        return self._displacements[body + 1]
+
+    @cached_property
+    def _displacements(self) -> list[Pose]:
+        placed = [Pose(np.eye(3), np.zeros(3))]
+        for frame, q in zip(self.chain.model.frames, self.q.reshape(-1, 6), strict=True):
+            placed.append(placed[-1] @ frame @ transform_of(q) @ frame.inverse())
+        return placed
 
     def velocities(self, body: int, point: Array) -> Array:
         """(n, 3) velocity of the body's point (neutral position in ground, m)."""

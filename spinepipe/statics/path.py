@@ -47,9 +47,11 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
     """
     solved: list[SolvedStep] = []
     q, before, states = np.zeros(system.chain.n), system.slots.unloaded(), system.initial_states()
-    seconds = 0.0
+    clock = 0.0
     for number, step in enumerate(system.case.steps):
         loading = system.slots.loading(step.wrenches)
+        time = clock if step.time is None else step.time
+        states, clock = replace(states, seconds=time - clock), time
         if solved and not solved[-1].usable:
             equilibrium = replace(solved[-1].equilibrium, message="an earlier load step failed")
             solved.append(SolvedStep(step, loading, equilibrium, states, {}))
@@ -58,14 +60,14 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
         equilibrium = solve(system, start, before, loading, states)
         if equilibrium.status is not Status.CONVERGED and guesses is not None:
             equilibrium = solve(system, q, before, loading, states)
-        advances = _advance(system, equilibrium.q, states, (step.time or 0.0) - seconds)
+        advances = _advance(system, equilibrium.q, states)
         solved.append(SolvedStep(step, loading, equilibrium, states, advances))
-        q, before, seconds = equilibrium.q, loading, step.time or 0.0
-        states = {index: advance.state for index, advance in advances.items()}
+        q, before = equilibrium.q, loading
+        states = States({index: advance.state for index, advance in advances.items()})
     return solved
 
 
-def _advance(system: System, q: Array, states: States, seconds: float) -> dict[int, Advance]:
+def _advance(system: System, q: Array, states: States) -> dict[int, Advance]:
     """States after a step that ended at q (n,)."""
     if not system.paths:
         return {}
@@ -73,6 +75,8 @@ def _advance(system: System, q: Array, states: States, seconds: float) -> dict[i
     if system.geometry:
         joints = system.placed(q, with_parameters=False).q
     return {
-        law.index: law.effect.advance(joints[law.joints], law.values, states[law.index], seconds)
+        law.index: law.effect.advance(
+            joints[law.joints], law.values, states.of[law.index], states.seconds
+        )
         for law in system.paths
     }

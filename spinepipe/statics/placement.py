@@ -6,17 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects import GeometryEffect, Placement
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 
 
 @dataclass(frozen=True)
 class ActiveGeometry:
     """A geometry effect at work: its place in the model's effects, its joints and values."""
 
-    index: int
     effect: GeometryEffect
-    joints: Array
+    index: int
+    joints: Indices
     values: Array
+    per_joint: bool
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def _then(before: Placed, active: ActiveGeometry, with_parameters: bool) -> Plac
 
 
 def _push(
-    before: Placed, j: Array, step: Placement, pair: tuple[Array, Array]
+    before: Placed, j: Indices, step: Placement, pair: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Earlier effects' parameter derivatives carried through a later placement."""
     dq, dfirst = pair[0].copy(), pair[1].copy()
@@ -75,13 +76,14 @@ def _push(
 
 
 def _own(before: Placed, active: ActiveGeometry) -> tuple[Array, Array]:
-    """Derivatives by the effect's own parameters, one row of parameters per joint in scope."""
+    """Derivatives by the effect's own parameters: a row per joint in scope, or one for all."""
     n, (rows, columns) = len(before.q), active.values.shape
     own = active.effect.by_parameter(before.q[active.joints], active.values)
     dq, dfirst = np.zeros((n, 6, rows, columns)), np.zeros((n, 6, 6, rows, columns))
-    for row, joint in enumerate(active.joints):
-        dq[joint, :, row] = own.q[row]
+    for number, joint in enumerate(active.joints):
+        row = number if active.per_joint else 0
+        dq[joint, :, row] = own.q[number]
         dfirst[joint, :, :, row] = np.einsum(
-            "kap,ac->kcp", own.by_coordinate[row], before.by_coordinate[joint]
+            "kap,ac->kcp", own.by_coordinate[number], before.by_coordinate[joint]
         )
     return dq, dfirst

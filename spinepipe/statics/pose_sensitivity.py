@@ -6,10 +6,12 @@ the vertebra below joint j, in front of its six coordinates, and minus the twist
 vertebra above, behind them.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose, transform_of
+from spinepipe.frames import Pose
 from spinepipe.statics.motion import ChainMotion
 from spinepipe.statics.path import SolvedStep
 from spinepipe.statics.system import System
@@ -27,29 +29,30 @@ def by_joint_pose(system: System, step: SolvedStep) -> Array:
     Raises
     ------
     ValueError
-        When the step has no equilibrium.
+        When the step has no equilibrium, or the model has effects whose own dependence on the
+        joint poses is not known here: load effects and path effects.
     """
     factored = step.equilibrium.factored
     if factored is None:
         raise ValueError(f"step {step.step.step} has no equilibrium to differentiate")
+    if system.load_effects or system.paths:
+        raise ValueError("joint-pose sensitivities do not cover load effects and path effects")
     motion = ChainMotion(system.chain, step.equilibrium.q)
-    points, forces, moments, bodies = _point_loads(system, step)
-    velocities = [motion.velocities(b, p) for b, p in zip(bodies, points, strict=True)]
-    placed = _displacements(system, step.equilibrium.q)
-    now = [placed[b + 1].apply(p) for b, p in zip(bodies, points, strict=True)]
+    loads = _point_loads(system, step, motion)
     n, n_joints = system.chain.n, system.model.n_joints
-    right = np.zeros((n, n_joints, 6))
+    change = np.zeros((n, n_joints, 6))
     for joint, frame in enumerate(system.model.frames):
+        beyond = [load for load in loads if load.body >= joint]
         for component, (turn, shift) in enumerate(_twists(frame)):
-            for below, sign in ((placed[joint], 1.0), (placed[joint + 1], -1.0)):
-                first = 6 * joint if sign > 0 else 6 * joint + 6
-                omega = below.rotation @ turn
-                base = below.rotation @ shift - np.cross(omega, below.origin)
-                right[:, joint, component] += sign * _generalised_load_change(
-                    motion.axes, velocities, now, forces, moments, bodies, joint, first, omega, base
-                )
+            for carrier, sign in ((joint - 1, 1.0), (joint, -1.0)):
+                carried = motion.displacement(carrier)
+                omega = carried.rotation @ turn
+                base = carried.rotation @ shift - np.cross(omega, carried.origin)
+                for load in beyond:
+                    moved = _load_change(motion.axes, load, 6 * (carrier + 1), omega, base)
+                    change[:, joint, component] += sign * moved
     # The residual is holding less applied load, so dr/dxi = -change and dq/dxi = K^-1 change.
-    return factored.solve(right.reshape(n, -1)).reshape(n, n_joints, 6)
+    return factored.solve(change.reshape(n, -1)).reshape(n, n_joints, 6)
 
 
 def _twists(frame: Pose) -> list[tuple[Array, Array]]:
@@ -60,52 +63,51 @@ def _twists(frame: Pose) -> list[tuple[Array, Array]]:
     return shifts + turns
 
 
-def _point_loads(system: System, step: SolvedStep):  # type: ignore[no-untyped-def]
-    """All ground-fixed point loads: listed wrenches and the vertebrae's weights."""
-    points = [np.array(place) for _, place in system.slots.places]
-    bodies = [body for body, _ in system.slots.places]
-    forces, moments = list(step.loading.forces), list(step.loading.moments)
-    if np.any(system.model.gravity):
-        for index, body in enumerate(system.model.bodies):
-            bodies.append(index)
-            points.append(body.com)
-            forces.append(step.loading.share * body.mass * system.model.gravity)
-            moments.append(np.zeros(3))
-    return points, forces, moments, bodies
+@dataclass(frozen=True)
+class _PointLoad:
+    """A ground-fixed wrench: where it is now (3,), and its point's velocities (n, 3) by rate."""
+
+    body: int
+    force: Array
+    moment: Array
+    place: Array
+    velocities: Array
 
 
-def _displacements(system: System, q: Array) -> list[Pose]:
-    """Displacement of the ground and of each vertebra from the neutral pose, in ground."""
-    placed = [Pose(np.eye(3), np.zeros(3))]
-    for frame, coordinates in zip(system.model.frames, q.reshape(-1, 6), strict=True):
-        placed.append(placed[-1] @ frame @ transform_of(coordinates) @ frame.inverse())
-    return placed
+def _point_loads(system: System, step: SolvedStep, motion: ChainMotion) -> list[_PointLoad]:
+    """The listed wrenches and the vertebrae's weights."""
+    listed = [
+        (body, np.array(point), force, moment)
+        for (body, point), force, moment in zip(
+            system.slots.places, step.loading.forces, step.loading.moments, strict=True
+        )
+    ]
+    weights = [
+        (index, body.com, step.loading.share * body.mass * system.model.gravity, np.zeros(3))
+        for index, body in enumerate(system.model.bodies)
+        if np.any(system.model.gravity)
+    ]
+    return [
+        _PointLoad(
+            body,
+            force,
+            moment,
+            motion.displacement(body).apply(point),
+            motion.velocities(body, point),
+        )
+        for body, point, force, moment in listed + weights
+    ]
 
 
-def _generalised_load_change(
-    axes: Array,
-    velocities: list[Array],
-    now: list[Array],
-    forces: list[Array],
-    moments: list[Array],
-    bodies: list[int],
-    joint: int,
-    first: int,
-    omega: Array,
-    base: Array,
-) -> Array:
-    """(n,) change of the applied generalised load when all from coordinate ``first`` up moves.
+def _load_change(axes: Array, load: _PointLoad, first: int, omega: Array, base: Array) -> Array:
+    """(n,) change of a wrench's generalised load when all from coordinate ``first`` up moves.
 
     ``omega`` and ``base`` are the angular velocity and the velocity at the ground origin.
     """
     change = np.zeros(len(axes))
-    for velocity, point, force, moment, body in zip(
-        velocities, now, forces, moments, bodies, strict=True
-    ):
-        if body < joint:
-            continue
-        carried = axes[first : 6 * (body + 1)]
-        change[:first] += axes[:first] @ np.cross(base + np.cross(omega, point), force)
-        above = velocity[first : 6 * (body + 1)] @ np.cross(force, omega)
-        change[first : 6 * (body + 1)] += above + carried @ np.cross(moment, omega)
+    velocity = base + np.cross(omega, load.place)
+    change[:first] = axes[:first] @ np.cross(velocity, load.force)
+    carried = slice(first, 6 * (load.body + 1))
+    change[carried] = load.velocities[carried] @ np.cross(load.force, omega)
+    change[carried] += axes[carried] @ np.cross(load.moment, omega)
     return change

@@ -23,7 +23,8 @@ def by_parameters(
     ValueError
         When a step has no equilibrium.
     """
-    state_by_x = {i: np.zeros((*s.shape, len(free))) for i, s in system.initial_states().items()}
+    starts = system.initial_states().of
+    state_by_x = {index: np.zeros((*s.shape, len(free))) for index, s in starts.items()}
     result = []
     for step in solved:
         if step.equilibrium.factored is None:
@@ -83,7 +84,7 @@ def _advance(
             ) + np.einsum("jst,jtm->jsm", advance.by_state, state_by_x[law.index])
             for column, parameter in enumerate(free):
                 if parameter.effect == law.index:
-                    rows = list(parameter.rows)
+                    rows = _joints_moved(parameter, law.per_joint)
                     own = advance.by_parameter[rows, :, parameter.column]
                     following[law.index][rows, :, column] += (
                         own * parameter.derivative(law.values)[:, None]
@@ -125,9 +126,14 @@ def observed_by_parameters(
         by_x[active.joints] = seen.by_coordinate @ by_x[active.joints]
         for column, parameter in enumerate(free):
             if parameter.effect == active.index:
-                rows = list(parameter.rows)
+                rows = _joints_moved(parameter, active.per_joint)
                 weights = parameter.derivative(active.values)
                 moved = own[rows, :, parameter.column] * weights[:, None]
                 by_x[active.joints[rows], :, column] += moved
         joints[active.joints] = seen.q
     return by_x
+
+
+def _joints_moved(parameter: FreeParameter, per_joint: bool) -> list[int] | slice:
+    """Joints in scope that an unknown moves: its rows, or all where one row is shared."""
+    return list(parameter.rows) if per_joint else slice(None)

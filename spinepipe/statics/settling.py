@@ -14,6 +14,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics.equilibrium import solve
+from spinepipe.statics.holding import NO_STATES
 from spinepipe.statics.loading import Loading
 from spinepipe.statics.rosenbrock import (
     ALPHA,
@@ -76,7 +77,8 @@ class Settled:
 
     Attributes
     ----------
-    q, rate : (n,) pose and rate at the end. history : (len(times), n) poses at asked times.
+    q, rate : (n,) pose and rate at the end.
+    history : (len(times), n) poses at asked times, NaN where the run did not get there.
     remaining : (n,) equilibrium pose less end pose, or None when there is no equilibrium.
     """
 
@@ -99,12 +101,12 @@ def settle(
     refusal = _refusal(system)
     if refusal:
         nothing = np.zeros(system.chain.n)
-        history = np.zeros((len(times), system.chain.n))
+        history = np.full((len(times), system.chain.n), np.nan)
         return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, 0)
     run = _Run(system, program)
-    history = run.to(duration, sorted(times))
+    history = run.to(duration, times)
     final = program.at(duration)
-    equilibrium = solve(system, run.q, system.slots.unloaded(), final, {})
+    equilibrium = solve(system, run.q, system.slots.unloaded(), final, NO_STATES)
     reachable = equilibrium.status is Status.CONVERGED
     remaining = equilibrium.q - run.q if reachable else None
     status, message = run.status, run.message
@@ -114,7 +116,7 @@ def settle(
 
 
 def _refusal(system: System) -> str | None:
-    if system.initial_states():
+    if system.paths:
         return "path effects advance by load step, not in time: use equilibrium loading"
     _, singular = dpotrf(system.chain.mass_matrix(np.zeros(system.chain.n)), lower=True)
     if singular:
@@ -143,12 +145,14 @@ class _Run:
             for index, time in enumerate(times):
                 if before[0] <= time <= self.time:
                     history[index] = _between(before, (self.time, self.q, self.rate), time)
-        return np.nan_to_num(history)
+        return history
 
     def _advance(self, limit: float) -> bool:
         """One accepted step, not beyond the limit."""
         while True:
             self.steps += 1
+            if self.steps > MOST_STEPS or self.size < SMALLEST_STEP_S:
+                return self._stop(Status.NOT_CONVERGED, "the step size went to zero")
             size = min(self.size, limit - self.time)
             q, rate, error = self._try(size)
             accepted = bool(np.isfinite(error)) and error <= 1.0
@@ -158,8 +162,6 @@ class _Run:
             self.size = size * float(np.clip(growth, 0.2, 6.0))
             if accepted:
                 return self._within_motion()
-            if self.steps > MOST_STEPS or self.size < SMALLEST_STEP_S:
-                return self._stop(Status.NOT_CONVERGED, "the step size went to zero")
 
     def _within_motion(self) -> bool:
         if np.abs(self.q.reshape(-1, 6)[:, 3:]).max() < LARGEST_ROTATION:
@@ -172,7 +174,7 @@ class _Run:
 
     def _try(self, size: float) -> tuple[Array, Array, float]:
         """Pose, rate and scaled error after a step of that size."""
-        balance = self.system.balance(self.q, self.program.at(self.time), {})
+        balance = self.system.balance(self.q, self.program.at(self.time), NO_STATES)
         mass = self.system.chain.mass_matrix(self.q)
         implicit = size * GAMMA
         lu, pivots, _ = dgetrf(
@@ -207,7 +209,7 @@ class _Run:
 
     def _later_force(self, q: Array, rate: Array, time: float, mass: Array) -> Array:
         """The force of a later stage, for the mass matrix at the step's start: M0 M^-1 F."""
-        force = self._force(q, rate, self.system.residual(q, self.program.at(time), {}))
+        force = self._force(q, rate, self.system.residual(q, self.program.at(time), NO_STATES))
         lower, _ = dpotrf(self.system.chain.mass_matrix(q), lower=True)
         acceleration, _ = dpotrs(lower, force, lower=True)
         return mass @ acceleration
@@ -217,7 +219,7 @@ class _Run:
         corner = self.program.corner_after(self.time)
         if corner == np.inf:
             return np.zeros_like(self.q)
-        end = self.system.residual(self.q, self.program.at(corner), {})
+        end = self.system.residual(self.q, self.program.at(corner), NO_STATES)
         ramp: Array = (residual - end) / (corner - self.time)
         return ramp
 

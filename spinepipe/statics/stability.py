@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.world import Chain
 
 ROUNDING = 1e-9
-"""Growth slower than this share of the fastest rate is rounding error of the eigenvalues."""
+"""Growth slower than this share of the stiffness (damping is one) is rounding error."""
 
 
 @dataclass(frozen=True)
@@ -74,5 +74,4 @@ def _decays(mass: Array, stiffness: Array) -> bool:
     b = np.block([[identity, nothing], [nothing, mass]])
     rates = eigvals(a, b)
     rates = rates[np.isfinite(rates)]
-    growth, fastest = float(rates.real.max()), float(np.abs(rates).max())
-    return growth < ROUNDING * fastest
+    return float(rates.real.max()) < ROUNDING * float(np.linalg.norm(stiffness))

@@ -5,11 +5,9 @@ from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.effects import (
     AppliedLoad,
-    Effect,
     GeometryEffect,
     JointLaw,
     Kind,
@@ -17,8 +15,8 @@ from spinepipe.effects import (
     MeasurementEffect,
     PathLaw,
 )
-from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, SpineModel
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics.holding import (
     ActiveLaw,
     ActivePath,
@@ -45,21 +43,24 @@ class Balance:
 
 @dataclass(frozen=True)
 class ActiveLoad:
-    """A load effect at work: its place in the model's effects and its values."""
+    """A load effect at work: its place in the model's effects, its joints and values."""
 
-    index: int
     effect: LoadEffect
+    index: int
+    joints: Indices
     values: Array
+    per_joint: bool
 
 
 @dataclass(frozen=True)
 class ActiveMeasurement:
     """A measurement effect at work: its place in the model's effects, its joints and values."""
 
-    index: int
     effect: MeasurementEffect
-    joints: Array
+    index: int
+    joints: Indices
     values: Array
+    per_joint: bool
 
 
 class System:
@@ -75,27 +76,30 @@ class System:
         self.measurement: list[ActiveMeasurement] = []
         for index, scoped in enumerate(model.effects):
             if scoped.in_scope(case.test):
-                self._activate(index, scoped.effect, np.array(scoped.joints), scoped.values)
+                self._activate(index, scoped)
         self._blocks = _block_indices(model.n_joints)
         self._heavy = bool(np.any(model.gravity))
         ones = np.ones((chain.n, chain.n))
         self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
         self._diagonal = np.diag_indices(chain.n)
 
-    def _activate(self, index: int, effect: Effect, joints: Array, values: Array) -> None:
+    def _activate(self, index: int, scoped: ScopedEffect) -> None:
+        effect, joints, values = scoped.effect, np.array(scoped.joints), scoped.values
+        shared = (index, joints, values, effect.per_joint)
         match effect.kind:
             case Kind.JOINT_LAW:
-                self.laws.append(ActiveLaw(index, cast(JointLaw, effect), joints, values))
+                self.laws.append(ActiveLaw(cast(JointLaw, effect), *shared))
             case Kind.PATH:
-                self.laws.append(ActivePath(index, cast(PathLaw, effect), joints, values))
+                self.laws.append(ActivePath(cast(PathLaw, effect), *shared))
             case Kind.GEOMETRY:
-                geometry = cast(GeometryEffect, effect)
-                self.geometry.append(ActiveGeometry(index, geometry, joints, values))
+                self.geometry.append(ActiveGeometry(cast(GeometryEffect, effect), *shared))
             case Kind.LOAD:
-                self.load_effects.append(ActiveLoad(index, cast(LoadEffect, effect), values))
+                self.load_effects.append(ActiveLoad(cast(LoadEffect, effect), *shared))
             case Kind.MEASUREMENT:
                 measurement = cast(MeasurementEffect, effect)
-                self.measurement.append(ActiveMeasurement(index, measurement, joints, values))
+                self.measurement.append(ActiveMeasurement(measurement, *shared))
+            case _:
+                raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
 
     def with_model(self, model: SpineModel) -> "System":
         """The same chain, case and effects with the parameter values of another model."""
@@ -114,7 +118,9 @@ class System:
 
     def initial_states(self) -> States:
         """States (J, S) of all path laws before the first step: zero."""
-        return {law.index: np.zeros((len(law.joints), law.effect.n_states)) for law in self.paths}
+        return States(
+            {law.index: np.zeros((len(law.joints), law.effect.n_states)) for law in self.paths}
+        )
 
     def balance(self, q: Array, loading: Loading, states: States) -> Balance:
         """Residual and tangent at q (n,)."""
@@ -194,7 +200,9 @@ class System:
         return load, tangent
 
     def _effect(self, active: ActiveLoad, motion: ChainMotion, loading: Loading) -> AppliedLoad:
-        return active.effect.apply(motion, self.slots.wrenches(loading), active.values)
+        return active.effect.apply(
+            motion, self.slots.wrenches(loading), active.joints, active.values
+        )
 
     def derivatives(self, q: Array, states: States) -> HoldingDerivatives:
         """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""
@@ -204,7 +212,9 @@ class System:
         """(n, R, P) derivative of the residual by a load effect's parameters."""
         motion = ChainMotion(self.chain, q)
         wrenches = self.slots.wrenches(loading)
-        by_parameter: Array = active.effect.by_parameter(motion, wrenches, active.values)
+        by_parameter: Array = active.effect.by_parameter(
+            motion, wrenches, active.joints, active.values
+        )
         return -loading.share * by_parameter
 
 
@@ -218,7 +228,7 @@ def _renewed(active: Active, model: SpineModel) -> Active:
     return replace(active, values=model.effects[active.index].values)
 
 
-def _block_indices(n_joints: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _block_indices(n_joints: int) -> tuple[Indices, Indices]:
     """Index arrays (J, 6, 6) of the diagonal blocks of an (n, n) matrix."""
     at = np.arange(6 * n_joints).reshape(-1, 6)
     rows = np.repeat(at[:, :, None], 6, axis=2)

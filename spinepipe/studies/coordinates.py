@@ -48,10 +48,10 @@ class Damping(BaseModel):
     model_config = FORM
 
     translation_n_s_per_m: float = Field(
-        default=1000.0, ge=0, le=1e7, description="damping of the three translations, N s/m"
+        default=1000.0, gt=0, le=1e7, description="damping of the three translations, N s/m"
     )
     rotation_nm_s_per_rad: float = Field(
-        default=1.4, ge=0, le=1e5, description="damping of the three rotations, N m s/rad"
+        default=1.4, gt=0, le=1e5, description="damping of the three rotations, N m s/rad"
     )
 
     def in_order(self) -> tuple[float, ...]:
@@ -64,12 +64,8 @@ class Weights(BaseModel):
 
     model_config = FORM
 
-    anterior: _Weight = Field(
-        default=10.0, description="weight of anterior motion, per mm2"
-    )
-    superior: _Weight = Field(
-        default=100.0, description="weight of superior motion, per mm2"
-    )
+    anterior: _Weight = Field(default=10.0, description="weight of anterior motion, per mm2")
+    superior: _Weight = Field(default=100.0, description="weight of superior motion, per mm2")
     right: _Weight = Field(default=1.0, description="weight of lateral motion, per mm2")
     extension: _Weight = Field(default=1.0, description="weight of extension, per deg2")
     right_bending: _Weight = Field(default=0.0, description="weight of right bending, per deg2")

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from spinepipe.tables.schema import Column, Table
+from spinepipe.tables.schema import TYPES, Column, Table
 
 
 class BadTable(ValueError):
@@ -30,16 +30,26 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
     if set(columns) != set(names):
         raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(names))}")
     arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
-    return pa.Table.from_arrays(arrays, schema=table.schema)
+    rows = pa.Table.from_arrays(arrays, schema=table.schema)
+    _check_keys(table, rows)
+    return rows
+
+
+def _check_keys(table: Table, rows: pa.Table) -> None:
+    repeated = rows.num_rows - rows.group_by(list(table.key)).aggregate([]).num_rows
+    if repeated:
+        raise BadTable(f"{table.name}: {repeated} rows repeat the key of another")
 
 
 def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
-    field = pa.field(column.name, pa.float64()).type if column.kind == "number" else None
-    if column.kind == "number":
-        array = pa.array(np.asarray(values, dtype=float), type=field, from_pandas=True)
-    else:
-        kinds = {"text": pa.string(), "integer": pa.int32(), "flag": pa.bool_()}
-        array = pa.array(list(values), type=kinds[column.kind])
+    kind = TYPES[column.kind]
+    try:
+        if column.kind == "number":
+            array = pa.array(np.asarray(values, dtype=float), type=kind, from_pandas=True)
+        else:
+            array = pa.array(list(values), type=kind)
+    except (pa.ArrowException, TypeError, ValueError) as error:
+        raise BadTable(f"{table}.{column.name}: {error}") from None
     problem = _problem(column, array)
     if problem:
         raise BadTable(f"{table}.{column.name}: {problem}")
@@ -88,9 +98,7 @@ def join(table: Table, parts: Sequence[pa.Table], path: str | Path) -> None:
         common = {key: value for key, value in common.items() if other.get(key) == value}
     rows = pa.concat_tables([part.replace_schema_metadata(None) for part in parts])
     rows = rows.select([column.name for column in table.columns]).cast(table.schema)
-    keys = rows.group_by(list(table.key)).aggregate([]).num_rows
-    if keys != rows.num_rows:
-        raise BadTable(f"{table.name}: {rows.num_rows - keys} rows repeat the key of another")
+    _check_keys(table, rows)
     write(rows, path, {key.decode(): value.decode() for key, value in common.items()})
 
 

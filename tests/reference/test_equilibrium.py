@@ -199,7 +199,7 @@ def test_loads_without_moments_are_the_slope_of_an_energy(seed: int) -> None:
     q = random_pose(rng, chain.n_joints)
     prepared = bridge.system(chain)
     loading = prepared.slots.loading(prepared.case.steps[0].wrenches)
-    found = prepared.balance(q, loading, {})
+    found = prepared.balance(q, loading, prepared.initial_states())
     # a central difference of an energy of order 10 J over 1e-6
     slope = newton.tangent(energy, q)[0]
     np.testing.assert_allclose(found.residual, slope, rtol=1e-8, atol=1e-7)
@@ -216,7 +216,7 @@ def test_the_tangent_is_the_slope_of_the_peers_residual(seed: int) -> None:
     q = random_pose(rng, chain.n_joints)
     prepared, built = bridge.system(chain), peer.build(chain)
     loading = prepared.slots.loading(prepared.case.steps[0].wrenches)
-    found = prepared.balance(q, loading, {})
+    found = prepared.balance(q, loading, prepared.initial_states())
     expected = built.residual(q)
     # loads reach 1e4 N; a central difference over 1e-6 magnifies their rounding to 1e-5
     np.testing.assert_allclose(found.residual, expected, rtol=0, atol=1e-10)
@@ -238,6 +238,23 @@ def test_a_vertebra_without_mass_is_refused_under_gravity_only() -> None:
     massless = replace(chain, gravity=WEIGHTLESS, masses=np.zeros(3), inertias=np.zeros((3, 3, 3)))
     pose = bridge.pose(massless.with_loads(moment))
     np.testing.assert_allclose(pose[:, 3], -7.5 / 51.0, rtol=0, atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda chain: {"damping": 0.0 * chain.damping}, "damping"),
+        (lambda chain: {"gravity": np.array([0.0, np.nan, 0.0])}, "gravity"),
+        (lambda chain: {"rotations": -chain.rotations}, "frame of joint J0"),
+        (lambda chain: {"rotations": 1.01 * chain.rotations}, "frame of joint J0"),
+        (lambda chain: {"inertias": -chain.inertias}, "body V0"),
+    ],
+    ids=["no damping", "gravity not a number", "left-handed", "stretched", "negative inertia"],
+)
+def test_models_that_no_body_can_be_are_refused(change, message: str) -> None:
+    chain = chains.l1_l4_chain()
+    with pytest.raises(RefusedModel, match=message):
+        bridge.spine_model(replace(chain, **change(chain)))
 
 
 def test_numbers_that_are_not_finite_are_refused() -> None:

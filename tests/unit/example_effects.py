@@ -20,7 +20,7 @@ from spinepipe.effects import (
     Wrench,
     create,
 )
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.units import COORDINATES
@@ -112,12 +112,14 @@ class ExtraWeight:
         number("weight", "N", 0.0, 500.0, 20.0, logarithmic=True),
     )
 
-    def apply(self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array) -> AppliedLoad:
+    def apply(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
+    ) -> AppliedLoad:
         acting = [self._at(motion, body, weight) for body, weight in enumerate(parameters[:, 0])]
         return AppliedLoad(sum(a.load for a in acting), sum(a.tangent for a in acting))
 
     def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> Array:
         unit = [self._at(motion, body, 1.0).load for body in range(len(parameters))]
         return np.stack(unit, axis=1)[:, :, None]
@@ -138,7 +140,9 @@ class FollowerLoad:
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = (number("compression", "N", 0.0, 1e3, 60.0),)
 
-    def apply(self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array) -> AppliedLoad:
+    def apply(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
+    ) -> AppliedLoad:
         compression, last = parameters[0, 0], 6 * self.body + 5
         downwards = -motion.axes[last]  # the last rotation's axis is fixed in the vertebra
         point = np.array(self.point)
@@ -149,7 +153,7 @@ class FollowerLoad:
         return AppliedLoad(fixed.load, fixed.tangent + compression * velocities @ turned.T)
 
     def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], parameters: Array
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> Array:
         velocities = motion.velocities(self.body, np.array(self.point))
         return -(velocities @ motion.axes[6 * self.body + 5])[:, None, None]
@@ -216,7 +220,7 @@ class Relaxation:
     )
 
     def respond_on_path(
-        self, q: Array, parameters: Array, state: Array, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> JointResponse:
         load, tangent = np.zeros_like(q), np.zeros((*q.shape, 6))
         load[:, EXTENSION] = parameters[:, 0] * (q[:, EXTENSION] - state[:, 0])
@@ -224,13 +228,15 @@ class Relaxation:
         return JointResponse(load, tangent)
 
     def by_parameter_on_path(
-        self, q: Array, parameters: Array, state: Array, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> Array:
         derivative = np.zeros((*q.shape, 2))
         derivative[:, EXTENSION, 0] = q[:, EXTENSION] - state[:, 0]
         return derivative
 
-    def by_state(self, q: Array, parameters: Array, state: Array, carried: Array) -> Array:
+    def by_state(
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+    ) -> Array:
         derivative = np.zeros((*q.shape, 1))
         derivative[:, EXTENSION, 0] = -parameters[:, 0]
         return derivative

@@ -36,6 +36,7 @@ from spinepipe.effects import (
 )
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
+from spinepipe.statics.holding import States
 from spinepipe.statics import (
     Chain,
     FreeParameter,
@@ -122,7 +123,8 @@ def test_examples_satisfy_exactly_their_own_protocol(effects) -> None:
 def test_tangent_is_the_slope_of_the_residual(effects) -> None:
     system, rng = system_of(effects), np.random.default_rng(1)
     q = np.tile([1e-3] * 3 + [0.15] * 3, 3) * rng.normal(size=18)
-    states = {index: rng.normal(0, 0.05, s.shape) for index, s in system.initial_states().items()}
+    empty = system.initial_states().of
+    states = States({index: rng.normal(0, 0.05, s.shape) for index, s in empty.items()})
     loading = system.slots.loading(system.case.steps[1].wrenches)
     tangent = system.balance(q, loading, states).tangent
     for column, size in enumerate(np.tile([1e-4] * 3 + [1e-3] * 3, 3)):
@@ -180,9 +182,9 @@ def test_effects_change_the_motion_they_are_meant_to_change() -> None:
 def test_path_state_of_a_step_comes_from_the_steps_before() -> None:
     steps = follow(system_of(ALONE["path"]))
     first, second = steps[0], steps[1]
-    assert not first.states[1].any()
+    assert not first.states.of[1].any()
     angle = first.equilibrium.q.reshape(-1, 6)[[1, 2], 3]
-    np.testing.assert_allclose(second.states[1][:, 0], (1 - np.exp(-2 / 3)) * angle, rtol=1e-14)
+    np.testing.assert_allclose(second.states.of[1][:, 0], (1 - np.exp(-2 / 3)) * angle, rtol=1e-14)
 
 
 def test_geometry_without_offset_leaves_the_motion_alone() -> None:
@@ -216,7 +218,6 @@ def test_effects_out_of_a_tests_scope_do_nothing() -> None:
         assert not by_x.any()
 
 
-@pytest.mark.xfail(strict=True, reason="only the first joint's derivative is taken")
 @pytest.mark.parametrize("effects", [
     pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),
     pytest.param((scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),), id="geometry"),

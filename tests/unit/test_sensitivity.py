@@ -131,22 +131,15 @@ def test_joint_poses(effects: tuple[ScopedEffect, ...], gravity: bool) -> None:
         )
 
 
-@pytest.mark.xfail(strict=True, reason="load effects are left out in silence")
-def test_joint_poses_with_a_load_effect() -> None:
-    model = spine(3, effects=(scoped(ExtraWeight(POINTS), (0, 1, 2)),))
-    case = loaded(model, 1)
-    system = System(Chain(model), model, case)
-    found = by_joint_pose(system, follow(system)[-1])
-    assert_close(found[:, 1], pose_slopes(model, case, 1))
-
-
-@pytest.mark.xfail(strict=True, reason="path states are taken as fixed in silence")
-def test_joint_poses_with_a_path_effect() -> None:
-    model = spine(3, effects=(scoped(Relaxation(), (0, 1, 2)),))
-    case = loaded(model, 2)
-    system = System(Chain(model), model, case)
-    found = by_joint_pose(system, follow(system)[-1])
-    assert_close(found[:, 1], pose_slopes(model, case, 1))
+@pytest.mark.parametrize("effect", [ExtraWeight(POINTS), Relaxation()], ids=["load", "path"])
+def test_poses_and_loads_refuse_effects_they_do_not_cover(effect) -> None:
+    model = spine(3, effects=(scoped(effect, (0, 1, 2)),))
+    system = System(Chain(model), model, loaded(model, 2))
+    last = follow(system)[-1]
+    with pytest.raises(ValueError, match="do not cover"):
+        by_joint_pose(system, last)
+    with pytest.raises(ValueError, match="do not cover"):
+        by_load(system, last, 0)
 
 
 def test_stiffness_shared_by_joints_and_joint_by_joint() -> None:

@@ -81,7 +81,7 @@ ALONE = [
     Case("NaN", None, "landmark_sd_mm: .nan", 9, "landmark_sd_mm", "finite"),
     Case("no stiffness", None, "stiffness: {right_n_per_m: 0}", 9, "stiffness.right_n_per_m", "greater than 0"),
     Case("stiffness without unit", None, "stiffness: {anterior: 5}", 9, "stiffness.anterior", "did you mean 'anterior_n_per_m'"),
-    Case("negative damping", None, "damping: {rotation_nm_s_per_rad: -1}", 9, "damping.rotation_nm_s_per_rad", "or equal to 0"),
+    Case("negative damping", None, "damping: {rotation_nm_s_per_rad: -1}", 9, "damping.rotation_nm_s_per_rad", "greater than 0"),
     Case("far shift", None, "load_point_shift_mm: {anterior: 900}", 9, "load_point_shift_mm.anterior", "equal to 200"),
     Case("unknown loading", None, "loading: settled", 9, "loading", "did you mean 'settle'"),
     Case("no time", None, "settle_time_s: 0", 9, "settle_time_s", "greater than 0"),

@@ -19,9 +19,6 @@ SHARE_OF_PEAK = 1e-3
 PEER_ACCURACY = 1e-6
 """A hundredth of the error looked for; at 1e-7 CPodes never ends on some of these chains."""
 
-TRANSLATION_FLOOR_M = 1e-7
-"""Translations below 0.1 mm: the integrator's absolute tolerance rules, 3e-8 m a step."""
-
 
 def chain_and_loads(name: str) -> Chain:
     short, long = chains.l1_l4_chain(), chains.t12_s1_chain()
@@ -72,10 +69,8 @@ def test_the_way_is_that_of_opensim(name: str, ramp_s: float) -> None:
     found = settle(system, program(system, ramp_s), 1.5, TIMES.tolist())
     assert found.status is Status.CONVERGED
     error = found.history.reshape(expected.shape) - expected
-    assert peak(error, slice(3, 6)) < SHARE_OF_PEAK * peak(expected, slice(3, 6))
-    translations = slice(0, 3)
-    allowed = max(SHARE_OF_PEAK * peak(expected, translations), TRANSLATION_FLOOR_M)
-    assert peak(error, translations) < allowed
+    for kind in (slice(0, 3), slice(3, 6)):
+        assert peak(error, kind) < SHARE_OF_PEAK * peak(expected, kind)
 
 
 @CHAINS
@@ -86,8 +81,8 @@ def test_what_remains_is_the_way_to_the_equilibrium(name: str, ramp_s: float) ->
     found = settle(system, program(system, ramp_s), 3.0)
     expected = bridge.pose(chain).ravel()
     np.testing.assert_allclose(found.q + found.remaining, expected, rtol=0, atol=1e-13)
-    # at rest but for the last step's tolerance (3e-4 of the way left, 3e-6 rad)
-    np.testing.assert_allclose(found.q, expected, rtol=0, atol=3e-6)
+    # at rest but for the absolute tolerance of a few steps, 4e-7 rad each
+    np.testing.assert_allclose(found.q, expected, rtol=0, atol=2e-6)
 
 
 def test_a_chain_without_inertia_cannot_settle() -> None:
@@ -100,7 +95,7 @@ def test_a_chain_without_inertia_cannot_settle() -> None:
     assert "mass and inertia" in found.message
 
 
-def test_a_tipping_load_ends_unstable_and_without_nan() -> None:
+def test_a_tipping_load_ends_unstable_and_says_how_far_it_came() -> None:
     force = np.array([500.0, -3000.0, 0.0])
     chain = chains.t12_s1_chain().with_loads(Load(5, force=force, point=np.array([0.0, 0.25, 0.0])))
     system = bridge.system(chain)
@@ -108,4 +103,6 @@ def test_a_tipping_load_ends_unstable_and_without_nan() -> None:
     assert found.status is Status.UNSTABLE
     assert found.remaining is None
     assert np.isfinite(found.q).all()
-    assert np.isfinite(found.history).all()
+    reached = np.isfinite(found.history).all(axis=1)
+    np.testing.assert_array_equal(reached, TIMES < 0.018)  # then it is beyond 80 degrees
+    assert "0.018 s" in found.message
