@@ -15,7 +15,7 @@ AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 1", "1 0 0", "0 1 0")
 """Axis of each coordinate: translations x, y, z, then the rotations z, x', y''."""
 
 INSIDE_LIMIT = 1e-12
-"""A flat body's largest moment is the sum of the others; PyBullet drops it if rounding adds to it."""
+"""A flat body has its largest moment at the sum of the others; rounding must not exceed it."""
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 

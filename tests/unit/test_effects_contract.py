@@ -36,7 +36,6 @@ from spinepipe.effects import (
 )
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics.holding import States
 from spinepipe.statics import (
     Chain,
     FreeParameter,
@@ -50,6 +49,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
+from spinepipe.statics.holding import States
 
 PROTOCOLS = {
     Kind.JOINT_LAW: JointLaw,

@@ -9,7 +9,11 @@ pytestmark = pytest.mark.slow
 
 SIMULATION = "small/jobs/specimen=s01/pose=0005/stiffness=best02.parquet"
 CALIBRATION = "small/calibrations/specimen=s01/pose=0002.parquet"
-FIGURES = {f"small/figures/{name}.svg" for name in ("stiffness", "errors", "joint_pose")}
+FIGURES = {
+    f"small/figures/{n}.{kind}"
+    for n in ("stiffness", "errors", "joint_pose")
+    for kind in ("svg", "png")
+}
 # Appended to the ranking of the copied package: other bytes, same meaning.
 OTHER_RANKING = """
 
