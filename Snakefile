@@ -12,6 +12,7 @@ include: "workflow/rules/execution.smk"
 
 
 SELECTION = selection()
+warm_up()
 
 
 wildcard_constraints:

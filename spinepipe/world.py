@@ -6,7 +6,9 @@ inverse dynamics, Jacobians or the mass matrix, which are exact to rounding.
 """
 
 import contextlib
+import ctypes
 import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
@@ -18,21 +20,30 @@ from spinepipe.effects.contract import Array
 from spinepipe.model.spine import RefusedModel, SpineModel
 from spinepipe.model.urdf import urdf
 
+_STREAMS = (1, 2)
+
 
 @contextlib.contextmanager
-def _silent_stderr() -> Iterator[None]:
-    """Swallow what C code prints: PyBullet greets on import."""
-    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(sink, 2)
+def _silent() -> Iterator[None]:
+    """Swallow what C code prints on standard output and error of the process."""
+    flush = ctypes.CDLL(None).fflush
+    sys.stdout.flush()
+    flush(None)
+    saved = [os.dup(stream) for stream in _STREAMS]
+    sink = os.open(os.devnull, os.O_WRONLY)
+    for stream in _STREAMS:
+        os.dup2(sink, stream)
     try:
         yield
+        flush(None)
     finally:
-        os.dup2(saved, 2)
-        os.close(saved)
+        for stream, copy in zip(_STREAMS, saved, strict=True):
+            os.dup2(copy, stream)
+            os.close(copy)
         os.close(sink)
 
 
-with _silent_stderr():
+with _silent():  # PyBullet greets on import
     import pybullet
 
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
@@ -91,6 +102,8 @@ class Chain:
         self.model = model
         self.n = 6 * model.n_joints
         self._zero = [0.0] * self.n
+        with _silent():  # axes that are off unit length by rounding are worth no warning
+            self._inverse_dynamics(self._zero, self._zero)
         self._principal = [self._principal_axes(j) for j in range(model.n_joints)]
         self._gravity_now: tuple[float, ...] | None = None
 

@@ -1,7 +1,7 @@
 """Bounded least squares with the exact Jacobian, from several starts, with honest status."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ START_SPREAD = 30.0
 
 SAME_OPTIMUM = 1e-3
 """Optima whose identifiable unknowns agree to this (logarithms, or prior SDs) are one."""
+
+ARRIVED = 1e-4
+"""A descent this close to a known optimum, in all unknowns, would end in it."""
 
 COST_TIE = 1e-6
 AT_BOUND = 1e-6
@@ -92,7 +95,9 @@ def fit(
     """
     evaluator = Evaluator(problem)
     problem = evaluator.problem
-    optima = [_descend(evaluator, x) for x in _start_points(problem, starts, seed)]
+    optima: list[Optimum] = []
+    for x in _start_points(problem, starts, seed):
+        optima.append(_descend(evaluator, x, optima))
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
     return Fit(
@@ -131,8 +136,11 @@ def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
     return points
 
 
-def _descend(evaluator: Evaluator, start: Array) -> Optimum:
-    """Least squares from one start; the start is stiffened until it has a stable equilibrium."""
+def _descend(evaluator: Evaluator, start: Array, known: Sequence[Optimum]) -> Optimum:
+    """Least squares from one start; the start is stiffened until it has a stable equilibrium.
+
+    A descent that has come so close to a known optimum that both count as one ends there.
+    """
     problem = evaluator.problem
     standing, stiffened = _stand_up(evaluator, start)
     if standing is None:
@@ -141,7 +149,7 @@ def _descend(evaluator: Evaluator, start: Array) -> Optimum:
         message = "no stable equilibrium up to the upper bounds: the loads tip the segment over"
         at_bound = np.ones(len(x), dtype=int)
         return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, message, 0, stiffened)
-    return _least_squares(evaluator, standing, stiffened)
+    return _least_squares(evaluator, standing, stiffened, known)
 
 
 def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
@@ -157,8 +165,11 @@ def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
     return start, stiffened
 
 
-def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimum:
+def _least_squares(
+    evaluator: Evaluator, start: Array, stiffened: int, known: Sequence[Optimum]
+) -> Optimum:
     problem = evaluator.problem
+    arrived: list[Optimum] = []
     size = len(evaluator.coordinate)
     seen: dict[bytes, Evaluation] = {}
 
@@ -172,6 +183,12 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
         assert found is not None
         return found
 
+    def stop_where_known(x: Array) -> None:
+        for optimum in known:
+            if np.abs((x - optimum.x) / problem.scale).max() < ARRIVED:
+                arrived.append(optimum)
+                raise StopIteration
+
     result = least_squares(
         residual,
         np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9),
@@ -183,7 +200,10 @@ def _least_squares(evaluator: Evaluator, start: Array, stiffened: int) -> Optimu
         xtol=1e-7,
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
+        callback=stop_where_known,
     )
+    if arrived:
+        return replace(arrived[0], stiffened=stiffened)
     x = _on_bounds(problem, result.x)
     at_bound = _bounds_reached(problem, x)
     status, message = _verdict(problem, bool(result.success), at_bound)

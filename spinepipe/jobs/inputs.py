@@ -1,5 +1,6 @@
 """What many jobs of one worker read again and again, kept as long as the files are the same."""
 
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +19,7 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
-from spinepipe.studies import JointPoseSensitivity, check
+from spinepipe.studies import JointPoseSensitivity, check, read
 from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS
 
@@ -45,7 +46,16 @@ class Poses:
 
 
 @lru_cache(maxsize=8)
-def _study(name: str, root: str, _stamps: tuple[Stamp, ...]) -> tuple[JointPoseSensitivity, Cohort]:
+def _folder(name: str, root: str, _study_file: Stamp) -> Path:
+    return read(Path(root) / "config" / "studies" / f"{name}.yaml", Path(root)).cohort_folder(
+        Path(root)
+    )
+
+
+@lru_cache(maxsize=8)
+def _study(
+    name: str, root: str, _study_file: Stamp, _cohort_files: tuple[Stamp, ...]
+) -> tuple[JointPoseSensitivity, Cohort]:
     study, cohort = check(Path(root), name)
     assert isinstance(study, JointPoseSensitivity)
     return study, cohort
@@ -53,10 +63,10 @@ def _study(name: str, root: str, _stamps: tuple[Stamp, ...]) -> tuple[JointPoseS
 
 def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort]:
     """The validated study and its cohort; read once per worker and state of the files."""
-    config = Path(root) / "config"
-    files = [config / "studies" / f"{name}.yaml"]
-    files += sorted((config / "cohorts").glob("*/*"))
-    return _study(name, root, tuple(stamp(file) for file in files if file.is_file()))
+    study_file = stamp(os.path.join(root, "config", "studies", f"{name}.yaml"))
+    with os.scandir(_folder(name, root, study_file)) as entries:
+        files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in entries)
+    return _study(name, root, study_file, tuple(files))
 
 
 @lru_cache(maxsize=4)

@@ -8,7 +8,9 @@ import os
 from dataclasses import dataclass
 
 TABLES = ("landmarks", "poses", "calibrations", "simulations")
-FIGURES = ("stiffness", "errors", "joint_pose")
+FIGURES = {"stiffness": "calibrations", "errors": "simulations", "joint_pose": "poses"}
+"""Figures and the table each is drawn from."""
+
 _MOST_FILES_PER_BLOCK = 300
 
 
@@ -67,7 +69,7 @@ class Layout:
     def results(self) -> list[str]:
         """What a reader of the study wants to have: tables, ranking, model and figures."""
         files = [*(f"{table}.parquet" for table in TABLES), "best.json", "model.yaml"]
-        files += [f"figures/{figure}.svg" for figure in FIGURES]
+        files += [f"figures/{figure}.{kind}" for figure in FIGURES for kind in ("svg", "png")]
         return [f"results/{self.study}/{file}" for file in files]
 
     def lost(self) -> list[str]:

@@ -20,6 +20,7 @@ import threading
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import ModuleType
@@ -69,6 +70,7 @@ class _Worker:
 
 _idle: "queue.LifoQueue[_Worker]" = queue.LifoQueue()
 _starting = threading.Lock()
+_CONTEXT = multiprocessing.get_context("forkserver")
 
 
 def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None:
@@ -108,13 +110,19 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
         _fail(job, log, _explain(failure, folder), failure.trace)
 
 
+def warm_up() -> None:
+    """Start the server that workers are forked from: its imports run while the caller plans."""
+    with _starting, _environment():
+        _CONTEXT.set_forkserver_preload(["numpy", "scipy.spatial", "pandas", "pyarrow", *_jobs()])
+        forkserver.ensure_running()
+
+
 def _start() -> _Worker:
-    """A new worker; the first one also starts the server they are forked from."""
-    context = multiprocessing.get_context("forkserver")
+    """A new worker, and the server they are forked from unless it runs already."""
+    warm_up()
     with _starting, _plain_main(), _environment():
-        context.set_forkserver_preload(["numpy", "scipy.spatial", "pandas", "pyarrow", *_jobs()])
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        ours, theirs = _CONTEXT.Pipe()
+        process = _CONTEXT.Process(target=_serve, args=(theirs,), daemon=True)
         process.start()
         theirs.close()
     return _Worker(process, ours)

@@ -39,6 +39,11 @@ class Body:
     com: Array
     inertia: Array
 
+    def __post_init__(self) -> None:
+        problem = _impossible(self)
+        if problem:
+            raise RefusedModel(f"body {self.name}: {problem}")
+
 
 @dataclass(frozen=True)
 class ScopedEffect:
@@ -154,20 +159,25 @@ def _frame_problem(model: SpineModel) -> str | None:
 
 def _body_problem(model: SpineModel) -> str | None:
     for body in model.bodies:
-        numbers = np.concatenate([[body.mass], body.com, body.inertia.ravel()])
-        if not np.isfinite(numbers).all() or body.mass < 0.0:
-            return f"body {body.name}: mass, centre and inertia must be finite, mass not negative"
-        moments = np.linalg.eigvalsh(body.inertia)
-        slack = ROUNDING * abs(moments[2])
-        if np.abs(body.inertia - body.inertia.T).max() > slack:
-            return f"body {body.name}: its inertia is not symmetric"
-        if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
-            return (
-                f"body {body.name}: no body has this inertia; principal moments are not negative, "
-                "and none is larger than the sum of the others"
-            )
         if body.mass == 0.0 and np.any(model.gravity):
             return f"body {body.name} has no mass, but gravity is on"
+    return None
+
+
+def _impossible(body: Body) -> str | None:
+    """Why no body can have this mass and inertia, or None."""
+    numbers = np.concatenate([[body.mass], body.com, body.inertia.ravel()])
+    if not np.isfinite(numbers).all() or body.mass < 0.0:
+        return "mass, centre and inertia must be finite, mass not negative"
+    moments = np.linalg.eigvalsh(body.inertia)
+    slack = ROUNDING * abs(moments[2])
+    if np.abs(body.inertia - body.inertia.T).max() > slack:
+        return "its inertia is not symmetric"
+    if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
+        return (
+            "no body has this inertia; principal moments are not negative, "
+            "and none is larger than the sum of the others"
+        )
     return None
 
 

@@ -115,9 +115,3 @@ def save(figure: Figure, path: str | Path) -> None:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def save_with_png(figure: Figure, svg: str | Path) -> None:
-    """Write a figure as the named SVG and as a PNG beside it."""
-    save(figure, Path(svg).with_suffix(".png"))
-    save(figure, svg)

@@ -9,14 +9,13 @@ from PIL import Image
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.jobs import figures
+from spinepipe.jobs.layout import FIGURES
 from spinepipe.report.published import paper_of
 from spinepipe.report.rows import MOST_ROWS, rows_of
 from spinepipe.report.spread import quartiles
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
 from spinepipe.report.words import fixed, number, percent, tick
 from spinepipe.units import COORDINATES
-
-NAMES = ("stiffness", "errors", "joint_pose")
 
 SIZES = {
     "two specimens": Size(),
@@ -31,9 +30,9 @@ SIZES = {
 def draw(root: Path, size: Size) -> Path:
     """Figures of made-up results; returns their folder."""
     folder = results(project(root, size), size)
-    tables = [str(folder / f"{name}.parquet") for name in ("poses", "calibrations", "simulations")]
-    pictures = [str(folder / "figures" / f"{name}.svg") for name in NAMES]
-    figures.run(str(root), STUDY, *tables, *pictures)
+    for name, table in FIGURES.items():
+        pictures = [str(folder / "figures" / f"{name}.{kind}") for kind in ("svg", "png")]
+        figures.run(str(root), STUDY, name, str(folder / f"{table}.parquet"), *pictures)
     return folder / "figures"
 
 
@@ -41,8 +40,8 @@ def draw(root: Path, size: Size) -> Path:
 def test_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
     folder = draw(tmp_path, size)
     files = {path.name for path in folder.iterdir()}
-    assert files == {f"{name}.{kind}" for name in NAMES for kind in ("svg", "png")}
-    for name in NAMES:
+    assert files == {f"{name}.{kind}" for name in FIGURES for kind in ("svg", "png")}
+    for name in FIGURES:
         with Image.open(folder / f"{name}.png") as picture:
             assert picture.width == int(WIDTH_MM / 25.4 * DPI)
             assert np.asarray(picture.convert("L")).min() < 128, "nothing is drawn"

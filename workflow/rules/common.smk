@@ -1,17 +1,20 @@
 # Helpers of the rules: studies, digests and which files a job needs. How a job is run: execution.smk.
 import os
+import tempfile
 from functools import cache
 from pathlib import Path
 
 from spinepipe import studies
 from spinepipe.jobs.digest import code_digest, value_digest
-from spinepipe.jobs.layout import Layout
+from spinepipe.jobs.layout import FIGURES, Layout
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.problems import InputError
 
 ROOT = os.getcwd()
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
+# A constant: Snakemake asks for its default, an expression, again for each of thousands of jobs.
+TMPDIR = tempfile.gettempdir()
 
 
 def selection():
@@ -104,7 +107,7 @@ def stiffness_source(wildcards):
     return {"calibration": f"{folder}/calibrations/{file}"}
 
 
-def figure(name):
-    """One figure of a study, shown with its caption by `snakemake --report`."""
+def shown(name):
+    """The file of a figure, shown with its caption by `snakemake --report`."""
     path = f"{RESULTS}/figures/{name}.svg"
     return report(path, caption=f"../report/{name}.rst", category="{study}")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from snakemake.logging import logger
 
-from spinepipe.jobs.pool import submit_and_wait
+from spinepipe.jobs.pool import submit_and_wait, warm_up
 from spinepipe.jobs.progress import Progress
 
 

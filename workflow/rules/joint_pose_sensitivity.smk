@@ -34,6 +34,8 @@ rule calibrate:
         output=f"{RESULTS}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
     log:
         f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
+    resources:
+        tmpdir=TMPDIR,
     params:
         digest=digest("calibrate"),
     run:
@@ -88,6 +90,8 @@ rule simulate:
         output=f"{RESULTS}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
+    resources:
+        tmpdir=TMPDIR,
     params:
         digest=digest("simulate"),
     run:
@@ -96,18 +100,22 @@ rule simulate:
         )
 
 
-rule figures:
-    input:
-        poses=f"{RESULTS}/poses.parquet",
-        calibrations=f"{RESULTS}/calibrations.parquet",
-        simulations=f"{RESULTS}/simulations.parquet",
-    output:
-        stiffness=figure("stiffness"),
-        errors=figure("errors"),
-        joint_pose=figure("joint_pose"),
-    log:
-        f"{LOGS}/figures.log",
-    params:
-        digest=digest("figures"),
-    run:
-        run_job(rule, "figures", wildcards, input, output, log)
+for figure, table in FIGURES.items():
+
+    rule:
+        name:
+            f"figure_{figure}"
+        input:
+            table=f"{RESULTS}/{table}.parquet",
+        output:
+            svg=shown(figure),
+            png=f"{RESULTS}/figures/{figure}.png",
+        log:
+            f"{LOGS}/figure_{figure}.log",
+        params:
+            digest=digest("figures"),
+            figure=figure,
+        run:
+            run_job(
+                rule, "figures", wildcards, input, output, log, figure=params.figure
+            )
