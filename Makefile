@@ -23,7 +23,7 @@ lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 	$(BIN)/snakemake --lint
 
 bench: dev-env  ## measure speed side by side with OpenSim
-	$(BIN)/python -m benchmarks
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks
 
 report: env  ## one HTML file with all figures and their captions
 	$(BIN)/snakemake --report results/report.html
