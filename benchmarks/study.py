@@ -1,5 +1,6 @@
 """The main study as a user runs it: cold, again, and after losing a file; wall time and memory."""
 
+import contextlib
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+
+from spinepipe.studies import JointPoseSensitivity, check
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "l1l4_joint_pose"
@@ -25,11 +28,13 @@ class Run:
     Attributes
     ----------
     peak_mib : largest memory of all its processes together (shared pages counted once).
+    engine_s : CPU seconds of Snakemake itself, without its workers.
     """
 
     what: str
     wall_s: float
     peak_mib: float
+    engine_s: float
     goal: str
 
 
@@ -48,6 +53,13 @@ def runs() -> Iterator[Run]:
         yield _run("one calibration lost", folder, "12 s")
 
 
+def targets() -> int:
+    """Job files of the whole study."""
+    study, cohort = check(ROOT, STUDY)
+    assert isinstance(study, JointPoseSensitivity)
+    return len(cohort.specimen_names) * study.poses * (2 + study.best_models)
+
+
 def _run(what: str, folder: str, goal: str) -> Run:
     start = time.perf_counter()
     process = subprocess.Popen(
@@ -56,24 +68,31 @@ def _run(what: str, folder: str, goal: str) -> Run:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    peak = [0.0]
-    watcher = threading.Thread(target=_watch, args=(process.pid, peak), daemon=True)
-    watcher.start()
+    watch = _Watch(process.pid)
+    watch.start()
     _, errors = process.communicate()
+    wall = time.perf_counter() - start
     if process.returncode:
         raise RuntimeError(f"{what}: {errors.decode()[-2000:]}")
-    return Run(what, time.perf_counter() - start, peak[0], goal)
+    return Run(what, wall, watch.peak_mib, watch.engine_s, goal)
 
 
-def _watch(pid: int, peak: list[float]) -> None:
-    """Look at the memory of a process and its descendants until it ends."""
-    while psutil.pid_exists(pid):
-        total = 0
-        try:
-            root = psutil.Process(pid)
-            for process in (root, *root.children(recursive=True)):
-                total += process.memory_full_info().pss
-        except (psutil.NoSuchProcess, psutil.AccessDenied):
-            pass
-        peak[0] = max(peak[0], total / 2**20)
-        time.sleep(SECONDS_BETWEEN_LOOKS)
+class _Watch(threading.Thread):
+    """Looks at a process and its descendants until it ends."""
+
+    def __init__(self, pid: int) -> None:
+        super().__init__(daemon=True)
+        self.pid, self.peak_mib, self.engine_s = pid, 0.0, 0.0
+
+    def run(self) -> None:
+        while psutil.pid_exists(self.pid):
+            with contextlib.suppress(psutil.NoSuchProcess, psutil.AccessDenied):
+                self._look(psutil.Process(self.pid))
+            time.sleep(SECONDS_BETWEEN_LOOKS)
+
+    def _look(self, root: psutil.Process) -> None:
+        times = root.cpu_times()
+        self.engine_s = max(self.engine_s, times.user + times.system)
+        processes = (root, *root.children(recursive=True))
+        total = sum(process.memory_full_info().pss for process in processes)
+        self.peak_mib = max(self.peak_mib, total / 2**20)
