@@ -148,11 +148,15 @@ def _problem(model: SpineModel) -> str | None:
 
 
 def _frame_problem(model: SpineModel) -> str | None:
-    for joint, frame in zip(model.joints, model.frames, strict=True):
-        if not (np.isfinite(frame.origin).all() and np.isfinite(frame.rotation).all()):
+    rotations = np.array([frame.rotation for frame in model.frames])
+    origins = np.array([frame.origin for frame in model.frames])
+    unit = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    proper = (unit < ORTHONORMAL) & (np.linalg.det(rotations) > 0.0)
+    finite = np.isfinite(origins).all(axis=1) & np.isfinite(rotations).all(axis=(1, 2))
+    for joint, is_finite, is_proper in zip(model.joints, finite, proper, strict=True):
+        if not is_finite:
             return f"the frame of joint {joint} is not finite"
-        unit = frame.rotation.T @ frame.rotation
-        if np.abs(unit - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(frame.rotation) < 0.0:
+        if not is_proper:
             return f"the frame of joint {joint} is not a right-handed rotation"
     return None
 
