@@ -8,7 +8,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics.holding import States
 from spinepipe.statics.linear import Factored, SingularTangent, factor
 from spinepipe.statics.loading import Loading
-from spinepipe.statics.stability import stability
+from spinepipe.statics.stability import Stability, stability
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import System
 
@@ -18,6 +18,10 @@ SMALLEST_FRACTION = 1.0 / 1024.0
 
 LARGEST_ROTATION = np.deg2rad(80.0)
 """Rotations beyond this are no joint motion and near the singularity of Z, X', Y''."""
+
+NOT_POSITIVE = (
+    "stable, though the tangent's symmetric part is not positive definite (large constant moment)"
+)
 
 # Newton squares its error: once a step is below these, the next would be below rounding.
 STEP_TOLERANCE = np.array([1e-11] * 3 + [1e-9] * 3)
@@ -59,8 +63,8 @@ def solve(
     continued in fractions that halve on failure and double on success.
     """
     direct = _newton(system, start, loading_to, states)
-    if direct is not None and _stable(system, direct):
-        return _converged(direct, direct.iterations)
+    if direct is not None and (verdict := _stability(system, direct)).stable:
+        return _converged(direct, direct.iterations, verdict)
     return _continue(system, start, loading_from, loading_to, states)
 
 
@@ -69,24 +73,28 @@ def _continue(
 ) -> Equilibrium:
     reached, increment, iterations = 0.0, 0.25, 0
     last: _Newton | None = None
+    verdict: Stability | None = None
     while reached < 1.0:
         target = min(1.0, reached + increment)
         loading = loading_from.towards(loading_to, target)
         q = start if last is None else last.q
         found = _newton(system, q, loading, states)
         iterations += MOST_ITERATIONS if found is None else found.iterations
-        if found is not None and _stable(system, found):
-            last, reached, increment = found, target, 2.0 * increment
+        if found is not None and (here := _stability(system, found)).stable:
+            verdict, last, reached, increment = here, found, target, 2.0 * increment
         elif increment > SMALLEST_FRACTION:
             increment *= 0.5
         else:
             return _stopped(start if last is None else last.q, found, reached, iterations)
     assert last is not None
-    return _converged(last, iterations)
+    assert verdict is not None
+    return _converged(last, iterations, verdict)
 
 
-def _converged(found: _Newton, iterations: int) -> Equilibrium:
-    return Equilibrium(found.q, found.factored, Status.CONVERGED, "", iterations, 1.0)
+def _converged(found: _Newton, iterations: int, verdict: Stability) -> Equilibrium:
+    """A stable pose; a tangent whose symmetric part is not positive is worth a warning."""
+    warning = "" if verdict.symmetric_part_positive else NOT_POSITIVE
+    return Equilibrium(found.q, found.factored, Status.CONVERGED, warning, iterations, 1.0)
 
 
 def _stopped(q: Array, found: _Newton | None, reached: float, iterations: int) -> Equilibrium:
@@ -123,5 +131,5 @@ def _beyond_motion(q: Array) -> bool:
     return bool(np.abs(q.reshape(-1, 6)[:, 3:]).max() > LARGEST_ROTATION)
 
 
-def _stable(system: System, found: _Newton) -> bool:
-    return stability(system.chain, found.q, found.tangent, found.factored.sign).stable
+def _stability(system: System, found: _Newton) -> Stability:
+    return stability(system.chain, found.q, found.tangent, found.factored.sign)

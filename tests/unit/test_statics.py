@@ -220,3 +220,13 @@ def test_bodies_that_cannot_be_are_refused(changes, said) -> None:
 def test_these_models_should_be_refused_too(changes) -> None:
     with pytest.raises(RefusedModel):
         spoiled(**changes)
+
+
+@pytest.mark.parametrize(("moment", "warned"), [(7.5, False), (12.0, True)])
+def test_a_symmetric_part_that_is_not_positive_is_a_warning(moment: float, warned: bool) -> None:
+    """Six joints of 20 N m/rad: it turns between 10 and 10.5 N m, the pose stays stable."""
+    model = upright(6, (1.5e5, 1.9e6, 1.4e5, 20.0, 20.0, 20.0))
+    flexion = Wrench(5, np.array([0.0, 0.16, 0.0]), NOWHERE, np.array([0.0, 0.0, -moment]))
+    found = under(model, flexion).equilibrium
+    assert found.status is Status.CONVERGED
+    assert ("symmetric part" in found.message) is warned
