@@ -18,10 +18,10 @@ warm_up()
 wildcard_constraints:
     study="[a-z0-9_]+",
     specimen="[^/=]+",
-    pose="[0-9]{4}",
+    pose="[0-9]{4,5}",
     stiffness="calibrated|best[0-9]{2}",
     table="calibrations|simulations",
-    block="[0-9]{3}",
+    block="[0-9]{3,5}",
 
 
 include: "workflow/rules/joint_pose_sensitivity.smk"

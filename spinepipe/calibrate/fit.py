@@ -26,6 +26,11 @@ SAME_OPTIMUM = 1e-3
 ARRIVED = 1e-4
 """A descent this close to a known optimum, in all unknowns, would end in it."""
 
+LEVEL = 1e-2
+"""Slope of the cost at an optimum, as a share of it per unknown's unit (logarithm or prior SD)."""
+
+AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
+
 COST_TIE = 1e-6
 AT_BOUND = 1e-6
 ROUNDING = 1e-12
@@ -205,12 +210,25 @@ def _least_squares(
     if arrived:
         return replace(arrived[0], stiffened=stiffened)
     x = _on_bounds(problem, result.x)
-    at_bound = _bounds_reached(problem, x)
+    at_bound, evaluation = _bounds_reached(problem, x), seen[x.tobytes()]
     status, message = _verdict(problem, bool(result.success), at_bound)
-    evaluation = seen[x.tobytes()]
+    if status.usable and not _stationary(problem, evaluation, at_bound):
+        status, message = Status.NOT_CONVERGED, AT_THE_BRINK
     return Optimum(
         x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
     )
+
+
+def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bool:
+    """Whether the cost is level in the unknowns inside their bounds.
+
+    Steps also shrink to nothing where what lies beyond has no equilibrium: that is no optimum.
+    """
+    residual, jacobian = evaluation.residual, evaluation.jacobian
+    assert residual is not None
+    assert jacobian is not None
+    slope = 2.0 * np.abs(residual @ jacobian * problem.scale)[at_bound == 0]
+    return bool(slope.max(initial=0.0) <= LEVEL * (residual @ residual) + 1e-9)
 
 
 def _on_bounds(problem: Problem, x: Array) -> Array:

@@ -94,13 +94,15 @@ class Evaluator:
             When nothing that was measured has a weight, or the engine refuses the model.
         """
         cases = (_needed(problem, case) for case in problem.cases)
-        problem = replace(problem, cases=tuple(case for case in cases if case.case.steps))
+        problem = replace(
+            problem, cases=tuple(case for case in cases if _used(case, problem.weights).any())
+        )
         if not problem.cases:
             raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
         self.problem = _within_declared(problem)
         chain = Chain(problem.model)
         self._systems = [System(chain, problem.model, m.case) for m in problem.cases]
-        self._used = [_used(m.measured, problem.weights) for m in problem.cases]
+        self._used = [_used(m, problem.weights) for m in problem.cases]
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         self._last: _Neighbour | None = None
@@ -191,13 +193,16 @@ def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
     """The case without the steps that neither carry a reading nor a path to those that do."""
     if measured.zeroed or any(s.effect.kind is Kind.PATH for s in problem.model.effects):
         return measured
-    read = np.any(_used(measured.measured, problem.weights), axis=(1, 2)).tolist()
+    read = np.any(_used(measured, problem.weights), axis=(1, 2)).tolist()
     steps = tuple(step for step, here in zip(measured.case.steps, read, strict=True) if here)
     return replace(
         measured, case=replace(measured.case, steps=steps), measured=measured.measured[read]
     )
 
 
-def _used(measured: Array, weights: Array) -> NDArray[np.bool_]:
-    """(T, J, 6) which readings enter the cost."""
-    return np.isfinite(measured) & (weights > 0.0)
+def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:
+    """(T, J, 6) which readings enter the cost; the zeros that zeroing makes of step 0 are none."""
+    used = np.isfinite(measured.measured) & (weights > 0.0)
+    if measured.zeroed:
+        used[0] = False
+    return used

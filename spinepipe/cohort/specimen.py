@@ -21,7 +21,7 @@ from spinepipe.model import (
     ScopedEffect,
     SpineModel,
 )
-from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, to_si
+from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, to_si
 
 Landmarks = Mapping[str, Mapping[str, Array]]
 """Points in m, ground: vertebra to landmark to (3,)."""
@@ -30,6 +30,7 @@ STRICTLY_INSIDE = 1e-6
 """Share of the largest moment by which an inertia keeps off the limit: PyBullet needs some."""
 
 _POINT = ["x_mm", "y_mm", "z_mm"]
+_ORIENTATION = [f"{name}_deg" for name in ROTATIONS]
 _INERTIA = ["ixx_kg_m2", "iyy_kg_m2", "izz_kg_m2", "ixy_kg_m2", "ixz_kg_m2", "iyz_kg_m2"]
 
 
@@ -76,31 +77,43 @@ def frames_from_landmarks(vertebrae: Sequence[str], points: Landmarks) -> tuple[
 
 
 def joint_frames(cohort: Cohort, specimen: str) -> tuple[Pose, ...]:
-    """Joint frames in ground at the neutral pose: ``joints.csv`` counts before landmarks."""
-    if cohort.joints is None:
-        return frames_from_landmarks(cohort.vertebrae, landmarks(cohort, specimen))
-    rows = cohort.joints[cohort.joints["specimen"] == specimen].set_index("joint")
-    rows = rows.loc[list(cohort.joint_names)]
-    origins = rows[_POINT].to_numpy(float) / MM_PER_M
-    orientation = rows[["extension_deg", "right_bending_deg", "left_rotation_deg"]]
-    angles = np.deg2rad(orientation.to_numpy(float))
+    """Joint frames in ground at the neutral pose; joint by joint, ``joints.csv`` counts first."""
+    given = _given_frames(cohort, specimen)
+    points = {} if cohort.landmarks is None else landmarks(cohort, specimen)
+    sides = zip(cohort.joint_names, pairwise(cohort.vertebrae), strict=True)
     return tuple(
-        Pose(rotation_zxy(*angle), origin) for origin, angle in zip(origins, angles, strict=True)
+        given[joint] if joint in given else joint_pose(points[lower], points[upper])
+        for joint, (lower, upper) in sides
     )
+
+
+def _given_frames(cohort: Cohort, specimen: str) -> dict[str, Pose]:
+    """Frames that ``joints.csv`` gives of a specimen, by joint."""
+    if cohort.joints is None:
+        return {}
+    rows = cohort.joints[cohort.joints["specimen"] == specimen]
+    origins = rows[_POINT].to_numpy(float) / MM_PER_M
+    angles = np.deg2rad(rows[_ORIENTATION].to_numpy(float))
+    poses = (Pose(rotation_zxy(*a), origin) for a, origin in zip(angles, origins, strict=True))
+    return dict(zip(rows["joint"], poses, strict=True))
 
 
 @lru_cache(maxsize=256)
 def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
-    """Moving vertebrae; massless where the cohort lists no bodies, points without inertia.
+    """Moving vertebrae; massless where the cohort lists no body, points without inertia.
 
     Kept per cohort object: thousands of models of one specimen share them.
     """
     names = cohort.vertebrae[1:]
     if cohort.bodies is None:
-        return tuple(Body(name, 0.0, np.zeros(3), np.zeros((3, 3))) for name in names)
+        return tuple(_massless(name) for name in names)
     rows = cohort.bodies[cohort.bodies["specimen"] == specimen]
     found = {name: rows[rows["vertebra"] == name] for name in names}
-    return tuple(_body(name, row) for name, row in found.items() if len(row))
+    return tuple(_body(name, row) if len(row) else _massless(name) for name, row in found.items())
+
+
+def _massless(name: str) -> Body:
+    return Body(name, 0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def _body(name: str, row: pd.DataFrame) -> Body:

@@ -133,7 +133,7 @@ def _errors(found: Fit) -> dict[str, Any]:
         return nothing
     errors = np.concatenate(
         [
-            _predicted(measured, steps) - measured.measured
+            _predicted(measured, steps) - _readings(measured)
             for steps, measured in zip(found.solved, found.cases, strict=True)
         ]
     )
@@ -142,6 +142,14 @@ def _errors(found: Fit) -> dict[str, Any]:
         _error_column(name): float(np.nanmean(column)) if np.isfinite(column).any() else None
         for name, column in zip(COORDINATE_COLUMNS, size.T, strict=True)
     }
+
+
+def _readings(measured: MeasuredCase) -> Array:
+    """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
+    readings = measured.measured.copy()
+    if measured.zeroed:
+        readings[0] = np.nan
+    return readings
 
 
 def _predicted(measured: MeasuredCase, steps: Sequence[SolvedStep]) -> Array:

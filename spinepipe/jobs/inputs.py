@@ -19,6 +19,7 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.statics import Status
 from spinepipe.studies import JointPoseSensitivity, check, read
 from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS
@@ -82,7 +83,7 @@ def _poses(where: Stamp) -> Poses:
     )  # fmt: skip
     for specimen, pose, status, message, origin, angle in rows:
         key = (specimen, int(pose))
-        if status == "refused":
+        if status == Status.REFUSED:
             refused[key] = message
         else:
             placed = Pose(rotation_zxy(*angle), origin)

@@ -1,12 +1,11 @@
 """Job: the best stiffness sets of each specimen, with which all its poses are simulated."""
 
 import json
-import os
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from spinepipe.files import appearing
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.statics import Status
 from spinepipe.studies import JointPoseSensitivity
@@ -22,9 +21,8 @@ def run(root: str, study: str, calibrations: str, output: str) -> None:
         specimen: _best(settings, frame[frame["specimen"] == specimen])
         for specimen in cohort.specimen_names
     }
-    temporary = Path(output).with_name(f".best.json.{os.getpid()}")
-    temporary.write_text(json.dumps(best, indent=1), encoding="utf-8")
-    os.replace(temporary, output)
+    with appearing(output) as temporary:
+        temporary.write_text(json.dumps(best, indent=1), encoding="utf-8")
 
 
 def _best(settings: JointPoseSensitivity, frame: pd.DataFrame) -> list[dict[str, Any]]:

@@ -125,10 +125,11 @@ def _settle(settings: JointPoseSensitivity, system: System) -> list[_Ended]:
 
 def _zeroed(ended: list[_Ended]) -> list[_Ended]:
     """Poses less that of step 0, as the cohort's readings are; none where step 0 has none."""
-    first = ended[0].q
-    return [
-        replace(end, q=None if first is None or end.q is None else end.q - first) for end in ended
-    ]
+    first = ended[0]
+    if first.q is None:
+        lost = replace(first, message=f"step 0, which is subtracted, has no pose: {first.message}")
+        return [lost if end.status.usable else end for end in ended]
+    return [replace(end, q=None if end.q is None else end.q - first.q) for end in ended]
 
 
 def _case_rows(

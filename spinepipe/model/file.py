@@ -1,9 +1,8 @@
 """The model file: one YAML per study with the effects, their scope and their parameter values.
 
-Geometry, masses and loads stay in the cohort. Any study can start from a model file.
+Geometry, masses and loads stay in the cohort.
 """
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
+from spinepipe.files import appearing
 from spinepipe.model.spine import ScopedEffect
 from spinepipe.problems import InputError, Problem
 
@@ -85,11 +85,9 @@ def _as_number(value: Any) -> Any:
 
 def write_model(model: ModelFile, path: str | Path) -> None:
     """Write a model file; it appears whole or not at all."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     text = yaml.safe_dump(model.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
+    with appearing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def read_model(path: str | Path) -> ModelFile:
@@ -104,7 +102,7 @@ def read_model(path: str | Path) -> ModelFile:
     try:
         data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
         model = ModelFile.model_validate(data)
-    except (OSError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise InputError(
             [Problem(name, None, None, str(error), "a YAML file", "mend it")]
         ) from None
@@ -146,7 +144,8 @@ def _check(file: str, number: int, entry: EffectEntry) -> list[Problem]:
 
 
 def _within(value: Any, low: float, high: float) -> bool:
-    return isinstance(value, int | float) and bool(low <= value <= high)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and bool(low <= value <= high)
 
 
 def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple[ScopedEffect, ...]:

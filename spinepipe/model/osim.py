@@ -4,7 +4,6 @@ All body frames lie on ground in the neutral pose, so centres of mass, inertias 
 stand in the file as the model has them.
 """
 
-import os
 import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
@@ -15,6 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.files import appearing
 from spinepipe.frames import Pose
 from spinepipe.model.spine import Body, LoadCase, RefusedModel, SpineModel
 from spinepipe.units import COORDINATES
@@ -87,11 +87,9 @@ def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
 
 def write_osim(model: SpineModel, path: str | Path, loads: LoadCase | None = None) -> None:
     """Write `osim`; the file appears whole or not at all. Raises what `osim` raises."""
-    path = Path(path)
     text = osim(model, loads)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
+    with appearing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _stiffness(model: SpineModel, loads: LoadCase | None) -> Array:

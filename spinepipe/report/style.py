@@ -1,7 +1,6 @@
 """How figures look: size, type, colours that colour-blind readers tell apart, and saving."""
 
 import io
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from spinepipe.files import appearing
 
 BLACK, GREY = "#000000", "#767676"
 BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
@@ -108,10 +109,5 @@ def save(figure: Figure, path: str | Path) -> None:
     picture = io.BytesIO()
     kind = path.suffix.removeprefix(".")
     figure.savefig(picture, format=kind, dpi=DPI, metadata=nothing[path.suffix])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with appearing(path) as temporary:
         temporary.write_bytes(picture.getvalue())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

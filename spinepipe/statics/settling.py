@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
 from spinepipe.effects.contract import Array
-from spinepipe.statics.equilibrium import solve
+from spinepipe.statics.equilibrium import LARGEST_ROTATION, solve
 from spinepipe.statics.holding import NO_STATES
 from spinepipe.statics.loading import Loading
 from spinepipe.statics.rosenbrock import (
@@ -36,8 +36,6 @@ ABSOLUTE_TOLERANCE = np.array([4e-9] * 3 + [4e-7] * 3)
 """m and rad per step; keeps the trajectory within 0.1 % of its peak."""
 
 _WEIGHTLESS = np.zeros(3)  # weight is part of the residual
-
-LARGEST_ROTATION = np.deg2rad(80.0)
 
 
 @dataclass(frozen=True)
@@ -151,12 +149,14 @@ class _Run:
         """One accepted step, not beyond the limit."""
         while True:
             self.steps += 1
-            if self.steps > MOST_STEPS or self.size < SMALLEST_STEP_S:
+            if self.steps > MOST_STEPS:
+                return self._stop(Status.NOT_CONVERGED, f"not there after {MOST_STEPS} steps")
+            if self.size < SMALLEST_STEP_S:
                 return self._stop(Status.NOT_CONVERGED, "the step size went to zero")
             size = min(self.size, limit - self.time)
             q, rate, error = self._try(size)
             accepted = bool(np.isfinite(error)) and error <= 1.0
-            growth = 0.9 * error ** (-1.0 / 3.0) if np.isfinite(error) and error > 0 else 0.2
+            growth = 0.9 * max(error, 1e-3) ** (-1.0 / 3.0) if np.isfinite(error) else 0.2
             if accepted:
                 self.q, self.rate, self.time = q, rate, self.time + size
             self.size = size * float(np.clip(growth, 0.2, 6.0))

@@ -42,8 +42,8 @@ def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
     positive = smallest > 0.0
     if sign < 0:
         return Stability(stable=False, symmetric_part_positive=positive)
-    if positive and np.array_equal(tangent, tangent.T):
-        return Stability(stable=True, symmetric_part_positive=True)
+    if np.array_equal(tangent, tangent.T):  # then inertia and damping decide nothing
+        return Stability(stable=positive, symmetric_part_positive=positive)
     twist = 0.5 * float(np.sum(skew * skew))  # |A|^2: a skew matrix's singular values are pairs
     mass = chain.mass_matrix(q) * scale[:, None] * scale
     if positive and twist * np.linalg.norm(mass) < smallest:
@@ -65,13 +65,17 @@ def _smallest_eigenvalue_bound(symmetric: Array) -> float:
 
 
 def _decays(mass: Array, stiffness: Array) -> bool:
-    """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0."""
+    """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0.
+
+    A growing mode l (m l + 1) = -k has |m l + 1| > 1, hence |l| < |K|: rates beyond are those of
+    directions without inertia, infinite but for rounding, which may give them either sign.
+    """
     n = len(stiffness)
     if not mass.any():
         return float(eigvals(stiffness).real.min()) > 0.0
     identity, nothing = np.eye(n), np.zeros((n, n))
     a = np.block([[nothing, identity], [-stiffness, -identity]])
     b = np.block([[identity, nothing], [nothing, mass]])
-    rates = eigvals(a, b)
-    rates = rates[np.isfinite(rates)]
-    return float(rates.real.max()) < ROUNDING * float(np.linalg.norm(stiffness))
+    rates, size = eigvals(a, b), float(np.linalg.norm(stiffness))
+    slow = rates[np.abs(rates) < size]
+    return float(slow.real.max(initial=-np.inf)) < ROUNDING * size

@@ -11,8 +11,8 @@ FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 Coordinate = Literal["anterior", "superior", "right", "extension", "right_bending", "left_rotation"]
 
-_Translational = Annotated[float, Field(gt=0, le=1e9)]
-_Rotational = Annotated[float, Field(gt=0, le=1e6)]
+_Translational = Annotated[float, Field(ge=1.0, le=1e9)]
+_Rotational = Annotated[float, Field(ge=1e-4, le=1e6)]
 _Weight = Annotated[float, Field(ge=0, le=1e6)]
 _Millimetres = Annotated[float, Field(ge=-200, le=200)]
 

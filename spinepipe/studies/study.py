@@ -1,9 +1,7 @@
 """What every study has, of whatever kind."""
 
-import json
 import re
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, Field
 
@@ -45,28 +43,3 @@ class Study(BaseModel):
     def cohort_folder(self, root: Path) -> Path:
         """Folder of the cohort, see the function of the same name."""
         return cohort_folder(self.cohort, root)
-
-    def part(self, *names: str) -> str:
-        """Canonical JSON of the named keys only, to digest what a result depends on.
-
-        Parameters
-        ----------
-        names : keys, dotted where nested (``calibration.free``); their order does not matter.
-
-        Raises
-        ------
-        KeyError
-            For a key that the study does not have.
-        """
-        data = self.model_dump(mode="json")
-        chosen = {name: _at(data, name) for name in names}
-        return json.dumps(chosen, sort_keys=True, separators=(",", ":"))
-
-
-def _at(data: dict[str, Any], dotted: str) -> object:
-    value: Any = data
-    for key in dotted.split("."):
-        if not isinstance(value, dict) or key not in value:
-            raise KeyError(f"no key '{dotted}' in a study")
-        value = value[key]
-    return value

@@ -1,6 +1,5 @@
 """Reading and writing result tables as Parquet: checked against their schema, atomically."""
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from spinepipe.files import appearing
 from spinepipe.tables.schema import TYPES, Column, Table
 
 SMALL_ROWS = 1000
@@ -90,15 +90,9 @@ def _problem(column: Column, array: pa.Array) -> str | None:
 
 def write(rows: pa.Table, path: str | Path, metadata: Mapping[str, str]) -> None:
     """Write rows with provenance in the file's metadata; the file appears whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     rows = rows.replace_schema_metadata(dict(sorted(metadata.items())))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with appearing(path) as temporary:
         pq.write_table(rows, temporary, **(_SMALL if rows.num_rows < SMALL_ROWS else _LARGE))
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def join(table: Table, parts: Sequence[pa.Table], path: str | Path) -> None:

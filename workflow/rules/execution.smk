@@ -11,11 +11,11 @@ from spinepipe.jobs.progress import Progress
 
 
 def check_engine():
-    """Refuse to run jobs as one Snakemake process each, which is 70 times slower."""
+    """Refuse to run jobs as one Snakemake process each, which is many times slower."""
     if not workflow.execution_settings.use_threads:
         stop(
-            "the option force-use-threads is off: each job would start Snakemake anew, 70 times "
-            "slower.\nLet Snakemake find profiles/default beside the Snakefile (do not pass "
+            "the option force-use-threads is off: each job would start Snakemake anew, "
+            "many times slower.\nLet Snakemake find profiles/default beside the Snakefile (do not pass "
             "--workflow-profile none), or add --force-use-threads."
         )
 
