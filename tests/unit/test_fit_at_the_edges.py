@@ -1,0 +1,81 @@
+"""Fits where honesty is easily lost: at the brink of stability, and on zeroed readings."""
+
+import numpy as np
+import pytest
+
+from spinepipe.calibrate import MeasuredCase, Problem, fit
+from spinepipe.effects import Wrench, create
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
+from spinepipe.statics import (
+    Chain,
+    Program,
+    Status,
+    System,
+    follow,
+    free_parameters,
+    settle,
+)
+
+STIFFNESS = np.array([1e5, 1e6, 1e5, 20.0, 20.0, 20.0])
+ANGLES = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+TOP = np.array([0.02, 0.1, 0.0])
+
+
+def joint() -> SpineModel:
+    """One weightless joint under a body of 0.1 kg."""
+    bushing = ScopedEffect(create("linear_bushing"), (0,), STIFFNESS[None])
+    return SpineModel(
+        specimen="one",
+        joints=("L3L4",),
+        frames=(Pose(np.eye(3), np.zeros(3)),),
+        bodies=(Body("L3", 0.1, np.array([0.0, 0.03, 0.0]), 1e-5 * np.eye(3)),),
+        gravity=np.zeros(3),
+        damping=np.array([[1e3] * 3 + [1.4] * 3]),
+        effects=(bushing,),
+    )
+
+
+def compression(*shares: float) -> LoadCase:
+    """100 N downwards, 20 mm in front of the joint and 100 mm above it, in steps."""
+    push = np.array([0.0, -100.0, 0.0])
+    steps = [(Wrench(0, TOP, share * push, np.zeros(3)),) for share in shares]
+    return LoadCase("flexion", 1, tuple(LoadStep(n, w) for n, w in enumerate(steps)))
+
+
+def problem(case: LoadCase, extension_deg: list[float], zeroed: bool = False) -> Problem:
+    """Extension stiffness to be found from extension angles by load step, NaN: not measured."""
+    model = joint()
+    measured = np.full((len(extension_deg), 1, 6), np.nan)
+    measured[:, 0, 3] = np.deg2rad(extension_deg)
+    free = free_parameters(model, 0, ["extension_nm_per_rad"], "per_specimen")
+    reach = np.array([np.log(1000.0)])
+    return Problem(model, (MeasuredCase(case, measured, zeroed),), free, ANGLES, -reach, reach)
+
+
+def test_the_brink_of_stability_is_no_optimum() -> None:
+    """The measured angle is beyond any stable pose: softer always fits better, then it tips."""
+    found = fit(problem(compression(1.0), [-85.0]))
+    assert found.status is Status.NOT_CONVERGED
+    assert "tip" in found.message
+
+
+def test_the_zero_of_a_zeroed_step_is_no_reading() -> None:
+    found = fit(problem(compression(0.0, 1.0), [0.0, -7.0], zeroed=True))
+    assert found.status is Status.CONVERGED
+    assert found.uncertainty.degrees_of_freedom == 0
+    assert not found.uncertainty.identifiable.any()
+
+
+def test_a_zeroed_case_without_another_reading_is_refused() -> None:
+    with pytest.raises(RefusedModel, match="no reading enters the cost"):
+        fit(problem(compression(0.0, 1.0), [0.0, np.nan], zeroed=True))
+
+
+def test_settling_where_nothing_moves_ends_converged() -> None:
+    model = joint()
+    system = System(Chain(model), model, compression(0.0))
+    loading = system.slots.loading(system.case.steps[0].wrenches)
+    end = settle(system, Program.constant(loading), 1.5)
+    assert end.status is Status.CONVERGED
+    np.testing.assert_array_equal(end.q, follow(system)[0].equilibrium.q)
