@@ -31,6 +31,11 @@ LEVEL = 1e-2
 
 AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
 
+OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
+
+SAME_POSE = 1e-6
+"""Weighted residuals, mm and degrees, of one pose solved twice differ by less."""
+
 COST_TIE = 1e-6
 AT_BOUND = 1e-6
 ROUNDING = 1e-12
@@ -211,12 +216,29 @@ def _least_squares(
         return replace(arrived[0], stiffened=stiffened)
     x = _on_bounds(problem, result.x)
     at_bound, evaluation = _bounds_reached(problem, x), seen[x.tobytes()]
-    status, message = _verdict(problem, bool(result.success), at_bound)
-    if status.usable and not _stationary(problem, evaluation, at_bound):
+    level = _stationary(problem, evaluation, at_bound)
+    status, message = _verdict(problem, bool(result.success) or level, at_bound)
+    if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
+    if status.usable and not _on_load_path(evaluator, x, evaluation):
+        status, message = Status.NOT_CONVERGED, OFF_THE_PATH
     return Optimum(
         x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
     )
+
+
+def _on_load_path(evaluator: Evaluator, x: Array, evaluation: Evaluation) -> bool:
+    """Whether the poses of the fit are those that the loads lead to from the neutral pose.
+
+    During a fit each pose is solved from its neighbour's; where segments snap, that may follow
+    another branch.
+    """
+    evaluator.forget()
+    cold = evaluator.at(x)
+    assert evaluation.residual is not None
+    if cold.residual is None:
+        return False
+    return bool(np.allclose(cold.residual, evaluation.residual, rtol=0.0, atol=SAME_POSE))
 
 
 def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bool:

@@ -108,6 +108,10 @@ class Evaluator:
         self._last: _Neighbour | None = None
         self.evaluations = 0
 
+    def forget(self) -> None:
+        """Solve the next point from the neutral pose, not from its neighbour."""
+        self._last = None
+
     def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,)."""
         self.evaluations += 1

@@ -79,7 +79,7 @@ def _fitted(
         "specimen": specimen,
         "pose": pose,
         **_errors(found),
-        "cost": found.cost if np.isfinite(found.cost) else None,
+        "cost": found.cost if solved else None,
         "degrees_of_freedom": found.uncertainty.degrees_of_freedom,
         "iterations": found.iterations,
         "evaluations": found.evaluations,
@@ -102,7 +102,7 @@ def _fitted(
 def _message(found: Fit) -> str:
     notes = [found.message] if found.message else []
     if found.stiffened:
-        notes.append(f"start stiffened {2**found.stiffened} x to stand")
+        notes.append(f"start stiffened by a factor of {2**found.stiffened} to stand")
     if found.n_optima > 1:
         notes.append(f"{found.n_optima} optima: the answer depends on the start")
     return "; ".join(notes)

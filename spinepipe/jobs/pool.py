@@ -106,7 +106,8 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
         _fail(job, log, _fate(worker))
     _idle.put(worker)
     if failure is not None:
-        folder = os.path.dirname(failure.path or str(arguments.get("output", ""))) or "."
+        written = arguments.get("output") or arguments.get("svg") or ""
+        folder = os.path.dirname(failure.path or str(written)) or "."
         _fail(job, log, _explain(failure, folder), failure.trace)
 
 

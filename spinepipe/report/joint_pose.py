@@ -59,7 +59,7 @@ def _equal_reach(axes: Sequence[Axes]) -> None:
 
 
 def _nominal(cohort: Cohort) -> pd.DataFrame:
-    """Joint frames from the landmarks as palpated, mm and deg, by specimen and joint."""
+    """Joint frames of the cohort itself, mm and deg, by specimen and joint."""
     rows = []
     for specimen in cohort.specimen_names:
         frames = joint_frames(cohort, specimen)
@@ -126,6 +126,6 @@ def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
 def _words(total: int, failed: int, rows: Rows) -> str:
     share = f"{percent(failed, total)} define no frame" if failed else "all define frames"
     numbers = "numbers: median and IQR in ground axes" if rows.with_numbers else ""
-    zero = "line at 0: landmarks as palpated"
+    zero = "line at 0: the cohort's own frames"
     parts = (f"{count(total, 'landmark set')}, {share}", rows.note, KEY, numbers, zero)
     return "; ".join(part for part in parts if part) + "."

@@ -169,7 +169,9 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     low, high = np.percentile(inside if len(inside) else values, [1.0, 99.0])
     middle = quartiles(values)
     reach = FARTHEST * middle.high / middle.low
-    low, high = max(low, middle.low / reach), min(high, middle.high * reach)
+    near_low, near_high = max(low, middle.low / reach), min(high, middle.high * reach)
+    if near_low < near_high:  # else the few inside the bounds lie far from the quartiles
+        low, high = near_low, near_high
     near: list[Any] = [panel.start]
     if panel.paper is not None:
         near += [panel.paper.low, panel.paper.high]

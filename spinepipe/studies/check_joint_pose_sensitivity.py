@@ -67,10 +67,25 @@ def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
 
 
 def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:
-    if study.loading == "settle" and cohort.bodies is None:
-        found = f"settle, with cohort '{cohort.name}', which has no bodies.csv"
-        allowed = "equilibrium, or a cohort with masses"
-        yield Problem(*_at(document, "loading"), found, allowed, "choose equilibrium")
+    """Settling moves the vertebrae in time: each needs mass and inertia."""
+    if study.loading != "settle":
+        return
+    lacking = f"cohort '{cohort.name}' has no bodies.csv"
+    if cohort.bodies is not None:
+        whole = cohort.bodies[cohort.bodies["ixx_kg_m2"].notna()]
+        given = set(zip(whole["specimen"], whole["vertebra"], strict=True))
+        missing = [
+            f"{vertebra} of {specimen}"
+            for specimen in cohort.specimen_names
+            for vertebra in cohort.vertebrae[1:]
+            if (specimen, vertebra) not in given
+        ]
+        if not missing:
+            return
+        lacking = f"no inertia in bodies.csv for {', '.join(missing[:5])}"
+    place = _at(document, "loading")
+    allowed = "equilibrium, or a cohort with masses and inertias of all moving vertebrae"
+    yield Problem(*place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in")
 
 
 def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:

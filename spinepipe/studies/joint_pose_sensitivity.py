@@ -79,7 +79,8 @@ class JointPoseSensitivity(Study):
     damping: Damping = Field(default_factory=Damping, description="viscous damping")
     loading: Literal["equilibrium", "settle"] = Field(
         default="equilibrium",
-        description="equilibrium: static; settle: the state a time after the load was applied",
+        description="how simulations are solved; equilibrium: static; settle: the state a time "
+        "after the load was applied. Stiffness is fitted to equilibria in either case",
     )
     settle_time_s: float = Field(
         default=1.5, gt=0, le=60, description="time after which a settling spine is read, s"

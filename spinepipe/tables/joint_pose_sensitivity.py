@@ -98,7 +98,7 @@ CALIBRATIONS = Table(
             for name in COORDINATES
         ),
         Column("cost", "number", "sum of weight times squared error", "mm2, deg2",
-               null="no fit was possible", low=0.0),
+               null="no stiffness was found", low=0.0),
         Column("degrees_of_freedom", "integer", "readings in the cost less unknowns"),
         Column("iterations", "integer", "iterations of the best start", low=0),
         Column("evaluations", "integer", "evaluations of all starts", low=0),

@@ -130,6 +130,13 @@ def test_cohort_that_does_not_serve_the_study(
     assert says in str(problems[0])
 
 
+def test_settling_needs_inertia_of_every_vertebra(tmp_path: Path) -> None:
+    """Specimen b of the small cohort has masses only."""
+    (problem,) = complaints(project(tmp_path, STUDY + "loading: settle\n"))
+    assert problem.column == "loading"
+    assert "no inertia in bodies.csv for L3 of b, L2 of b" in problem.found
+
+
 def test_settling_needs_masses(tmp_path: Path) -> None:
     weightless = swap("cohort.yaml", "gravity: true", "gravity: false")
     root = project(tmp_path, STUDY + "loading: settle\n", weightless, without("bodies.csv"))

@@ -1,0 +1,41 @@
+"""What the tables of a real run say must agree with one another."""
+
+import numpy as np
+import pandas as pd
+import pyarrow.dataset as ds
+import pytest
+from small_project import Project
+
+from spinepipe.units import COORDINATE_COLUMNS
+
+pytestmark = pytest.mark.slow
+
+
+def table(project: Project, name: str) -> pd.DataFrame:
+    return pd.read_parquet(project.path(f"results/small/{name}.parquet"))
+
+
+def test_errors_of_a_calibration_are_those_of_its_simulation(project: Project) -> None:
+    """The fit solves each pose from its neighbour, the simulation along the load path."""
+    simulated = table(project, "simulations")
+    simulated = simulated[simulated["stiffness"] == "calibrated"]
+    for _, row in table(project, "calibrations").iterrows():
+        own = simulated[simulated["pose"] == row["pose"]]
+        for column in COORDINATE_COLUMNS:
+            name, unit = column.rsplit("_", 1)
+            expected = own[f"error_{column}"].abs().mean()
+            np.testing.assert_allclose(row[f"{name}_error_{unit}"], expected, rtol=0, atol=1e-6)
+
+
+def test_no_number_is_nan_or_infinite(project: Project) -> None:
+    for name in ("landmarks", "poses", "calibrations", "simulations"):
+        for column in table(project, name).select_dtypes("number"):
+            values = ds.dataset(project.path(f"results/small/{name}.parquet")).to_table([column])
+            assert np.isfinite(values[column].drop_null().to_numpy()).all(), column
+
+
+def test_job_files_open_as_one_data_set(project: Project) -> None:
+    jobs = ds.dataset(project.path("results/small/jobs"), partitioning="hive").to_table()
+    rows = table(project, "simulations")
+    assert jobs.num_rows == len(rows)
+    assert set(jobs["pose"].to_pylist()) == set(rows["pose"])
