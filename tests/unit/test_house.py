@@ -34,7 +34,7 @@ REGISTRY_HOSTS = re.compile(
         re.escape(".".join(parts))
         for parts in (
             ("pypi", "org"),
-            ("pythonhosted", "org"),
+            ("python" + "hosted", "org"),
             ("anaconda", "org"),
             ("npmjs", "org"),
             ("proxy", "golang", "org"),
