@@ -102,7 +102,14 @@ def fit(
     identifiable_below : largest standard error of an unknown at which it still counts as
         identified: of its logarithm where it is logarithmic, else in prior SDs.
     noise : (6,) m and rad, SD of one reading; None takes it from the residuals.
+
+    Raises
+    ------
+    ValueError
+        For ``noise`` with a zeroed case: its errors are correlated, which is not covered.
     """
+    if noise is not None and any(case.zeroed for case in problem.cases):
+        raise ValueError("zeroed readings have correlated errors: noise cannot be given for them")
     evaluator = Evaluator(problem)
     problem = evaluator.problem
     optima: list[Optimum] = []

@@ -72,6 +72,13 @@ def test_a_zeroed_case_without_another_reading_is_refused() -> None:
         fit(problem(compression(0.0, 1.0), [0.0, np.nan], zeroed=True))
 
 
+def test_noise_of_zeroed_readings_is_refused() -> None:
+    """Zeroing correlates the errors of a cycle; independent ones would be too small."""
+    zeroed = problem(compression(0.0, 1.0), [0.0, -7.0], zeroed=True)
+    with pytest.raises(ValueError, match="correlated"):
+        fit(zeroed, noise=np.full(6, 1e-3))
+
+
 def test_settling_where_nothing_moves_ends_converged() -> None:
     model = joint()
     system = System(Chain(model), model, compression(0.0))
