@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, uncertainty
 from spinepipe.effects.contract import Array
-from spinepipe.statics import SolvedStep, Status
+from spinepipe.statics import SolvedStep, Status, moved
 
 MOST_EVALUATIONS = 200
 STIFFENING = 2.0
@@ -187,16 +187,14 @@ def _least_squares(
 ) -> Optimum:
     problem = evaluator.problem
     arrived: list[Optimum] = []
-    size = len(evaluator.coordinate)
-    seen: dict[bytes, Evaluation] = {}
+    nowhere = np.full(len(evaluator.coordinate), np.nan)
 
     def residual(x: Array) -> Array:
-        x = _on_bounds(problem, x)
-        seen[x.tobytes()] = here = evaluator.at(x)
-        return np.full(size, np.nan) if here.residual is None else here.residual
+        found = evaluator.at(_on_bounds(problem, x)).residual
+        return nowhere if found is None else found
 
     def jacobian(x: Array) -> Array:
-        found = seen[_on_bounds(problem, x).tobytes()].jacobian
+        found = evaluator.at(_on_bounds(problem, x)).jacobian
         assert found is not None
         return found
 
@@ -222,7 +220,7 @@ def _least_squares(
     if arrived:
         return replace(arrived[0], stiffened=stiffened)
     x = _on_bounds(problem, result.x)
-    at_bound, evaluation = _bounds_reached(problem, x), seen[x.tobytes()]
+    at_bound, evaluation = _bounds_reached(problem, x), evaluator.at(x)
     level = _stationary(problem, evaluation, at_bound)
     status, message = _verdict(problem, bool(result.success) or level, at_bound)
     if status.usable and not level:
@@ -288,13 +286,8 @@ def _verdict(problem: Problem, success: bool, at_bound: Array) -> tuple[Status, 
 
 def _values(problem: Problem, x: Array) -> Array:
     """(m,) value of each unknown's first row, SI."""
-    start = [problem.model.effects[p.effect].values[p.rows[0], p.column] for p in problem.free]
-    return np.array(
-        [
-            value * np.exp(change) if parameter.logarithmic else value + change
-            for parameter, value, change in zip(problem.free, start, x, strict=True)
-        ]
-    )
+    effects = moved(problem.model, problem.free, x).effects
+    return np.array([effects[p.effect].values[p.rows[0], p.column] for p in problem.free])
 
 
 def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_], scale: Array) -> int:

@@ -106,14 +106,22 @@ class Evaluator:
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         self._last: _Neighbour | None = None
+        self._known: dict[bytes, Evaluation] = {}
         self.evaluations = 0
 
     def forget(self) -> None:
-        """Solve the next point from the neutral pose, not from its neighbour."""
+        """Solve the next point from the neutral pose, not from its neighbour, nor recall it."""
         self._last = None
+        self._known.clear()
 
     def at(self, x: Array) -> Evaluation:
-        """Residuals and Jacobian with the unknowns moved by x (m,)."""
+        """Residuals and Jacobian with the unknowns moved by x (m,); known points are recalled."""
+        point = x.tobytes()
+        if point not in self._known:
+            self._known[point] = self._evaluate(x)
+        return self._known[point]
+
+    def _evaluate(self, x: Array) -> Evaluation:
         self.evaluations += 1
         model = moved(self.problem.model, self.problem.free, x)
         systems = [system.with_model(model) for system in self._systems]

@@ -28,9 +28,7 @@ def by_load(system: System, step: SolvedStep, slot: int) -> LoadSensitivity:
         When the step has no equilibrium, or the model has effects that may themselves depend on
         the listed loads: load effects, and path effects through earlier steps.
     """
-    factored = step.equilibrium.factored
-    if factored is None:
-        raise ValueError(f"step {step.step.step} has no equilibrium to differentiate")
+    factored = step.factored
     if system.load_effects or system.paths:
         raise ValueError("load sensitivities do not cover load effects and path effects")
     motion = ChainMotion(system.chain, step.equilibrium.q)

@@ -9,6 +9,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
 from spinepipe.statics.equilibrium import Equilibrium, solve
 from spinepipe.statics.holding import States
+from spinepipe.statics.linear import Factored
 from spinepipe.statics.loading import Loading
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import System
@@ -33,6 +34,19 @@ class SolvedStep:
     def usable(self) -> bool:
         """Whether the pose is an equilibrium."""
         return self.equilibrium.status.usable
+
+    @property
+    def factored(self) -> Factored:
+        """LU of the tangent at the pose.
+
+        Raises
+        ------
+        ValueError
+            When the step has no equilibrium.
+        """
+        if self.equilibrium.factored is None:
+            raise ValueError(f"step {self.step.step} has no equilibrium to differentiate")
+        return self.equilibrium.factored
 
 
 def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedStep]:

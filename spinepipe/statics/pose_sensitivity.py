@@ -32,9 +32,7 @@ def by_joint_pose(system: System, step: SolvedStep) -> Array:
         When the step has no equilibrium, or the model has effects whose own dependence on the
         joint poses is not known here: load effects and path effects.
     """
-    factored = step.equilibrium.factored
-    if factored is None:
-        raise ValueError(f"step {step.step.step} has no equilibrium to differentiate")
+    factored = step.factored
     if system.load_effects or system.paths:
         raise ValueError("joint-pose sensitivities do not cover load effects and path effects")
     motion = ChainMotion(system.chain, step.equilibrium.q)

@@ -27,10 +27,8 @@ def by_parameters(
     state_by_x = {index: np.zeros((*s.shape, len(free))) for index, s in starts.items()}
     result = []
     for step in solved:
-        if step.equilibrium.factored is None:
-            raise ValueError(f"step {step.step.step} has no equilibrium to differentiate")
         residual = residual_by_parameters(system, step, free, state_by_x)
-        dq = -step.equilibrium.factored.solve(residual)
+        dq = -step.factored.solve(residual)
         result.append(dq)
         state_by_x = _advance(system, step, free, dq, state_by_x)
     return result
