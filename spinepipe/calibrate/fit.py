@@ -11,9 +11,12 @@ from scipy.stats import qmc
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, uncertainty
 from spinepipe.effects.contract import Array
-from spinepipe.statics import SolvedStep, Status, moved
+from spinepipe.statics import Status, moved
 
 MOST_EVALUATIONS = 200
+LAST_STEP, LAST_SETTLING_STEP = 1e-7, 1e-4
+"""Relative step at which a fit has arrived; settling runs cost a hundred times as much."""
+
 STIFFENING = 2.0
 """Factor by which a start without a stable equilibrium is stiffened, again and again."""
 
@@ -70,7 +73,7 @@ class Fit:
     x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
     cost : sum of weight times squared error, mm2 and deg2.
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
-    cases, solved : the measured cases with the load steps that were needed, and their solutions.
+    cases : the measured cases with the load steps that were needed. poses : (T, n) of each.
     """
 
     x: Array
@@ -85,7 +88,7 @@ class Fit:
     n_optima: int
     stiffened: int
     cases: tuple[MeasuredCase, ...]
-    solved: tuple[tuple[SolvedStep, ...], ...]
+    poses: tuple[Array, ...]
 
 
 def fit(
@@ -130,7 +133,7 @@ def fit(
         n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
         cases=evaluator.problem.cases,
-        solved=best.evaluation.solved,
+        poses=best.evaluation.poses,
     )
 
 
@@ -212,7 +215,7 @@ def _least_squares(
         method="dogbox",
         x_scale=problem.scale,
         ftol=1e-11,
-        xtol=1e-7,
+        xtol=LAST_STEP if problem.course is None else LAST_SETTLING_STEP,
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
         callback=stop_where_known,
@@ -225,7 +228,8 @@ def _least_squares(
     status, message = _verdict(problem, bool(result.success) or level, at_bound)
     if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
-    if status.usable and not _on_load_path(evaluator, x, evaluation):
+    at_rest = problem.course is None
+    if at_rest and status.usable and not _on_load_path(evaluator, x, evaluation):
         status, message = Status.NOT_CONVERGED, OFF_THE_PATH
     return Optimum(
         x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened

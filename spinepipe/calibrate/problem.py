@@ -1,23 +1,21 @@
 """A calibration problem: a model, the tests it was measured in, and what may be moved to fit."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.calibrate.solvers import AtRest, Settling
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.statics import (
     Chain,
+    Course,
     FreeParameter,
-    SolvedStep,
     System,
-    by_parameters,
     declared,
-    follow,
     moved,
     observe,
     observed_by_parameters,
@@ -47,6 +45,8 @@ class Problem:
     Attributes
     ----------
     weights : (6,) cost weight of each coordinate on mm2 and deg2; zero leaves it out.
+    course : how loads come on in time when the pose is read while the spine still settles; None
+        for poses at rest.
     lower, upper : (m,) bounds of the unknowns, relative to the model's values (log or absolute).
     """
 
@@ -56,6 +56,7 @@ class Problem:
     weights: Array
     lower: Array
     upper: Array
+    course: Course | None = None
 
     @cached_property
     def scale(self) -> Array:
@@ -71,13 +72,12 @@ class Problem:
 class Evaluation:
     """Weighted residuals (N,) and Jacobian (N, m) at one point; None where it has no equilibrium.
 
-    ``solved`` holds the steps of every case, ``coordinate`` (N,) which of the six each residual
-    is of.
+    ``poses`` holds (T, n) of every case, ``coordinate`` (N,) which of the six each residual is of.
     """
 
     residual: Array | None
     jacobian: Array | None
-    solved: tuple[tuple[SolvedStep, ...], ...]
+    poses: tuple[Array, ...]
     coordinate: NDArray[np.int64]
     message: str = ""
 
@@ -105,13 +105,17 @@ class Evaluator:
         self._used = [_used(m, problem.weights) for m in problem.cases]
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
-        self._last: _Neighbour | None = None
+        self._solver: AtRest | Settling = (
+            Settling(problem.free, problem.course)
+            if problem.course
+            else AtRest(problem.free, problem.scale)
+        )
         self._known: dict[bytes, Evaluation] = {}
         self.evaluations = 0
 
     def forget(self) -> None:
         """Solve the next point from the neutral pose, not from its neighbour, nor recall it."""
-        self._last = None
+        self._solver.forget()
         self._known.clear()
 
     def at(self, x: Array) -> Evaluation:
@@ -125,25 +129,17 @@ class Evaluator:
         self.evaluations += 1
         model = moved(self.problem.model, self.problem.free, x)
         systems = [system.with_model(model) for system in self._systems]
-        guesses = self._last.guesses(x) if self._last else [None] * len(systems)
-        solved = tuple(
-            tuple(follow(system, guess)) for system, guess in zip(systems, guesses, strict=True)
-        )
-        failed = [step for case in solved for step in case if not step.usable]
-        if failed:
-            return Evaluation(None, None, solved, self.coordinate, failed[0].equilibrium.message)
-        poses = [[step.equilibrium.q for step in case] for case in solved]
-        free = self.problem.free
-        by_x = [by_parameters(s, c, free) for s, c in zip(systems, solved, strict=True)]
-        self._last = _Neighbour(x.copy(), self.problem.scale, poses, by_x)
+        solved = self._solver.solve(x, systems)
+        if isinstance(solved, str):
+            return Evaluation(None, None, (), self.coordinate, solved)
         numbers = range(len(systems))
-        residual = np.concatenate([self._residual(n, systems[n], poses[n]) for n in numbers])
+        residual = np.concatenate([self._residual(n, systems[n], solved.poses[n]) for n in numbers])
         jacobian = np.concatenate(
-            [self._jacobian(n, systems[n], poses[n], by_x[n]) for n in numbers]
+            [self._jacobian(n, systems[n], solved.poses[n], solved.by_x[n]) for n in numbers]
         )
-        return Evaluation(residual, jacobian, solved, self.coordinate)
+        return Evaluation(residual, jacobian, solved.poses, self.coordinate)
 
-    def _residual(self, number: int, system: System, poses: Sequence[Array]) -> Array:
+    def _residual(self, number: int, system: System, poses: Array) -> Array:
         """(N,) weighted residuals of the readings of one case that enter the cost."""
         measured = self.problem.cases[number]
         seen = np.stack([observe(system, q) for q in poses])
@@ -151,9 +147,7 @@ class Evaluator:
         error: Array = (seen - measured.measured) * self._scale
         return error[self._used[number]]
 
-    def _jacobian(
-        self, number: int, system: System, poses: Sequence[Array], by_x: Sequence[Array]
-    ) -> Array:
+    def _jacobian(self, number: int, system: System, poses: Array, by_x: Array) -> Array:
         """(N, m) derivative of the residuals of one case by the unknowns."""
         seen = np.stack(
             [
@@ -163,27 +157,6 @@ class Evaluator:
         )
         seen = seen - seen[0] if self.problem.cases[number].zeroed else seen
         return (seen * self._scale[:, None])[self._used[number]]
-
-
-@dataclass(frozen=True)
-class _Neighbour:
-    """The last solved point: poses (n,) and their derivatives (n, m) by case and step.
-
-    ``reach`` (m,) is how far first order is trusted.
-    """
-
-    x: Array
-    reach: Array
-    poses: list[list[Array]]
-    by_x: list[list[Array]]
-
-    def guesses(self, x: Array) -> list[list[Array]]:
-        """Poses to start from at another point, to first order."""
-        change = np.clip(x - self.x, -self.reach, self.reach)
-        return [
-            [q + dq @ change for q, dq in zip(case, by_x, strict=True)]
-            for case, by_x in zip(self.poses, self.by_x, strict=True)
-        ]
 
 
 def _within_declared(problem: Problem) -> Problem:

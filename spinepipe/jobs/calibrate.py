@@ -1,6 +1,5 @@
 """Job: stiffness of one specimen with one sampled joint pose."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from spinepipe.jobs.inputs import (
 )
 from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics import SolvedStep, Status, free_parameters, moved
+from spinepipe.statics import Status, free_parameters, moved
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.tables import CALIBRATIONS, to_arrow, write
 from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
@@ -133,8 +132,8 @@ def _errors(found: Fit) -> dict[str, Any]:
         return nothing
     errors = np.concatenate(
         [
-            _predicted(measured, steps) - _readings(measured)
-            for steps, measured in zip(found.solved, found.cases, strict=True)
+            _predicted(measured, poses) - _readings(measured)
+            for poses, measured in zip(found.poses, found.cases, strict=True)
         ]
     )
     size: Array = np.abs(errors.reshape(-1, 6)) * BORDER_PER_SI
@@ -152,9 +151,9 @@ def _readings(measured: MeasuredCase) -> Array:
     return readings
 
 
-def _predicted(measured: MeasuredCase, steps: Sequence[SolvedStep]) -> Array:
+def _predicted(measured: MeasuredCase, poses: Array) -> Array:
     """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
-    q = np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps])
+    q = poses.reshape(len(poses), -1, 6)
     return q - q[0] if measured.zeroed else q
 
 

@@ -6,8 +6,10 @@ from spinepipe.statics.load_sensitivity import LoadSensitivity, by_load
 from spinepipe.statics.loading import Loading, Slots
 from spinepipe.statics.path import SolvedStep, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
+from spinepipe.statics.program import Course, Program
 from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
-from spinepipe.statics.settling import Program, Settled, settle
+from spinepipe.statics.settling import Settled, settle
+from spinepipe.statics.settling_sensitivity import settled_by_parameters
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import Balance, System
 from spinepipe.world import Chain
@@ -15,6 +17,7 @@ from spinepipe.world import Chain
 __all__ = [
     "Balance",
     "Chain",
+    "Course",
     "Equilibrium",
     "FreeParameter",
     "LoadSensitivity",
@@ -35,4 +38,5 @@ __all__ = [
     "observe",
     "observed_by_parameters",
     "settle",
+    "settled_by_parameters",
 ]

@@ -15,7 +15,8 @@ from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 from spinepipe.effects.contract import Array
 from spinepipe.statics.equilibrium import LARGEST_ROTATION, solve
 from spinepipe.statics.holding import NO_STATES
-from spinepipe.statics.loading import Loading
+from spinepipe.statics.motion import ChainMotion
+from spinepipe.statics.program import Program
 from spinepipe.statics.rosenbrock import (
     ALPHA,
     COUPLING,
@@ -35,38 +36,7 @@ RELATIVE_TOLERANCE = 4e-5
 ABSOLUTE_TOLERANCE = np.array([4e-9] * 3 + [4e-7] * 3)
 """m and rad per step; keeps the trajectory within 0.1 % of its peak."""
 
-_WEIGHTLESS = np.zeros(3)  # weight is part of the residual
-
-
-@dataclass(frozen=True)
-class Program:
-    """Loadings at times, straight lines in between, the last one held.
-
-    Attributes
-    ----------
-    times : (T,) s, increasing, first 0.
-    """
-
-    times: tuple[float, ...]
-    loadings: tuple[Loading, ...]
-
-    @classmethod
-    def constant(cls, loading: Loading) -> "Program":
-        """The loading switched on at time zero and held."""
-        return cls((0.0,), (loading,))
-
-    def at(self, time: float) -> Loading:
-        """Loading at a time in s."""
-        later = int(np.searchsorted(self.times, time, side="right"))
-        if later == len(self.times):
-            return self.loadings[-1]
-        start, end = self.times[later - 1], self.times[later]
-        fraction = (time - start) / (end - start)
-        return self.loadings[later - 1].towards(self.loadings[later], fraction)
-
-    def corner_after(self, time: float) -> float:
-        """The next time at which the load changes its rate; infinity after the last."""
-        return next((t for t in self.times if t > time * (1.0 + 1e-12) + 1e-15), np.inf)
+_WEIGHTLESS = np.zeros(3)  # where weight is part of the residual
 
 
 @dataclass(frozen=True)
@@ -78,6 +48,7 @@ class Settled:
     q, rate : (n,) pose and rate at the end.
     history : (len(times), n) poses at asked times, NaN where the run did not get there.
     remaining : (n,) equilibrium pose less end pose, or None when there is no equilibrium.
+    sizes : s, the steps of time that were taken.
     """
 
     q: Array
@@ -86,7 +57,7 @@ class Settled:
     remaining: Array | None
     status: Status
     message: str
-    steps: int
+    sizes: tuple[float, ...]
 
 
 def settle(
@@ -100,7 +71,7 @@ def settle(
     if refusal:
         nothing = np.zeros(system.chain.n)
         history = np.full((len(times), system.chain.n), np.nan)
-        return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, 0)
+        return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, ())
     run = _Run(system, program)
     history = run.to(duration, times)
     final = program.at(duration)
@@ -110,7 +81,20 @@ def settle(
     status, message = run.status, run.message
     if status.usable and not reachable:
         status, message = Status.UNSTABLE, f"moving away: {equilibrium.message}"
-    return Settled(run.q, run.rate, history, remaining, status, message, run.steps)
+    return Settled(run.q, run.rate, history, remaining, status, message, tuple(run.sizes))
+
+
+def retrace(system: System, program: Program, sizes: Sequence[float]) -> Array | None:
+    """(n,) end pose after the very steps of another run, or None when they do not lead there.
+
+    Steps of fixed size make the end a smooth function of the model, which it is not where each
+    run chooses its own: the way to its derivative (internal numerical differentiation, Bock 1981).
+    """
+    run = _Run(system, program)
+    for size in sizes:
+        if not run.take(size):
+            return None
+    return run.q
 
 
 def _refusal(system: System) -> str | None:
@@ -129,7 +113,8 @@ class _Run:
         self.system, self.program = system, program
         self.q, self.rate = np.zeros((2, system.chain.n))
         self.damping = system.model.damping.ravel()
-        self.time, self.size, self.steps = 0.0, FIRST_STEP_S, 0
+        self.time, self.size, self.tries = 0.0, FIRST_STEP_S, 0
+        self.sizes: list[float] = []
         self.status, self.message = Status.CONVERGED, ""
         self.tolerance = np.tile(ABSOLUTE_TOLERANCE, system.model.n_joints)
 
@@ -148,8 +133,8 @@ class _Run:
     def _advance(self, limit: float) -> bool:
         """One accepted step, not beyond the limit."""
         while True:
-            self.steps += 1
-            if self.steps > MOST_STEPS:
+            self.tries += 1
+            if self.tries > MOST_STEPS:
                 return self._stop(Status.NOT_CONVERGED, f"not there after {MOST_STEPS} steps")
             if self.size < SMALLEST_STEP_S:
                 return self._stop(Status.NOT_CONVERGED, "the step size went to zero")
@@ -158,10 +143,22 @@ class _Run:
             accepted = bool(np.isfinite(error)) and error <= 1.0
             growth = 0.9 * max(error, 1e-3) ** (-1.0 / 3.0) if np.isfinite(error) else 0.2
             if accepted:
-                self.q, self.rate, self.time = q, rate, self.time + size
+                self._arrive(q, rate, size)
             self.size = size * float(np.clip(growth, 0.2, 6.0))
             if accepted:
                 return self._within_motion()
+
+    def take(self, size: float) -> bool:
+        """One step of that size, whatever its error."""
+        q, rate, error = self._try(size)
+        if not np.isfinite(error):
+            return self._stop(Status.NOT_CONVERGED, "the step leads nowhere")
+        self._arrive(q, rate, size)
+        return self._within_motion()
+
+    def _arrive(self, q: Array, rate: Array, size: float) -> None:
+        self.q, self.rate, self.time = q, rate, self.time + size
+        self.sizes.append(size)
 
     def _within_motion(self) -> bool:
         if np.abs(self.q.reshape(-1, 6)[:, 3:]).max() < LARGEST_ROTATION:
@@ -209,8 +206,11 @@ class _Run:
 
     def _later_force(self, q: Array, rate: Array, time: float, mass: Array) -> Array:
         """The force of a later stage, for the mass matrix at the step's start: M0 M^-1 F."""
-        force = self._force(q, rate, self.system.residual(q, self.program.at(time), NO_STATES))
-        lower, _ = dpotrf(self.system.chain.mass_matrix(q), lower=True)
+        system, loading = self.system, self.program.at(time)
+        residual = system.weightless_residual(ChainMotion(system.chain, q), loading, NO_STATES)
+        weight_and_inertia = system.chain.bias(q, rate, loading.share * system.model.gravity)
+        force = -residual - weight_and_inertia - self.damping * rate
+        lower, _ = dpotrf(system.chain.mass_matrix(q), lower=True)
         acceleration, _ = dpotrs(lower, force, lower=True)
         return mass @ acceleration
 

@@ -144,7 +144,13 @@ class System:
     def residual(self, q: Array, loading: Loading, states: States) -> Array:
         """Residual alone at q (n,), at half the price of a balance."""
         motion = ChainMotion(self.chain, q)
-        applied = self._applied(motion, loading, self._slot_velocities(motion, loading))
+        weightless = self.weightless_residual(motion, loading, states)
+        return weightless - self._weight(motion, loading) if self._heavy else weightless
+
+    def weightless_residual(self, motion: ChainMotion, loading: Loading, states: States) -> Array:
+        """Residual (n,) but for the weight, for callers that get it with the inertial loads."""
+        q = motion.q
+        applied = self._wrenches(motion, loading, self._slot_velocities(motion, loading))
         for active in self.load_effects:
             applied += loading.share * self._effect(active, motion, loading).load
         return self._hold(q, states).load.ravel() - applied
@@ -158,13 +164,15 @@ class System:
             )
         ]
 
-    def _applied(
+    def _weight(self, motion: ChainMotion, loading: Loading) -> Array:
+        """(n,) generalised load of the weight."""
+        return motion.mass_velocity @ (loading.share * self.model.gravity)
+
+    def _wrenches(
         self, motion: ChainMotion, loading: Loading, velocities: list[Array | None]
     ) -> Array:
-        """(n,) generalised load of weight and wrenches."""
+        """(n,) generalised load of the wrenches."""
         load = np.zeros(self.chain.n)
-        if self._heavy:
-            load += motion.mass_velocity @ (loading.share * self.model.gravity)
         for slot, (body, _) in enumerate(self.slots.places):
             velocity, moment = velocities[slot], loading.moments[slot]
             if velocity is not None:
@@ -176,11 +184,12 @@ class System:
     def _apply(self, motion: ChainMotion, loading: Loading) -> tuple[Array, Array]:
         """Generalised applied load (n,) and its tangent (n, n)."""
         velocities = self._slot_velocities(motion, loading)
-        load = self._applied(motion, loading, velocities)
+        load = self._wrenches(motion, loading, velocities)
         forces = np.zeros((self.chain.n, self.chain.n))
         moments = np.zeros_like(forces)
         axes = motion.axes
         if self._heavy:
+            load += self._weight(motion, loading)
             weight = cross_matrix(loading.share * self.model.gravity)
             forces += (axes @ weight.T) @ motion.mass_velocity.T
         for slot, (body, _) in enumerate(self.slots.places):

@@ -339,7 +339,7 @@ def test_unread_steps_and_unweighted_readings_change_nothing() -> None:
     found = fit(replace(problem, cases=(replace(problem.cases[0], measured=measured),),
                         weights=weights))  # fmt: skip
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=1e-6)
-    assert len(found.solved[0]) == len(found.cases[0].case.steps) == 2
+    assert len(found.poses[0]) == len(found.cases[0].case.steps) == 2
     np.testing.assert_array_equal(found.cases[0].measured, measured[[0, 2]])
 
 
@@ -351,7 +351,7 @@ def test_steps_on_the_way_are_kept_for_path_effects() -> None:
     measured[:2] = np.nan
     found = fit(replace(problem, cases=(replace(problem.cases[0], measured=measured),)))
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=1e-6)
-    assert len(found.solved[0]) == 3
+    assert len(found.poses[0]) == 3
 
 
 def test_zeroed_measurements_are_met_by_zeroed_predictions() -> None:
