@@ -4,24 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
-from spinepipe.cohort.specimen import in_frames
+from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.designs import specimen_seed
-from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose
-from spinepipe.jobs.inputs import (
-    bushing_model,
-    sampled_poses,
-    specimen_inputs,
-    start_stiffness,
-    study_and_cohort,
-)
+from spinepipe.jobs.inputs import sampled_poses, study_and_cohort
+from spinepipe.jobs.problem import absolute_errors, calibration_problem
 from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics import Status, free_parameters, moved
+from spinepipe.statics import Status, moved
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.tables import CALIBRATIONS, to_arrow, write
-from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
 
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
@@ -40,31 +32,13 @@ def _rows(
     if frames is None:
         return [_refused(specimen, pose, reason)]
     try:
-        problem = _problem(root, settings, specimen, frames)
+        problem = calibration_problem(root, settings, specimen, frames)
         seed = specimen_seed(settings.seed, f"{specimen}/{pose}")
         options = settings.calibration
         found = fit(problem, options.starts, seed, options.identifiable_below)
     except RefusedModel as error:
         return [_refused(specimen, pose, str(error))]
     return _fitted(settings, specimen, pose, problem, found)
-
-
-def _problem(
-    root: str, settings: JointPoseSensitivity, specimen: str, frames: tuple[Pose, ...]
-) -> Problem:
-    _, cohort = study_and_cohort(root, settings.study)
-    inputs = specimen_inputs(root, settings.study, specimen, cohort.digest)
-    model = bushing_model(settings, cohort, specimen, frames, start_stiffness(settings))
-    options = settings.calibration
-    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
-    free = free_parameters(model, 0, names, options.grouping)
-    reach = np.full(len(free), np.log(options.bound_factor))
-    cases = tuple(
-        MeasuredCase(case, in_frames(motion, inputs.nominal, frames).q, cohort.zeroed_at_step_0)
-        for case, motion in zip(inputs.cases, inputs.motions, strict=True)
-    )
-    weights = np.array(options.weights.in_order(), dtype=float)
-    return Problem(model, cases, free, weights, -reach, reach)
 
 
 def _fitted(
@@ -127,34 +101,11 @@ def _stiffness(
 
 def _errors(found: Fit) -> dict[str, Any]:
     """Mean absolute error per coordinate over all measured readings, mm and deg."""
-    nothing = {_error_column(name): None for name in COORDINATE_COLUMNS}
-    if not found.status.usable:
-        return nothing
-    errors = np.concatenate(
-        [
-            _predicted(measured, poses) - _readings(measured)
-            for poses, measured in zip(found.poses, found.cases, strict=True)
-        ]
-    )
-    size: Array = np.abs(errors.reshape(-1, 6)) * BORDER_PER_SI
+    size = absolute_errors(found).reshape(-1, 6)
     return {
         _error_column(name): float(np.nanmean(column)) if np.isfinite(column).any() else None
         for name, column in zip(COORDINATE_COLUMNS, size.T, strict=True)
     }
-
-
-def _readings(measured: MeasuredCase) -> Array:
-    """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
-    readings = measured.measured.copy()
-    if measured.zeroed:
-        readings[0] = np.nan
-    return readings
-
-
-def _predicted(measured: MeasuredCase, poses: Array) -> Array:
-    """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
-    q = poses.reshape(len(poses), -1, 6)
-    return q - q[0] if measured.zeroed else q
 
 
 def _error_column(column: str) -> str:

@@ -5,24 +5,26 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
 from spinepipe.studies.coordinates import FORM, Coordinate, Damping, Shift, Stiffness, Weights
+from spinepipe.studies.identification import (
+    DampingBootstrap,
+    Dynamic,
+    LandmarkPrecision,
+    Methods,
+    StartBootstrap,
+    Success,
+    distinct,
+)
 from spinepipe.studies.study import Study
 
 __all__ = ["Calibration", "JointPoseSensitivity"]
 
 
-def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
-    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
-    if twice:
-        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
-    return names
-
-
 _TestName = Annotated[str, StringConstraints(min_length=1)]
 _Tests = Annotated[
-    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(_distinct)
+    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
 _Coordinates = Annotated[
-    tuple[Coordinate, ...], Field(strict=False, min_length=1), AfterValidator(_distinct)
+    tuple[Coordinate, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
 
 
@@ -93,5 +95,22 @@ class JointPoseSensitivity(Study):
         ge=1,
         le=99,
         description="best stiffnesses of a specimen that all its poses are run with",
+    )
+    success: Success = Field(default_factory=Success, description="which fits count")
+    start_bootstrap: StartBootstrap = Field(
+        default_factory=StartBootstrap, description="fits from sampled start values"
+    )
+    damping_bootstrap: DampingBootstrap = Field(
+        default_factory=DampingBootstrap, description="fits with sampled damping"
+    )
+    dynamic: Dynamic = Field(default_factory=Dynamic, description="dynamic loading of bootstraps")
+    methods: Methods = Field(
+        default_factory=Methods, description="fits in the published way, for comparison"
+    )
+    landmark_precision: LandmarkPrecision = Field(
+        default_factory=LandmarkPrecision, description="errors over landmark SD"
+    )
+    significance: float = Field(
+        default=0.05, gt=0, lt=1, description="p-values below this are called significant"
     )
     block: int = Field(default=25, ge=1, le=1000, description="poses per summary table")

@@ -137,5 +137,3 @@ SIMULATIONS = Table(
         MESSAGE,
     ),
 )  # fmt: skip
-
-TABLES = {table.name: table for table in (LANDMARKS, POSES, CALIBRATIONS, SIMULATIONS)}

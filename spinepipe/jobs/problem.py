@@ -1,0 +1,83 @@
+"""The calibration problem of a study in given joint frames, and the errors a fit of it leaves."""
+
+import numpy as np
+
+from spinepipe.calibrate import Fit, MeasuredCase, Problem
+from spinepipe.cohort.specimen import in_frames
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.jobs.inputs import (
+    bushing_model,
+    specimen_inputs,
+    start_stiffness,
+    study_and_cohort,
+)
+from spinepipe.statics import free_parameters
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.units import BORDER_PER_SI, COORDINATES, STIFFNESS_COLUMNS
+
+
+def calibration_problem(
+    root: str,
+    settings: JointPoseSensitivity,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array | None = None,
+) -> Problem:
+    """What is fitted for a specimen with these joint frames.
+
+    Parameters
+    ----------
+    stiffness : (6,) or (J, 6) SI to start from; None: the study's.
+
+    Raises
+    ------
+    RefusedModel
+        When the frames and loads make no model.
+    """
+    _, cohort = study_and_cohort(root, settings.study)
+    inputs = specimen_inputs(root, settings.study, specimen, cohort.digest)
+    start = start_stiffness(settings) if stiffness is None else stiffness
+    model = bushing_model(settings, cohort, specimen, frames, start)
+    options = settings.calibration
+    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
+    free = free_parameters(model, 0, names, options.grouping)
+    reach = np.full(len(free), np.log(options.bound_factor))
+    cases = tuple(
+        MeasuredCase(case, in_frames(motion, inputs.nominal, frames).q, cohort.zeroed_at_step_0)
+        for case, motion in zip(inputs.cases, inputs.motions, strict=True)
+    )
+    weights = np.array(options.weights.in_order(), dtype=float)
+    return Problem(model, cases, free, weights, -reach, reach)
+
+
+def absolute_errors(found: Fit) -> Array:
+    """(R, J, 6) absolute error of every reading of a fit, mm and deg; NaN where not measured.
+
+    All NaN when there is no fit. R counts the load steps of all tests and cycles.
+    """
+    size = np.concatenate([np.full_like(case.measured, np.nan) for case in found.cases])
+    if not found.status.usable:
+        return size
+    error = np.concatenate(
+        [
+            _predicted(case, poses) - _readings(case)
+            for poses, case in zip(found.poses, found.cases, strict=True)
+        ]
+    )
+    absolute: Array = np.abs(error) * BORDER_PER_SI
+    return absolute
+
+
+def _readings(measured: MeasuredCase) -> Array:
+    """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
+    readings = measured.measured.copy()
+    if measured.zeroed:
+        readings[0] = np.nan
+    return readings
+
+
+def _predicted(measured: MeasuredCase, poses: Array) -> Array:
+    """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
+    q = poses.reshape(len(poses), -1, 6)
+    return q - q[0] if measured.zeroed else q

@@ -1,0 +1,142 @@
+"""Parts of a joint-pose study beyond its poses: filters, bootstraps, methods, precision."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, Field
+
+from spinepipe.anatomy import published
+from spinepipe.studies.coordinates import FORM, Stiffness
+
+_BOX = published("gould_2024a")["start_stiffness_box"]
+
+
+def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names as they are.
+
+    Raises
+    ------
+    ValueError
+        For a name that stands there twice.
+    """
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
+    return names
+
+
+_Loading = Literal["equilibrium", "quasi_static", "dynamic"]
+_Loadings = Annotated[
+    tuple[_Loading, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
+]
+_ALL_LOADINGS: tuple[_Loading, ...] = ("equilibrium", "quasi_static", "dynamic")
+_Millimetres = Annotated[float, Field(gt=0, le=20)]
+_SDs = Annotated[tuple[_Millimetres, ...], Field(strict=False, min_length=1)]
+
+
+class Success(BaseModel):
+    """Filters of the published study; what they leave is the reduced dataset."""
+
+    model_config = FORM
+
+    near_start_percent: float = Field(
+        default=1.0,
+        ge=0,
+        lt=100,
+        description="a stiffness this close to its start or closer counts as not moved, percent",
+    )
+    failed_when: Literal["all", "any"] = Field(
+        default="all",
+        description="a fit has failed when all its free stiffnesses have not moved, or any of them",
+    )
+    outlier_times_start: float = Field(
+        default=10.0,
+        gt=1,
+        description="a fit with a free stiffness of this many times its start is an outlier",
+    )
+
+
+class Bootstrap(BaseModel):
+    """Fits in the cohort's own joint poses, from sampled starts or with sampled damping."""
+
+    model_config = FORM
+
+    sets: int = Field(default=100, ge=0, le=1000, description="sampled sets; 0 leaves it out")
+    loadings: _Loadings = Field(
+        default=_ALL_LOADINGS,
+        description="ways of loading each set is fitted under; quasi_static and dynamic need "
+        "masses and inertias",
+    )
+
+
+class StartBootstrap(Bootstrap):
+    """Does the start decide about the fitted stiffness?"""
+
+    lowest: Stiffness = Field(
+        default_factory=lambda: Stiffness(**_BOX["low"]),
+        description="smallest sampled stiffness (Gould 2024a, Table 1)",
+    )
+    highest: Stiffness = Field(
+        default_factory=lambda: Stiffness(**_BOX["high"]),
+        description="largest sampled stiffness (Gould 2024a, Table 1)",
+    )
+
+
+class DampingBootstrap(Bootstrap):
+    """Does damping decide about the fitted stiffness?"""
+
+    sets: int = Field(default=10, ge=0, le=1000, description="sampled sets; 0 leaves it out")
+    factor: float = Field(
+        default=10.0,
+        gt=1,
+        le=1e4,
+        description="damping is drawn between damping / factor and damping x factor",
+    )
+
+
+class Dynamic(BaseModel):
+    """Loads that grow in time."""
+
+    model_config = FORM
+
+    ramp_s: float = Field(
+        default=1.0, gt=0, le=60, description="time in which the load grows; then motion is read"
+    )
+    steps_per_s: float = Field(
+        default=25.0, gt=0, le=1000, description="times per second at which the load is given"
+    )
+
+
+class Methods(BaseModel):
+    """The same fits by forward runs with derivatives by differences, as published."""
+
+    model_config = FORM
+
+    poses: int = Field(default=12, ge=0, le=1000, description="poses fitted; 0 leaves it out")
+    sane_step: float = Field(
+        default=1e-3, gt=0, lt=1, description="relative difference step chosen with care"
+    )
+    accuracy: float = Field(
+        default=1e-5, gt=0, lt=1, description="relative accuracy asked of the forward run"
+    )
+
+
+class LandmarkPrecision(BaseModel):
+    """How precise must landmarks be for errors below a limit?"""
+
+    model_config = FORM
+
+    sd_mm: _SDs = Field(
+        default=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0), description="sampled SDs of all landmarks, mm"
+    )
+    poses: int = Field(
+        default=60, ge=0, le=10000, description="poses sampled for each SD; 0 leaves it out"
+    )
+    translation_limit_mm: float = Field(
+        default=1.0, gt=0, le=100, description="limit of translation errors, mm"
+    )
+    rotation_limit_deg: float = Field(
+        default=1.0, gt=0, le=100, description="limit of rotation errors, degrees"
+    )
+    share: float = Field(
+        default=0.95, gt=0, lt=1, description="share of poses that must stay below the limits"
+    )

@@ -1,0 +1,129 @@
+"""Tables of tests, shares and agreement, the same for every kind of study."""
+
+from spinepipe.tables.columns import MESSAGE, SPECIMEN
+from spinepipe.tables.schema import Column, Table
+
+NO_RESULT = "there is no result, see status"
+ENDED = Column(
+    "status",
+    "text",
+    "whether there is a result; constant: nothing varies; too_few: too little data",
+    allowed=("done", "constant", "too_few"),
+)
+JOINT_OR_ALL = Column("joint", "text", "joint, or * for all joints together")
+
+
+def _p(name: str, meaning: str) -> Column:
+    return Column(name, "number", meaning, null=NO_RESULT, low=0.0, high=1.0)
+
+
+STATISTICS = Table(
+    "statistics",
+    "Tests of significance: one row per test. A family is what is corrected for together.",
+    ("specimen", "family", "test", "joint", "response", "factor", "stratum"),
+    (
+        SPECIMEN,
+        Column("family", "text", "tests that are corrected together"),
+        Column("test", "text", "name of the test"),
+        JOINT_OR_ALL,
+        Column("response", "text", "what is tested, such as extension_error"),
+        Column("factor", "text", "what it is tested against; empty where there is nothing"),
+        Column("stratum", "text", "what was held fixed, a stiffness set or a pose; or empty"),
+        Column("n", "integer", "observations, or blocks of a Friedman test", low=0),
+        Column("statistic_name", "text", "what the statistic is called"),
+        Column("statistic", "number", "value of the statistic", null=NO_RESULT),
+        Column("effect_name", "text", "what the effect size is called"),
+        Column("effect", "number", "effect size", null=NO_RESULT),
+        _p("p", "p-value, uncorrected"),
+        _p("p_bonferroni", "p-value times the size of the family"),
+        _p("p_holm", "p-value corrected by Holm's method, never larger than Bonferroni's"),
+        Column("family_size", "integer", "tests of the family that have a p-value", low=0),
+        ENDED,
+        MESSAGE,
+    ),
+)
+
+_LIMITS = "mm or deg, see unit"
+
+
+def _agreement(name: str, meaning: str) -> Column:
+    return Column(name, "number", meaning, _LIMITS, null=NO_RESULT)
+
+
+AGREEMENT = Table(
+    "agreement",
+    "Predicted against measured motion after Bland and Altman: one row per dataset, joint and "
+    "coordinate. Differences are predicted less measured.",
+    ("specimen", "dataset", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        Column("dataset", "text", "poses it is made of"),
+        JOINT_OR_ALL,
+        Column("coordinate", "text", "coordinate"),
+        Column("unit", "text", "unit of the differences", allowed=("mm", "deg")),
+        Column("n", "integer", "pairs of readings", low=0),
+        _agreement("bias", "mean difference"),
+        _agreement("bias_low", "lower end of the 95 % interval of the bias"),
+        _agreement("bias_high", "upper end of the 95 % interval of the bias"),
+        _agreement("sd", "standard deviation of the differences"),
+        _agreement("lower_limit", "lower limit of agreement, bias less 1.96 SD"),
+        _agreement("upper_limit", "upper limit of agreement, bias plus 1.96 SD"),
+        _agreement("lower_limit_low", "lower end of the 95 % interval of the lower limit"),
+        _agreement("upper_limit_high", "upper end of the 95 % interval of the upper limit"),
+        Column("proportional_rho", "number",
+               "Spearman's correlation of difference and mean: bias that grows with motion",
+               null=NO_RESULT, low=-1.0, high=1.0),
+        _p("proportional_p", "its p-value, uncorrected"),
+        ENDED,
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+
+def _share(name: str, meaning: str) -> Column:
+    return Column(name, "number", meaning, null=NO_RESULT, low=0.0, high=1.0)
+
+
+VARIANCE_SHARES = Table(
+    "variance_shares",
+    "Joint pose against stiffness: shares of the variance of each error over the grid of all "
+    "reduced poses and best stiffness sets, with 95 % intervals.",
+    ("specimen", "joint", "coordinate", "factor"),
+    (
+        SPECIMEN,
+        Column("joint", "text", "joint"),
+        Column("coordinate", "text", "coordinate whose absolute error is decomposed"),
+        Column("factor", "text", "what the share belongs to",
+               allowed=("pose", "stiffness", "interaction")),
+        _share("share", "share of the variance"),
+        _share("share_low", "lower end of its 95 % interval"),
+        _share("share_high", "upper end of its 95 % interval"),
+        _share("total", "share with the interaction added: what fixing all else would leave"),
+        Column("n_poses", "integer", "joint poses in the grid", low=0),
+        Column("n_stiffness", "integer", "stiffness sets in the grid", low=0),
+        ENDED,
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+IMPORTANCE = Table(
+    "importance",
+    "Regression tree of each error on joint pose and stiffness: share of the squared error that "
+    "splits on a predictor remove. The shares of a tree sum to one.",
+    ("specimen", "joint", "coordinate", "predictor"),
+    (
+        SPECIMEN,
+        Column("joint", "text", "joint whose error is explained"),
+        Column("coordinate", "text", "coordinate whose absolute error is explained"),
+        Column("predictor", "text", "predictor, such as L2L3_extension_orientation"),
+        Column("factor", "text", "what the predictor belongs to", allowed=("pose", "stiffness")),
+        _share("importance", "share of this predictor among all splits"),
+        Column("leaves", "integer", "leaves of the pruned tree; 1: nothing is explained",
+               null=NO_RESULT, low=1),
+        Column("r2", "number", "share of the variance explained, cross-validated", null=NO_RESULT,
+               high=1.0),
+        Column("n", "integer", "rows the tree was grown on", low=0),
+        ENDED,
+        MESSAGE,
+    ),
+)  # fmt: skip
