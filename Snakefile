@@ -20,11 +20,17 @@ wildcard_constraints:
     specimen="[^/=]+",
     pose="[0-9]{4,5}",
     stiffness="calibrated|best[0-9]{2}",
-    table="calibrations|simulations",
+    table="calibrations|simulations|bootstrap|method_fits|precision_errors",
+    bootstrap="start|damping",
+    loading="equilibrium|quasi_static|dynamic",
+    set="[0-9]{3,4}",
+    method="|".join(METHODS),
+    sd_mm="[0-9.e+-]+",
     block="[0-9]{3,5}",
 
 
 include: "workflow/rules/joint_pose_sensitivity.smk"
+include: "workflow/rules/identification.smk"
 
 
 rule all:

@@ -47,3 +47,26 @@ def sample_landmarks(
         points.ravel(), np.repeat(sds, 3), n, specimen_seed(seed, specimen)
     )
     return flat.reshape(n, *points.shape), range(n)
+
+
+def sample_log_uniform(lowest: Array, highest: Array, n: int, seed: int) -> Array:
+    """(n, D) Latin hypercube, each coordinate uniform on a logarithmic scale between its ends.
+
+    A coordinate whose ends are equal stays there.
+
+    Raises
+    ------
+    ValueError
+        For an end that is not positive, ends the wrong way round, or fewer than two points.
+    """
+    lowest, highest = np.asarray(lowest, dtype=float), np.asarray(highest, dtype=float)
+    if n < 2 or not np.all((lowest > 0.0) & (lowest <= highest)):
+        raise ValueError("a log-uniform sample needs positive ends in order and at least 2 points")
+    problem = {
+        "num_vars": len(lowest),
+        "names": [f"x{index}" for index in range(len(lowest))],
+        "bounds": [[0.0, 1.0]] * len(lowest),
+    }
+    share = latin.sample(problem, n, seed=seed)
+    points: Array = lowest * (highest / lowest) ** share
+    return points

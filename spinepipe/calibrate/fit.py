@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import Status, moved
 
 MOST_EVALUATIONS = 200
-LAST_STEP, LAST_SETTLING_STEP = 1e-7, 1e-4
+LAST_STEP, LAST_SETTLING_STEP = 1e-7, 1e-3
 """Relative step at which a fit has arrived; settling runs cost a hundred times as much."""
 
 STIFFENING = 2.0
@@ -73,7 +73,8 @@ class Fit:
     x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
     cost : sum of weight times squared error, mm2 and deg2.
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
-    cases : the measured cases with the load steps that were needed. poses : (T, n) of each.
+    cases : the measured cases with the load steps that were needed. poses : (T, n) of each,
+        nothing where there is no usable pose.
     """
 
     x: Array
@@ -133,7 +134,7 @@ def fit(
         n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
         cases=evaluator.problem.cases,
-        poses=best.evaluation.poses,
+        poses=best.evaluation.poses if best.status.usable else (),
     )
 
 

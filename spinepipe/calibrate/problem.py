@@ -17,6 +17,7 @@ from spinepipe.statics import (
     System,
     declared,
     moved,
+    no_settling,
     observe,
     observed_by_parameters,
 )
@@ -91,7 +92,8 @@ class Evaluator:
         Raises
         ------
         RefusedModel
-            When nothing that was measured has a weight, or the engine refuses the model.
+            When nothing that was measured has a weight, or the engine refuses the model, or a
+            course is asked of a model that cannot move in time.
         """
         cases = (_needed(problem, case) for case in problem.cases)
         problem = replace(
@@ -102,6 +104,9 @@ class Evaluator:
         self.problem = _within_declared(problem)
         chain = Chain(problem.model)
         self._systems = [System(chain, problem.model, m.case) for m in problem.cases]
+        refusal = no_settling(self._systems[0]) if problem.course else None
+        if refusal:
+            raise RefusedModel(refusal)
         self._used = [_used(m, problem.weights) for m in problem.cases]
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI

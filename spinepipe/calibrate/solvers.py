@@ -7,6 +7,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics import (
+    END_ONLY,
     Course,
     FreeParameter,
     System,
@@ -81,7 +82,7 @@ class Settling:
             ends, derivatives = [], []
             for step in system.case.steps:
                 program = self._course.program(system.slots.loading(step.wrenches))
-                end = settle(system, program, self._course.duration_s)
+                end = settle(system, program, self._course.duration_s, coarseness=END_ONLY)
                 if not end.status.usable:
                     return end.message
                 derivative = settled_by_parameters(system, program, end, self._free)

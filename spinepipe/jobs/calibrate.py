@@ -101,7 +101,7 @@ def _stiffness(
 
 def _errors(found: Fit) -> dict[str, Any]:
     """Mean absolute error per coordinate over all measured readings, mm and deg."""
-    size = absolute_errors(found).reshape(-1, 6)
+    size = absolute_errors(found.cases, found.poses).reshape(-1, 6)
     return {
         _error_column(name): float(np.nanmean(column)) if np.isfinite(column).any() else None
         for name, column in zip(COORDINATE_COLUMNS, size.T, strict=True)

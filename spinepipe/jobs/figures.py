@@ -1,25 +1,45 @@
 """Job: one figure of a study, as SVG and as PNG."""
 
+from collections.abc import Callable, Mapping
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from spinepipe.cohort import Cohort
 from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.report.agreement import agreement_figure
+from spinepipe.report.bootstrap import bootstrap_figure
 from spinepipe.report.errors import errors_figure
 from spinepipe.report.joint_pose import joint_pose_figure
+from spinepipe.report.landmark_precision import landmark_precision_figure
+from spinepipe.report.pose_against_stiffness import pose_against_stiffness_figure
 from spinepipe.report.stiffness import stiffness_figure
 from spinepipe.report.style import save, style
-from spinepipe.tables import read_frame
+from spinepipe.report.success import success_figure
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import read_frames
+
+Tables = Mapping[str, pd.DataFrame]
+Draw = Callable[[JointPoseSensitivity, Cohort, Tables], Figure]
+
+DRAW: dict[str, Draw] = {
+    "stiffness": lambda study, cohort, rows: stiffness_figure(study, cohort, rows["calibrations"]),
+    "errors": lambda _, cohort, rows: errors_figure(cohort, rows["simulations"]),
+    "joint_pose": lambda _, cohort, rows: joint_pose_figure(cohort, rows["poses"]),
+    "bootstrap": bootstrap_figure,
+    "success_by_method": success_figure,
+    "agreement": agreement_figure,
+    "pose_against_stiffness": pose_against_stiffness_figure,
+    "landmark_precision": landmark_precision_figure,
+}
+"""What draws each figure; the tables it is drawn from: `spinepipe.jobs.layout.FIGURES`."""
 
 
-def run(root: str, study: str, figure: str, table: str, svg: str, png: str) -> None:
-    """Draw a figure (``stiffness``, ``errors`` or ``joint_pose``) from its table."""
+def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: str) -> None:
+    """Draw a figure, one of `DRAW`, from the files of its tables."""
     settings, cohort = study_and_cohort(root, study)
-    rows = read_frame(table)
+    rows = read_frames(tables)
     with style():
-        if figure == "stiffness":
-            drawn = stiffness_figure(settings, cohort, rows)
-        elif figure == "errors":
-            drawn = errors_figure(cohort, rows)
-        elif figure == "joint_pose":
-            drawn = joint_pose_figure(cohort, rows)
-        else:
-            raise ValueError(f"no figure is called {figure!r}")
+        drawn = DRAW[figure](settings, cohort, rows)
         for path in (svg, png):
             save(drawn, path)

@@ -1,8 +1,10 @@
-"""The calibration problem of a study in given joint frames, and the errors a fit of it leaves."""
+"""The calibration problem of a study in given joint frames, and the errors of its solutions."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, MeasuredCase, Problem
+from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort.specimen import in_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
@@ -51,19 +53,19 @@ def calibration_problem(
     return Problem(model, cases, free, weights, -reach, reach)
 
 
-def absolute_errors(found: Fit) -> Array:
-    """(R, J, 6) absolute error of every reading of a fit, mm and deg; NaN where not measured.
+def absolute_errors(cases: Sequence[MeasuredCase], poses: Sequence[Array]) -> Array:
+    """(R, J, 6) absolute error of every reading, mm and deg; NaN where not measured.
 
-    All NaN when there is no fit. R counts the load steps of all tests and cycles.
+    R counts the load steps of all tests and cycles.
+
+    Parameters
+    ----------
+    poses : (T, n) of each case, or nothing when there are none: then all is NaN.
     """
-    size = np.concatenate([np.full_like(case.measured, np.nan) for case in found.cases])
-    if not found.status.usable:
-        return size
+    if not poses:
+        return np.concatenate([np.full_like(case.measured, np.nan) for case in cases])
     error = np.concatenate(
-        [
-            _predicted(case, poses) - _readings(case)
-            for poses, case in zip(found.poses, found.cases, strict=True)
-        ]
+        [_predicted(case, q) - _readings(case) for q, case in zip(poses, cases, strict=True)]
     )
     absolute: Array = np.abs(error) * BORDER_PER_SI
     return absolute

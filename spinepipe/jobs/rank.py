@@ -7,16 +7,17 @@ import pandas as pd
 
 from spinepipe.files import appearing
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.statics import Status
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def run(root: str, study: str, calibrations: str, output: str) -> None:
-    """Write ``best.json``: specimen to its best sets, best first; least cost is best."""
+def run(root: str, study: str, calibrations: str, success: str, output: str) -> None:
+    """Write ``best.json``: specimen to its best sets of the reduced dataset; least cost is best."""
     settings, cohort = study_and_cohort(root, study)
-    frame = read_frame(calibrations)
+    judged = read_frame(success)
+    kept = judged.loc[judged["reduced"], ["specimen", "pose"]]
+    frame = read_frame(calibrations).merge(kept, on=["specimen", "pose"])
     best = {
         specimen: _best(settings, frame[frame["specimen"] == specimen])
         for specimen in cohort.specimen_names
@@ -27,15 +28,14 @@ def run(root: str, study: str, calibrations: str, output: str) -> None:
 
 def _best(settings: JointPoseSensitivity, frame: pd.DataFrame) -> list[dict[str, Any]]:
     """The best sets of one specimen: pose they come from, cost, stiffness (J or 1, 6) SI."""
-    usable = frame[frame["status"].isin([status for status in Status if status.usable])]
-    costs = usable.groupby("pose")["cost"].first().sort_values(kind="stable")
+    costs = frame.groupby("pose")["cost"].first().sort_values(kind="stable")
     chosen = costs.index[: settings.best_models]
     return [
         {
             "name": f"best{rank:02d}",
             "pose": int(pose),
             "cost": float(costs[pose]),
-            "stiffness": usable.loc[usable["pose"] == pose, list(STIFFNESS_COLUMNS)]
+            "stiffness": frame.loc[frame["pose"] == pose, list(STIFFNESS_COLUMNS)]
             .to_numpy(float)
             .tolist(),
         }

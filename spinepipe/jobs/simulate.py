@@ -75,7 +75,7 @@ def _stiffness(calibration: str, best: str, specimen: str, name: str) -> tuple[A
     for ranked in _ranking(stamp(best)).get(specimen, []):
         if ranked["name"] == name:
             return np.array(ranked["stiffness"]), ""
-    return None, f"fewer usable calibrations than {name} asks for"
+    return None, f"fewer fits in the reduced dataset than {name} asks for"
 
 
 @lru_cache(maxsize=4)

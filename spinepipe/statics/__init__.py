@@ -8,13 +8,14 @@ from spinepipe.statics.path import SolvedStep, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
 from spinepipe.statics.program import Course, Program
 from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
-from spinepipe.statics.settling import Settled, settle
+from spinepipe.statics.settling import END_ONLY, Settled, no_settling, settle
 from spinepipe.statics.settling_sensitivity import settled_by_parameters
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import Balance, System
 from spinepipe.world import Chain
 
 __all__ = [
+    "END_ONLY",
     "Balance",
     "Chain",
     "Course",
@@ -35,6 +36,7 @@ __all__ = [
     "follow",
     "free_parameters",
     "moved",
+    "no_settling",
     "observe",
     "observed_by_parameters",
     "settle",

@@ -1,5 +1,6 @@
 """Parts of a joint-pose study beyond its poses: filters, bootstraps, methods, precision."""
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, Field
@@ -24,13 +25,21 @@ def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
+def _rising(sds: tuple[float, ...]) -> tuple[float, ...]:
+    if any(later <= sooner for sooner, later in pairwise(sds)):
+        raise ValueError("in rising order, each once")
+    return sds
+
+
 _Loading = Literal["equilibrium", "quasi_static", "dynamic"]
 _Loadings = Annotated[
     tuple[_Loading, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
 _ALL_LOADINGS: tuple[_Loading, ...] = ("equilibrium", "quasi_static", "dynamic")
 _Millimetres = Annotated[float, Field(gt=0, le=20)]
-_SDs = Annotated[tuple[_Millimetres, ...], Field(strict=False, min_length=1)]
+_SDs = Annotated[
+    tuple[_Millimetres, ...], Field(strict=False, min_length=1), AfterValidator(_rising)
+]
 
 
 class Success(BaseModel):

@@ -13,7 +13,16 @@ from spinepipe.tables.identification import (
     SUMMARY,
 )
 from spinepipe.tables.joint_pose_sensitivity import CALIBRATIONS, LANDMARKS, POSES, SIMULATIONS
-from spinepipe.tables.parquet import BadTable, join, read, read_frame, to_arrow, write
+from spinepipe.tables.parquet import (
+    BadTable,
+    from_rows,
+    join,
+    read,
+    read_frame,
+    read_frames,
+    to_arrow,
+    write,
+)
 from spinepipe.tables.schema import Column, Table
 from spinepipe.tables.statistics import AGREEMENT, IMPORTANCE, STATISTICS, VARIANCE_SHARES
 
@@ -64,9 +73,11 @@ __all__ = [
     "BadTable",
     "Column",
     "Table",
+    "from_rows",
     "join",
     "read",
     "read_frame",
+    "read_frames",
     "to_arrow",
     "write",
 ]

@@ -116,3 +116,20 @@ def read_frame(path: str | Path) -> pd.DataFrame:
     """The rows of one file as a data frame, empty cells as NaN or None."""
     frame: pd.DataFrame = read(path).to_pandas()
     return frame
+
+
+def read_frames(paths: Sequence[str | Path]) -> dict[str, pd.DataFrame]:
+    """Tables by name, which is that of their file."""
+    return {Path(path).stem: read_frame(path) for path in paths}
+
+
+def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]]) -> pa.Table:
+    """Rows as a table that keeps the schema.
+
+    Raises
+    ------
+    BadTable
+        As `to_arrow` does.
+    """
+    names = [column.name for column in table.columns]
+    return to_arrow(table, {name: [row[name] for row in rows] for name in names})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from spinepipe import studies
 from spinepipe.jobs.digest import code_digest, value_digest
-from spinepipe.jobs.layout import FIGURES, Layout
+from spinepipe.jobs.layout import COMPARED, FIGURES, METHODS, Layout
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.problems import InputError
 
@@ -62,8 +62,12 @@ def load(name):
 @cache
 def layout(name):
     study, cohort = load(name)
-    specimens = tuple(cohort.specimen_names)
-    return Layout(name, specimens, study.poses, study.best_models, study.block)
+    return Layout.of(study, cohort.name, tuple(cohort.specimen_names))
+
+
+def tables(*names):
+    """Input function: files of these tables, of those that the study at hand has."""
+    return lambda wildcards: layout(wildcards.study).table_files(names)
 
 
 @cache

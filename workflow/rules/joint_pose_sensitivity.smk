@@ -72,6 +72,7 @@ rule aggregate_table:
 checkpoint rank_models:
     input:
         calibrations=f"{RESULTS}/calibrations.parquet",
+        success=f"{RESULTS}/success.parquet",
     output:
         output=f"{RESULTS}/best.json",
     log:
@@ -98,24 +99,3 @@ rule simulate:
         run_job(
             rule, "simulate", wildcards, input, output, log, calibration="", best=""
         )
-
-
-for figure, table in FIGURES.items():
-
-    rule:
-        name:
-            f"figure_{figure}"
-        input:
-            table=f"{RESULTS}/{table}.parquet",
-        output:
-            svg=shown(figure),
-            png=f"{RESULTS}/figures/{figure}.png",
-        log:
-            f"{LOGS}/figure_{figure}.log",
-        params:
-            digest=digest("figures"),
-            figure=figure,
-        run:
-            run_job(
-                rule, "figures", wildcards, input, output, log, figure=params.figure
-            )

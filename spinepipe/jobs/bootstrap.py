@@ -1,0 +1,136 @@
+"""Job: one fit in a cohort's own joint poses, from a sampled start or with sampled damping."""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.cohort import Cohort
+from spinepipe.designs import sample_log_uniform, specimen_seed
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.inputs import specimen_inputs, start_stiffness, study_and_cohort
+from spinepipe.jobs.problem import absolute_errors, calibration_problem
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.statics import Course, Status, moved
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import BOOTSTRAP, from_rows, write
+from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
+
+_START = [f"start_{name}" for name in STIFFNESS_COLUMNS]
+_ERRORS = [
+    f"{name}_error_{unit}"
+    for name, unit in (column.rsplit("_", 1) for column in COORDINATE_COLUMNS)
+]
+
+
+def run(
+    root: str, study: str, specimen: str, bootstrap: str, loading: str, set: str, output: str
+) -> None:
+    """Write the rows, one per joint, of one fit."""
+    settings, cohort = study_and_cohort(root, study)
+    start, damping = sampled(settings, specimen, bootstrap)[int(set)]
+    common = {
+        "specimen": specimen,
+        "bootstrap": bootstrap,
+        "loading": loading,
+        "set": int(set),
+        **dict(zip(_START, start.tolist(), strict=True)),
+        "damping_translation_n_s_per_m": float(damping[0]),
+        "damping_rotation_nm_s_per_rad": float(damping[5]),
+    }
+    try:
+        problem = _problem(root, settings, cohort, specimen, start, damping)
+        found = fit(replace(problem, course=course(settings, loading)))
+    except RefusedModel as error:
+        rows = _refused(cohort, str(error))
+    else:
+        rows = _fitted(cohort, problem, found)
+    table = from_rows(BOOTSTRAP, [{**common, **row} for row in rows])
+    write(table, output, provenance("bootstrap", settings, cohort))
+
+
+def sampled(
+    settings: JointPoseSensitivity, specimen: str, bootstrap: str
+) -> tuple[tuple[Array, Array], ...]:
+    """Start stiffness (6,) and damping (6,) of every set, SI; what is not drawn is the study's."""
+    start, damping = start_stiffness(settings), np.array(settings.damping.in_order())
+    seed = specimen_seed(settings.seed, f"{bootstrap}/{specimen}")
+    if bootstrap == "start":
+        part = settings.start_bootstrap
+        low, high = np.array(part.lowest.in_order()), np.array(part.highest.in_order())
+        return tuple((row, damping) for row in _sample(low, high, part.sets, seed))
+    reach, sets = settings.damping_bootstrap.factor, settings.damping_bootstrap.sets
+    two = damping[[0, 5]]  # translations share a coefficient, and so do rotations
+    drawn = _sample(two / reach, two * reach, sets, seed)
+    return tuple((start, np.repeat(row, 3)) for row in drawn)
+
+
+def _sample(low: Array, high: Array, sets: int, seed: int) -> Array:
+    return _cached_sample(tuple(low.tolist()), tuple(high.tolist()), sets, seed)
+
+
+@lru_cache(maxsize=16)
+def _cached_sample(low: tuple[float, ...], high: tuple[float, ...], sets: int, seed: int) -> Array:
+    return sample_log_uniform(np.array(low), np.array(high), max(sets, 2), seed)[:sets]
+
+
+def course(settings: JointPoseSensitivity, loading: str) -> Course | None:
+    """How the loads of a bootstrap come on; None for poses at rest."""
+    if loading == "equilibrium":
+        return None
+    if loading == "quasi_static":
+        return Course(settings.settle_time_s)
+    ramp = settings.dynamic
+    return Course(ramp.ramp_s, ramp.ramp_s, ramp.steps_per_s)
+
+
+def _problem(
+    root: str,
+    settings: JointPoseSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    start: Array,
+    damping: Array,
+) -> Problem:
+    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).nominal
+    problem = calibration_problem(root, settings, specimen, frames, start)
+    shape = problem.model.damping.shape
+    model = replace(problem.model, damping=np.broadcast_to(damping, shape).copy())
+    return replace(problem, model=model)
+
+
+def _fitted(cohort: Cohort, problem: Problem, found: Fit) -> list[dict[str, Any]]:
+    """One row per joint: its stiffness and its own mean errors."""
+    solved = found.status.usable
+    values = moved(problem.model, problem.free, found.x).effects[0].values
+    rows = []
+    for joint, errors in enumerate(np.moveaxis(absolute_errors(found.cases, found.poses), 1, 0)):
+        known = np.isfinite(errors).any(axis=0)
+        rows.append(
+            {
+                "joint": cohort.joint_names[joint],
+                **{
+                    name: float(value) if solved else None
+                    for name, value in zip(STIFFNESS_COLUMNS, values[joint], strict=True)
+                },
+                **{
+                    name: float(np.nanmean(errors[:, column])) if known[column] else None
+                    for column, name in enumerate(_ERRORS)
+                },
+                "cost": found.cost if solved else None,
+                "evaluations": found.evaluations,
+                "status": found.status.value,
+                "message": found.message,
+            }
+        )
+    return rows
+
+
+def _refused(cohort: Cohort, message: str) -> list[dict[str, Any]]:
+    """One row per joint without numbers."""
+    nothing = dict.fromkeys((*STIFFNESS_COLUMNS, *_ERRORS, "cost"))
+    ended = {"evaluations": 0, "status": Status.REFUSED.value, "message": message}
+    return [{"joint": joint, **nothing, **ended} for joint in cohort.joint_names]

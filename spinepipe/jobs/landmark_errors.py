@@ -1,0 +1,147 @@
+"""Job: errors of one specimen with landmarks of one precision, pose by pose."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import frames_from_landmarks
+from spinepipe.designs import sample_landmarks
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.jobs.inputs import specimen_inputs, study_and_cohort
+from spinepipe.jobs.problem import absolute_errors, calibration_problem
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.statics import Status, moved
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import PRECISION_ERRORS, from_rows, write
+from spinepipe.units import MM_PER_M
+
+
+def run(root: str, study: str, specimen: str, sd_mm: str, output: str) -> None:
+    """Write two rows per sampled pose: with its own stiffness and with the cohort's own pose's."""
+    settings, cohort = study_and_cohort(root, study)
+    nominal = _nominal(root, settings, cohort, specimen)
+    rows = []
+    for pose, points in enumerate(_landmark_sets(settings, cohort, specimen, float(sd_mm))):
+        key = {"specimen": specimen, "sd_mm": float(sd_mm), "pose": pose}
+        for name, ended in _errors(root, settings, cohort, specimen, points, nominal).items():
+            rows.append({**key, "stiffness": name, **ended})
+    metadata = provenance("landmark_errors", settings, cohort)
+    write(from_rows(PRECISION_ERRORS, rows), output, metadata)
+
+
+def _landmark_sets(
+    settings: JointPoseSensitivity, cohort: Cohort, specimen: str, sd_mm: float
+) -> list[dict[str, dict[str, Array]]]:
+    """Landmark sets, m: vertebra to landmark to position.
+
+    Every SD draws the same directions, so that errors over SD differ by precision alone.
+    """
+    assert cohort.landmarks is not None
+    rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
+    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float)
+    n = settings.landmark_precision.poses
+    sds = np.full(len(rows), sd_mm)
+    drawn, _ = sample_landmarks(points, sds, max(n, 2), settings.seed, f"precision/{specimen}")
+    names = list(zip(rows["vertebra"], rows["landmark"], strict=True))
+    sets: list[dict[str, dict[str, Array]]] = []
+    for one in drawn[:n] / MM_PER_M:
+        placed: dict[str, dict[str, Array]] = {}
+        for (vertebra, landmark), point in zip(names, one, strict=True):
+            placed.setdefault(vertebra, {})[landmark] = point
+        sets.append(placed)
+    return sets
+
+
+def _nominal(
+    root: str, settings: JointPoseSensitivity, cohort: Cohort, specimen: str
+) -> Array | str:
+    """(J, 6) stiffness fitted in the cohort's own pose, or why there is none."""
+    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).nominal
+    try:
+        problem = calibration_problem(root, settings, specimen, frames)
+        found = _fit(settings, problem)
+    except RefusedModel as error:
+        return str(error)
+    if not found.status.usable:
+        return found.message
+    values: Array = moved(problem.model, problem.free, found.x).effects[0].values
+    return values
+
+
+def _errors(
+    root: str,
+    settings: JointPoseSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    points: dict[str, dict[str, Array]],
+    nominal: Array | str,
+) -> dict[str, dict[str, Any]]:
+    try:
+        frames = frames_from_landmarks(cohort.vertebrae, points)
+        problem = calibration_problem(root, settings, specimen, frames)
+        found = _fit(settings, problem)
+    except (ValueError, RefusedModel) as error:
+        refused = _row((), (), Status.REFUSED, str(error))
+        return {"calibrated": refused, "nominal": refused}
+    return {
+        "calibrated": _fitted(found),
+        "nominal": _with(root, settings, specimen, frames, nominal),
+    }
+
+
+def _fit(settings: JointPoseSensitivity, problem: Problem) -> Fit:
+    """A fit from the study's start; from its further starts too where that one finds no optimum."""
+    found = fit(problem)
+    if found.status is Status.CONVERGED:
+        return found
+    options = settings.calibration
+    return fit(problem, options.starts, settings.seed)
+
+
+def _fitted(found: Fit) -> dict[str, Any]:
+    return _row(found.cases, found.poses, found.status, found.message)
+
+
+def _with(
+    root: str,
+    settings: JointPoseSensitivity,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array | str,
+) -> dict[str, Any]:
+    """Errors in these frames with a given stiffness (J, 6)."""
+    if isinstance(stiffness, str):
+        message = f"the cohort's own pose was not calibrated: {stiffness}"
+        return _row((), (), Status.REFUSED, message)
+    problem: Problem = calibration_problem(root, settings, specimen, frames, stiffness)
+    evaluator = Evaluator(replace(problem, free=(), lower=_NONE, upper=_NONE))
+    there = evaluator.at(_NONE)
+    status = Status.CONVERGED if there.poses and there.residual is not None else Status.UNSTABLE
+    return _row(evaluator.problem.cases, there.poses, status, there.message)
+
+
+_NONE = np.empty(0)
+
+
+def _row(
+    cases: tuple[MeasuredCase, ...], poses: tuple[Array, ...], status: Status, message: str
+) -> dict[str, Any]:
+    ended = {"status": status.value, "message": message}
+    if not status.usable:
+        return {"translation_error_mm": None, "rotation_error_deg": None, **ended}
+    errors = absolute_errors(cases, poses)
+    return {
+        "translation_error_mm": _largest(errors[..., :3]),
+        "rotation_error_deg": _largest(errors[..., 3:]),
+        **ended,
+    }
+
+
+def _largest(errors: Array) -> float | None:
+    known = errors[np.isfinite(errors)]
+    return float(known.max()) if len(known) else None

@@ -1,0 +1,94 @@
+"""Job: how errors grow with the landmarks' SD, and the largest SD that will do."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from statsmodels.stats.proportion import proportion_confint
+
+from spinepipe.designs import specimen_seed
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.provenance import provenance
+from spinepipe.sensitivity.precision import required_precision
+from spinepipe.studies import LandmarkPrecision
+from spinepipe.tables import LANDMARK_PRECISION, REQUIRED_PRECISION, from_rows, read_frame, write
+
+BOOTSTRAPS = 1000
+COLUMNS = {"translation": "translation_error_mm", "rotation": "rotation_error_deg"}
+
+
+def run(root: str, study: str, errors: str, precision: str, required: str) -> None:
+    """Write ``landmark_precision.parquet`` and ``required_precision.parquet``."""
+    settings, cohort = study_and_cohort(root, study)
+    asked = settings.landmark_precision
+    spread: list[dict[str, Any]] = []
+    needed: list[dict[str, Any]] = []
+    for (specimen, stiffness), rows in read_frame(errors).groupby(
+        ["specimen", "stiffness"], sort=False
+    ):
+        key = {"specimen": specimen, "stiffness": stiffness}
+        found = measured_errors(rows)
+        spread += [{**key, **row} for row in _spread(asked, found)]
+        seed = specimen_seed(settings.seed, f"required/{specimen}/{stiffness}")
+        needed += [{**key, **row} for row in _required(asked, found, seed)]
+    origin = provenance("landmark_precision", settings, cohort)
+    write(from_rows(LANDMARK_PRECISION, spread), precision, origin)
+    write(from_rows(REQUIRED_PRECISION, needed), required, origin)
+
+
+def measured_errors(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Largest errors by kind of motion: a row per SD, a column per pose; infinite without result.
+
+    Kinds of motion that were not measured are left out.
+    """
+    grids = {
+        kind: rows.pivot(index="sd_mm", columns="pose", values=column)
+        for kind, column in COLUMNS.items()
+    }
+    return {
+        kind: grid.fillna(np.inf) for kind, grid in grids.items() if grid.notna().any(axis=None)
+    }
+
+
+def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:
+    return {
+        "translation": (asked.translation_limit_mm, "mm"),
+        "rotation": (asked.rotation_limit_deg, "deg"),
+    }
+
+
+def _spread(
+    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame]
+) -> Iterator[dict[str, Any]]:
+    for kind, grid in errors.items():
+        limit, unit = _limits(asked)[kind]
+        for sd, values in zip(grid.index, grid.to_numpy(float), strict=True):
+            below = int((values < limit).sum())
+            low, high = proportion_confint(below, len(values), method="wilson")
+            key = {"motion": kind, "sd_mm": float(sd), "unit": unit, "n": len(values)}
+            shares = {"below": below / len(values), "below_low": low, "below_high": high}
+            yield {**key, "limit": limit, **shares, **_quantiles(values)}
+
+
+def _quantiles(values: Array) -> dict[str, Any]:
+    """Quantiles of the errors there are."""
+    known = values[np.isfinite(values)]
+    names = ("median", "p90", "p95", "largest")
+    found = np.percentile(known, [50, 90, 95, 100]).tolist() if len(known) else [None] * 4
+    return {"without_result": len(values) - len(known), **dict(zip(names, found, strict=True))}
+
+
+def _required(
+    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame], seed: int
+) -> Iterator[dict[str, Any]]:
+    relative = {kind: grid / _limits(asked)[kind][0] for kind, grid in errors.items()}
+    if len(relative) > 1:
+        relative["both"] = pd.concat(relative.values()).groupby(level="sd_mm").max()
+    for kind, grid in relative.items():
+        sds = grid.index.to_numpy(float)
+        found = required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
+        ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
+        numbers = {"sd_mm": found.sd, **ends, "message": found.message}
+        yield {"motion": kind, "share": asked.share, **numbers}

@@ -1,0 +1,34 @@
+"""Job: the report of a study, one HTML file."""
+
+from pathlib import Path
+
+from spinepipe.files import appearing
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.report.page import Results, study_page
+from spinepipe.tables import read, read_frames
+
+
+def run(
+    root: str, study: str, tables: list[str], figures: list[str], captions: list[str], output: str
+) -> None:
+    """Write the page from the files of all tables, pictures (SVG) and captions."""
+    settings, cohort = study_and_cohort(root, study)
+    results = Results(
+        tables=read_frames(tables),
+        metadata={Path(path).stem: _metadata(path) for path in tables},
+        pictures=_texts(figures),
+        captions=_texts(captions),
+    )
+    page = study_page(settings, cohort, results)
+    with appearing(Path(output)) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _metadata(path: str) -> dict[str, str]:
+    found = read(path).schema.metadata or {}
+    return {key.decode(): value.decode() for key, value in found.items()}
+
+
+def _texts(paths: list[str]) -> dict[str, str]:
+    """Texts of files by the name of the file, in the order given."""
+    return {Path(path).stem: Path(path).read_text(encoding="utf-8") for path in paths}

@@ -1,0 +1,198 @@
+"""Job: the tests of the published study on poses, stiffness and errors, with corrected p-values."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.jobs.errors import absolute_error, measured_coordinates, readings
+from spinepipe.jobs.grid import complete_grid
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.pose_factors import pose_factors, pose_parameters
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statistics import (
+    Outcome,
+    chi_squared_normality,
+    corrected,
+    family_size,
+    friedman,
+    kendall,
+    kolmogorov_smirnov_normality,
+    lilliefors_normality,
+    spearman,
+)
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import STATISTICS, from_rows, read_frames, write
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+
+NORMALITY = (chi_squared_normality, kolmogorov_smirnov_normality, lilliefors_normality)
+
+
+def run(root: str, study: str, tables: list[str], best: str, output: str) -> None:
+    """Write ``statistics.parquet``."""
+    settings, cohort = study_and_cohort(root, study)
+    frames = read_frames(tables)
+    errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
+    ranking = json.loads(Path(best).read_text("utf-8"))
+    rows: list[dict[str, Any]] = []
+    for specimen in cohort.specimen_names:
+        judged = frames["success"]
+        kept = judged.loc[judged["reduced"] & (judged["specimen"] == specimen), "pose"].to_numpy()
+        own = {
+            name: table[(table["specimen"] == specimen) & table["pose"].isin(kept)]
+            for name, table in (("errors", errors), ("poses", frames["poses"]))
+        }
+        fits = frames["calibrations"]
+        fits = fits[(fits["specimen"] == specimen) & fits["pose"].isin(kept)]
+        data = Specimen(settings, kept, own["poses"], fits, own["errors"], ranking[specimen])
+        rows += [{"specimen": specimen, **row} for row in _corrected(list(data.tests()))]
+    write(from_rows(STATISTICS, rows), output, provenance("statistics", settings, cohort))
+
+
+@dataclass(frozen=True)
+class Tested:
+    """One test and what it is of."""
+
+    family: str
+    joint: str
+    response: str
+    factor: str
+    stratum: str
+    outcome: Outcome
+
+
+def _corrected(tests: Sequence[Tested]) -> Iterator[dict[str, Any]]:
+    """Rows with p-values corrected within each family and kind of test."""
+    families: dict[tuple[str, str], list[Tested]] = {}
+    for test in tests:
+        families.setdefault((test.family, test.outcome.test), []).append(test)
+    for family in families.values():
+        ps = [test.outcome.p for test in family]
+        both = zip(family, corrected(ps, "bonferroni"), corrected(ps, "holm"), strict=True)
+        for test, bonferroni, holm in both:
+            yield _row(test, bonferroni, holm, family_size(ps))
+
+
+def _row(test: Tested, bonferroni: float | None, holm: float | None, size: int) -> dict[str, Any]:
+    outcome = test.outcome
+    return {
+        **{key: getattr(test, key) for key in ("family", "joint", "response", "factor", "stratum")},
+        **{key: getattr(outcome, key) for key in ("test", "statistic_name", "statistic", "p", "n")},
+        **{key: getattr(outcome, key) for key in ("effect_name", "effect", "message")},
+        "status": outcome.status.value,
+        "p_bonferroni": bonferroni,
+        "p_holm": holm,
+        "family_size": size,
+    }
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """What is tested of one specimen, its reduced poses only."""
+
+    settings: JointPoseSensitivity
+    kept: Indices
+    poses: pd.DataFrame
+    fits: pd.DataFrame
+    errors: pd.DataFrame
+    ranking: Sequence[dict[str, Any]]
+
+    def tests(self) -> Iterator[Tested]:
+        """All tests, family by family."""
+        if not len(self.kept):
+            return
+        yield from self._normality()
+        yield from self._calibrated_fits()
+        for joint, coordinate in measured_coordinates(self.errors):
+            yield from self._grid(joint, coordinate)
+
+    def _normality(self) -> Iterator[Tested]:
+        named: list[tuple[str, str, Array]] = []
+        for name, column in pose_parameters(self.poses).items():
+            named.append(("*", str(name), column.to_numpy(float)))
+        named += [(joint, name, values) for joint, name, values in self._stiffness()]
+        for joint, coordinate in measured_coordinates(self.errors):
+            error = self._own_errors(joint)[coordinate].dropna().to_numpy(float)
+            named.append((joint, f"{coordinate}_error", error))
+        for test in NORMALITY:
+            for joint, name, values in named:
+                yield Tested("normality", joint, name, "", "", test(values))
+
+    def _stiffness(self) -> Iterator[tuple[str, str, Array]]:
+        """(joint, name, values) of every fitted stiffness, by pose."""
+        for joint, rows in self.fits.groupby("joint", sort=False):
+            by_pose = rows.set_index("pose").loc[self.kept]
+            for name in self.settings.calibration.free:
+                column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
+                yield str(joint), f"{name}_stiffness", by_pose[column].to_numpy(float)
+
+    def _own_errors(self, joint: str) -> pd.DataFrame:
+        """Errors by pose with each pose's own stiffness; ``*``: mean over the measured joints."""
+        own = self.errors[self.errors["stiffness"] == "calibrated"]
+        if joint != "*":
+            return own[own["joint"] == joint].set_index("pose").loc[self.kept]
+        measured = {name for name, _ in measured_coordinates(own)}
+        names = list(COORDINATES)
+        grouped = own[own["joint"].isin(measured)].groupby("pose")[names]
+        return grouped.mean().loc[self.kept]
+
+    def _calibrated_fits(self) -> Iterator[Tested]:
+        """Errors and stiffness of the poses' own fits against each other and against the pose."""
+        factors = pose_factors(self.poses).loc[self.kept]
+        for joint, name, values in self._stiffness():
+            for factor in factors:
+                found = spearman(factors[factor].to_numpy(float), values)
+                yield Tested("stiffness against pose", joint, name, str(factor), "", found)
+            yield from self._errors_against("error against stiffness", joint, name, values)
+        for factor in factors:
+            values = factors[factor].to_numpy(float)
+            yield from self._errors_against("error against pose", "*", str(factor), values)
+
+    def _errors_against(
+        self, family: str, joint: str, factor: str, values: Array
+    ) -> Iterator[Tested]:
+        errors = self._own_errors(joint)
+        for coordinate in COORDINATES:
+            error = errors[coordinate].to_numpy(float)
+            known = np.isfinite(error)
+            if known.any():
+                found = spearman(values[known], error[known])
+                yield Tested(family, joint, f"{coordinate}_error", factor, "", found)
+
+    def _grid(self, joint: str, coordinate: str) -> Iterator[Tested]:
+        """Friedman tests and correlations over the grid of poses and best stiffness sets."""
+        grid = complete_grid(self.errors, joint, coordinate)
+        if grid.empty:
+            return
+        error = f"{coordinate}_error"
+        values = grid.to_numpy(float)
+        yield Tested("friedman", joint, error, "stiffness", "", friedman(values))
+        yield Tested("friedman", joint, error, "pose", "", friedman(values.T))
+        family = f"two-factor: {error} at {joint} against"
+        factors = pose_factors(self.poses).loc[grid.index]
+        for factor in factors:
+            for stratum in grid:
+                pair = factors[factor].to_numpy(float), grid[stratum].to_numpy(float)
+                for test in (kendall, spearman):
+                    name = str(factor), str(stratum)
+                    yield Tested(f"{family} pose", joint, error, *name, test(*pair))
+        for factor, stiffness in self._best_stiffness(joint, [str(name) for name in grid.columns]):
+            for pose, row in zip(grid.index, values, strict=True):
+                found = spearman(stiffness, row)
+                yield Tested(f"{family} stiffness", joint, error, factor, str(pose), found)
+
+    def _best_stiffness(self, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
+        """(name, values) of each fitted stiffness in the best sets, in the order of names."""
+        sets = {ranked["name"]: np.array(ranked["stiffness"]) for ranked in self.ranking}
+        joints = list(dict.fromkeys(self.errors["joint"]))
+        for name in self.settings.calibration.free:
+            column = COORDINATES.index(name)
+            row = [
+                sets[one][joints.index(joint) if len(sets[one]) > 1 else 0, column] for one in names
+            ]
+            yield f"{name}_stiffness", np.array(row)

@@ -1,0 +1,137 @@
+"""Job: joint pose against stiffness, by shares of variance and by a regression tree."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.designs import specimen_seed
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.errors import absolute_error, measured_coordinates, readings
+from spinepipe.jobs.grid import complete_grid
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.pose_factors import pose_parameters
+from spinepipe.jobs.provenance import provenance
+from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.tables import IMPORTANCE, VARIANCE_SHARES, from_rows, read_frames, write
+from spinepipe.units import COORDINATES
+
+
+def run(root: str, study: str, tables: list[str], best: str, shares: str, importance: str) -> None:
+    """Write ``variance_shares.parquet`` and ``importance.parquet``."""
+    settings, cohort = study_and_cohort(root, study)
+    frames = read_frames(tables)
+    errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
+    kept = frames["success"].loc[frames["success"]["reduced"], ["specimen", "pose"]]
+    errors = errors.merge(kept, on=["specimen", "pose"])
+    ranking = json.loads(Path(best).read_text("utf-8"))
+    divided: list[dict[str, Any]] = []
+    grown: list[dict[str, Any]] = []
+    for specimen in cohort.specimen_names:
+        own = errors[errors["specimen"] == specimen]
+        poses = frames["poses"]
+        parameters = pose_parameters(poses[poses["specimen"] == specimen])
+        for joint, coordinate in measured_coordinates(own):
+            grid = complete_grid(own, joint, coordinate)
+            key = {"specimen": specimen, "joint": joint, "coordinate": coordinate}
+            divided += [{**key, **row} for row in _shares(grid)]
+            seed = specimen_seed(settings.seed, f"tree/{specimen}/{joint}/{coordinate}")
+            sets = {one["name"]: np.array(one["stiffness"]) for one in ranking[specimen]}
+            tree = Grown(settings, cohort.joint_names, parameters, sets, seed)
+            grown += [{**key, **row} for row in tree.rows(grid)]
+    origin = provenance("two_factor", settings, cohort)
+    write(from_rows(VARIANCE_SHARES, divided), shares, origin)
+    write(from_rows(IMPORTANCE, grown), importance, origin)
+
+
+def _shares(grid: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Three rows: pose, stiffness and what only both together explain."""
+    found: Shares = variance_shares(grid.to_numpy(float))
+    parts = {
+        "pose": (found.row, found.total_row),
+        "stiffness": (found.column, found.total_column),
+        "interaction": (found.interaction, found.interaction),
+    }
+    for factor, (first, total) in parts.items():
+        yield {
+            "factor": factor,
+            **_interval(first),
+            "total": None if total is None else total.estimate,
+            "n_poses": found.n_rows,
+            "n_stiffness": found.n_columns,
+            "status": found.status.value,
+            "message": found.message,
+        }
+
+
+def _interval(share: Share | None) -> dict[str, float | None]:
+    if share is None:
+        return {"share": None, "share_low": None, "share_high": None}
+    return {"share": share.estimate, "share_low": share.low, "share_high": share.high}
+
+
+@dataclass(frozen=True)
+class Grown:
+    """What a tree is grown on: pose parameters (deg, mm) and the fitted stiffnesses' logarithms.
+
+    Attributes
+    ----------
+    sets : (J or 1, 6) stiffness of each best set.
+    """
+
+    settings: JointPoseSensitivity
+    joints: Sequence[str]
+    parameters: pd.DataFrame
+    sets: dict[str, Array]
+    seed: int
+
+    def rows(self, grid: pd.DataFrame) -> Iterator[dict[str, Any]]:
+        """One row per predictor."""
+        of_pose = [str(name) for name in self.parameters.columns]
+        of_stiffness = self._stiffness_names()
+        pose = self.parameters.loc[grid.index].to_numpy(float)
+        stiffness = np.array([self._stiffness(str(name)) for name in grid.columns]).reshape(
+            grid.shape[1], -1
+        )
+        x = np.hstack(
+            [
+                np.repeat(pose, grid.shape[1], axis=0),
+                np.tile(stiffness.reshape(grid.shape[1], len(of_stiffness)), (len(grid), 1)),
+            ]
+        )
+        groups = np.repeat(np.arange(len(grid)), grid.shape[1])
+        names = (*of_pose, *of_stiffness)
+        tree = regression_tree(x, grid.to_numpy(float).ravel(), names, self.seed, groups=groups)
+        yield from _importance(tree, len(of_pose), grid.size)
+
+    def _stiffness_names(self) -> list[str]:
+        free = self.settings.calibration.free
+        if self.settings.calibration.grouping == "per_specimen":
+            return [f"{name}_stiffness" for name in free]
+        return [f"{joint}_{name}_stiffness" for joint in self.joints for name in free]
+
+    def _stiffness(self, name: str) -> Array:
+        """(k,) logarithms of the fitted stiffnesses of a set, joint by joint."""
+        columns = [COORDINATES.index(free) for free in self.settings.calibration.free]
+        logarithms: Array = np.log(self.sets[name][:, columns]).ravel()
+        return logarithms
+
+
+def _importance(tree: Tree, n_pose: int, n: int) -> Iterator[dict[str, Any]]:
+    done = tree.status == "done"
+    for number, (name, share) in enumerate(zip(tree.names, tree.importance, strict=True)):
+        yield {
+            "predictor": name,
+            "factor": "pose" if number < n_pose else "stiffness",
+            "importance": float(share) if done else None,
+            "leaves": tree.leaves if done else None,
+            "r2": tree.r2_cross_validated,
+            "n": n,
+            "status": tree.status.value,
+            "message": tree.message,
+        }

@@ -1,0 +1,20 @@
+"""Sensitivity: what an output hangs on, from tables of results (not from derivatives)."""
+
+from spinepipe.sensitivity.tree import Tree, regression_tree
+from spinepipe.sensitivity.two_factor import (
+    MeanSquares,
+    Share,
+    Shares,
+    mean_squares,
+    variance_shares,
+)
+
+__all__ = [
+    "MeanSquares",
+    "Share",
+    "Shares",
+    "Tree",
+    "mean_squares",
+    "regression_tree",
+    "variance_shares",
+]

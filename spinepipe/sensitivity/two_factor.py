@@ -1,0 +1,181 @@
+"""How much of the variation over a grid is due to its rows, its columns, and both together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from spinepipe.sensitivity.jackknife import share_intervals
+from spinepipe.statistics import Ended
+from spinepipe.statistics.outcome import Array
+
+FEWEST = 3
+"""Rows and columns: leaving one out must leave an interaction."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of the variance, 0 to 1, with its 95 % confidence interval."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Variance of a grid divided among rows, columns and their interaction.
+
+    Attributes
+    ----------
+    n_rows, n_columns : P and S.
+    row, column, interaction : first-order Sobol indices of the two factors, and the rest; they
+        sum to 1. The interaction contains what scatter there is, as the grid has no replicates.
+    total_row, total_column : first order plus interaction.
+
+    The shares are None where the status is not ``done``.
+    """
+
+    n_rows: int
+    n_columns: int
+    status: Ended
+    message: str = ""
+    row: Share | None = None
+    column: Share | None = None
+    interaction: Share | None = None
+    total_row: Share | None = None
+    total_column: Share | None = None
+
+
+@dataclass(frozen=True)
+class MeanSquares:
+    """Mean squares of two-way analyses of variance without replicates; arrays of one shape."""
+
+    row: Array
+    column: Array
+    interaction: Array
+
+
+def variance_shares(grid: ArrayLike) -> Shares:
+    """Shares of rows (joint poses) and columns (stiffness sets) in the variance of a full grid.
+
+    Parameters
+    ----------
+    grid : (P, S) one finite value for every combination.
+
+    Estimates are the unbiased variance components of the model with random rows and columns,
+    negative ones set to 0. They speak of the populations that rows and columns are drawn from:
+    with ten sets chosen for their quality, of sets like those.
+
+    Intervals are a jackknife over rows and one over columns, their variances added, on the logit
+    scale, with t at Satterthwaite's degrees of freedom (Arvesen 1969, Ann. Math. Stat. 40:2076,
+    for variance components). A share that comes within one row or column of 0 or 1 has no logit:
+    its interval is on the plain scale. No resampling, hence no seed.
+
+    Coverage of the nominal 95 % in 300 grids each of 100 x 10 and 500 x 10, four sets of shares:
+    91 to 99 % with normal effects, 87 to 97 % where the interaction is the product of a row and a
+    column effect, 85 to 97 % for absolute values of sums, 78 to 98 % with exponential effects;
+    83 % for a share that is truly 0. Owen's pigeonhole bootstrap (2007, doi:10.1214/07-AOAS122)
+    covers 42 to 96 % with normal effects: its doubled columns move about 1/S of the interaction
+    into the rows. Chi-squared pivots cover 93 to 98 % of those, but as little as 24 % of products.
+
+    Raises
+    ------
+    ValueError
+        For a grid that is not two-dimensional and finite.
+    """
+    values: Array = np.asarray(grid, dtype=np.float64)
+    if values.ndim != 2 or not np.isfinite(values).all():
+        raise ValueError("shares need a full grid (rows, columns) of finite numbers")
+    if min(values.shape) < FEWEST:
+        message = f"grid of {values.shape[0]} x {values.shape[1]}; at least 3 x 3 are needed"
+        return _without(values, Ended.TOO_FEW, message)
+    if (values == values[0, 0]).all():
+        return _without(values, Ended.CONSTANT, "all values are the same")
+    if _constant_but_for_one_row(values) or _constant_but_for_one_row(values.T):
+        message = "but for one row or column all values are the same"
+        return _without(values, Ended.CONSTANT, message)
+    return _shares(values)
+
+
+def _constant_but_for_one_row(values: Array) -> bool:
+    """Whether leaving out one row leaves no variance to share."""
+    others = (values[0, 0], values[1, 0])  # one of them is not in the row left out
+    return any(np.count_nonzero((values != other).any(axis=1)) <= 1 for other in others)
+
+
+def _without(values: Array, status: Ended, message: str) -> Shares:
+    rows, columns = values.shape
+    return Shares(rows, columns, status, message)
+
+
+def _shares(values: Array) -> Shares:
+    rows, columns = values.shape
+    # a scale of 1 keeps the squares of tiny and of huge values
+    values = (values - values.mean()) / np.abs(values - values.mean()).max()
+    raw = _raw_shares(mean_squares(values), rows, columns)
+    estimates = _estimates(raw)
+    by_row = _raw_shares(_leaving_out_rows(values), rows - 1, columns)
+    swapped = _leaving_out_rows(values.T)
+    by_column = _raw_shares(
+        MeanSquares(swapped.column, swapped.row, swapped.interaction), rows, columns - 1
+    )
+    low, high = share_intervals(raw, by_row, by_column)
+    # an estimate set to 0 changes the others a little
+    low, high = np.minimum(low, estimates), np.maximum(high, estimates)
+    found = [Share(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    return Shares(rows, columns, Ended.DONE, _message(raw), *found)
+
+
+def mean_squares(values: Array) -> MeanSquares:
+    """Mean squares of a grid (P, S)."""
+    rows, columns = values.shape
+    by_row, by_column = values.mean(axis=1), values.mean(axis=0)
+    rest = values - by_row[:, None] - by_column + values.mean()
+    return MeanSquares(
+        columns * by_row.var(ddof=1),
+        rows * by_column.var(ddof=1),
+        np.sum(rest**2) / ((rows - 1) * (columns - 1)),
+    )
+
+
+def _leaving_out_rows(values: Array) -> MeanSquares:
+    """Mean squares (P,) of the P grids that lack one row each."""
+    rows, columns = values.shape
+    left = rows - 1
+    by_row = values.mean(axis=1)
+    by_column = (values.sum(axis=0) - values) / left
+    mean = by_column.mean(axis=1)
+    row = columns * (by_row @ by_row - by_row**2 - left * mean**2)
+    column = left * np.sum((by_column - mean[:, None]) ** 2, axis=1)
+    squares = np.sum(values**2, axis=1)
+    whole = squares.sum() - squares - left * columns * mean**2
+    # a difference of sums: rounding may leave less than nothing
+    rest = np.maximum(whole - row - column, 0.0)
+    return MeanSquares(
+        np.maximum(row, 0.0) / (left - 1),
+        column / (columns - 1),
+        rest / ((left - 1) * (columns - 1)),
+    )
+
+
+def _raw_shares(squares: MeanSquares, rows: int, columns: int) -> Array:
+    """(..., 5) row, column, interaction, totals; beyond 0 to 1 where chance has it."""
+    row = (squares.row - squares.interaction) / columns
+    column = (squares.column - squares.interaction) / rows
+    rest = squares.interaction
+    parts = np.stack([row, column, rest, row + rest, column + rest], axis=-1)
+    shares: Array = parts / (row + column + rest)[..., None]
+    return shares
+
+
+def _estimates(raw: Array) -> Array:
+    """(5,) shares with negative components set to 0."""
+    parts = np.maximum(raw[:3], 0.0)
+    row, column, rest = parts / parts.sum()
+    return np.array([row, column, rest, row + rest, column + rest])
+
+
+def _message(raw: Array) -> str:
+    names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
+    return f"negative {' and '.join(names)} component set to 0" if names else ""

@@ -1,0 +1,27 @@
+"""Statistics: tests of arrays, each with statistic, p, effect size, status and message."""
+
+from spinepipe.statistics.agreement import Agreement, bland_altman
+from spinepipe.statistics.correction import corrected, family_size
+from spinepipe.statistics.correlation import kendall, spearman
+from spinepipe.statistics.normality import (
+    chi_squared_normality,
+    kolmogorov_smirnov_normality,
+    lilliefors_normality,
+)
+from spinepipe.statistics.outcome import Ended, Outcome
+from spinepipe.statistics.ranks import friedman
+
+__all__ = [
+    "Agreement",
+    "Ended",
+    "Outcome",
+    "bland_altman",
+    "chi_squared_normality",
+    "corrected",
+    "family_size",
+    "friedman",
+    "kendall",
+    "kolmogorov_smirnov_normality",
+    "lilliefors_normality",
+    "spearman",
+]

@@ -1,0 +1,94 @@
+"""Agreement of predicted with measured values (Bland and Altman 1986, 1999)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from spinepipe.statistics.correlation import spearman
+from spinepipe.statistics.outcome import Array, Ended, Outcome, constant, finite_pairs
+
+FEWEST = 3
+LIMIT_SDS = 1.96
+TAILS = (0.025, 0.975)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Bland-Altman analysis; difference = predicted - measured, in the unit of the values.
+
+    Attributes
+    ----------
+    bias, bias_low, bias_high : mean difference and its 95 % t interval.
+    sd : standard deviation of the differences.
+    lower_limit, upper_limit : limits of agreement, bias -+ 1.96 SD.
+    lower_limit_low ... upper_limit_high : 95 % intervals of the limits.
+    proportional : Spearman correlation of difference and mean of each pair; a bias that grows
+        with the size of the values shows here.
+
+    Numbers that the values do not give are None: all but ``n`` when they are too few, the
+    intervals when the difference is the same everywhere.
+    """
+
+    n: int
+    proportional: Outcome
+    status: Ended
+    message: str = ""
+    bias: float | None = None
+    bias_low: float | None = None
+    bias_high: float | None = None
+    sd: float | None = None
+    lower_limit: float | None = None
+    lower_limit_low: float | None = None
+    lower_limit_high: float | None = None
+    upper_limit: float | None = None
+    upper_limit_low: float | None = None
+    upper_limit_high: float | None = None
+
+
+def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
+    """Agreement of predicted (n,) with measured (n,) values.
+
+    The intervals of the limits are exact for normal differences: bias + 1.96 SD is a quantile of
+    theirs, and (limit - mean) sqrt(n) / SD has a noncentral t distribution (Carkeet 2015,
+    doi:10.1097/OPX.0000000000000513). Bland and Altman's own, limit -+ t sqrt(3/n) SD, is their
+    approximation for many pairs.
+    """
+    first, second = finite_pairs(measured, predicted)
+    proportional = spearman(0.5 * (first + second), second - first)
+    difference, n = second - first, len(first)
+    if n < FEWEST:
+        message = f"{n} pairs; at least {FEWEST} are needed"
+        return Agreement(n, proportional, Ended.TOO_FEW, message)
+    if constant(difference):
+        same = float(difference[0])
+        message = "the difference is the same in all pairs"
+        return Agreement(
+            *(n, proportional, Ended.CONSTANT, message),
+            bias=same,
+            sd=0.0,
+            lower_limit=same,
+            upper_limit=same,
+        )
+    return _agreement(difference, proportional)
+
+
+def _agreement(difference: Array, proportional: Outcome) -> Agreement:
+    """Bias, limits and their intervals from differences (n,) that are not all the same."""
+    n, bias, sd = len(difference), float(difference.mean()), float(difference.std(ddof=1))
+    mean = sd * stats.t.ppf(TAILS, n - 1) / np.sqrt(n)
+    limit = sd * stats.nct.ppf(TAILS, n - 1, LIMIT_SDS * np.sqrt(n)) / np.sqrt(n)
+    return Agreement(
+        *(n, proportional, Ended.DONE),
+        bias=bias,
+        bias_low=float(bias + mean[0]),
+        bias_high=float(bias + mean[1]),
+        sd=sd,
+        lower_limit=bias - LIMIT_SDS * sd,
+        lower_limit_low=float(bias - limit[1]),
+        lower_limit_high=float(bias - limit[0]),
+        upper_limit=bias + LIMIT_SDS * sd,
+        upper_limit_low=float(bias + limit[0]),
+        upper_limit_high=float(bias + limit[1]),
+    )

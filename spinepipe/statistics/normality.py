@@ -1,0 +1,109 @@
+"""Are the values a sample of a normal distribution? Two tests of the paper, and the right one."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+from statsmodels.stats.diagnostic import lilliefors
+
+from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite
+
+BINS = 10
+LEAST_EXPECTED = 5.0
+ESTIMATED = 2
+"""Parameters estimated from the values: mean and SD."""
+
+FEWEST = 4
+"""Fewer values than this are not tested (the Lilliefors table starts here)."""
+
+CHI_SQUARED = Test("chi-squared goodness of fit, normal", "chi2", "skewness")
+KOLMOGOROV_SMIRNOV = Test("Kolmogorov-Smirnov, normal", "D", "skewness")
+LILLIEFORS = Test("Lilliefors, normal", "D", "skewness")
+
+LILLIEFORS_RANGE = (0.001, 0.99)
+"""The table that p is read from ends here."""
+
+
+def chi_squared_normality(values: ArrayLike) -> Outcome:
+    """Chi-squared goodness of fit to a normal with the values' mean and SD.
+
+    As MATLAB's ``chi2gof`` does by default: 10 bins of equal width over the range, the outermost
+    open to infinity, pooled from the tails inwards until at least 5 are expected in each tail bin;
+    degrees of freedom = bins - 1 - 2.
+    """
+    return _tested(CHI_SQUARED, finite(values), _chi_squared)
+
+
+def kolmogorov_smirnov_normality(values: ArrayLike) -> Outcome:
+    """One-sample Kolmogorov-Smirnov test of the standardised values, as Gould et al. 2024a did.
+
+    Its p is too large, as mean and SD come from the same values; see `lilliefors_normality`.
+    """
+    return _tested(KOLMOGOROV_SMIRNOV, finite(values), _kolmogorov_smirnov)
+
+
+def lilliefors_normality(values: ArrayLike) -> Outcome:
+    """Kolmogorov-Smirnov test whose p allows for estimated mean and SD (Lilliefors 1967)."""
+    return _tested(LILLIEFORS, finite(values), _lilliefors)
+
+
+def _tested(test: Test, values: Array, compute: Callable[[Array], Outcome]) -> Outcome:
+    """The outcome of a test of normality, unless there is nothing to test."""
+    n = len(values)
+    if n < FEWEST:
+        return test.without(Ended.TOO_FEW, n, f"{n} values; at least {FEWEST} are needed")
+    if constant(values):
+        return test.without(Ended.CONSTANT, n, "all values are the same")
+    return compute(values)
+
+
+def _chi_squared(values: Array) -> Outcome:
+    n = len(values)
+    edges = np.linspace(values.min(), values.max(), BINS + 1)
+    observed = np.histogram(values, edges)[0].astype(np.float64)
+    inner = stats.norm.cdf(edges[1:-1], values.mean(), values.std(ddof=1))
+    expected = n * np.diff(np.concatenate(([0.0], inner, [1.0])))
+    observed, expected = _pooled(observed, expected)
+    if len(expected) - 1 - ESTIMATED < 1:
+        return CHI_SQUARED.without(
+            Ended.TOO_FEW,
+            n,
+            f"{len(expected)} bins left after pooling, which leaves no degree of freedom: "
+            "use Kolmogorov-Smirnov, as the paper did",
+        )
+    found = stats.chisquare(observed, expected, ddof=ESTIMATED)
+    return CHI_SQUARED.done(
+        found.statistic, found.pvalue, n, stats.skew(values), f"{len(expected)} bins"
+    )
+
+
+def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
+    """Bins after pooling the emptier tail bin inwards until both tails expect enough.
+
+    As in ``chi2gof``, also the bins next to the tails must expect enough, inner bins are left
+    alone, and at least two bins stay.
+    """
+    while len(expected) > 2 and min(expected[[0, 1, -2, -1]]) < LEAST_EXPECTED:
+        first = 0 if expected[0] < expected[-1] else len(expected) - 2
+        starts = np.delete(np.arange(len(expected)), first + 1)
+        observed, expected = np.add.reduceat(observed, starts), np.add.reduceat(expected, starts)
+    return observed, expected
+
+
+def _kolmogorov_smirnov(values: Array) -> Outcome:
+    found = stats.kstest(stats.zscore(values, ddof=1), "norm")
+    return KOLMOGOROV_SMIRNOV.done(
+        found.statistic,
+        found.pvalue,
+        len(values),
+        stats.skew(values),
+        "p is too large: mean and SD come from the same values (see Lilliefors)",
+    )
+
+
+def _lilliefors(values: Array) -> Outcome:
+    statistic, p = lilliefors(values, dist="norm", pvalmethod="table")
+    low, high = LILLIEFORS_RANGE
+    message = f"p at most {low}" if p <= low else f"p at least {high}" if p >= high else ""
+    return LILLIEFORS.done(statistic, p, len(values), stats.skew(values), message)

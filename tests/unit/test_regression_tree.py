@@ -1,0 +1,208 @@
+"""Regression tree against rpart's published example, scikit-learn's own pruning, and laws."""
+
+import numpy as np
+import pytest
+from sklearn.tree import DecisionTreeRegressor
+
+from spinepipe.sensitivity import regression_tree
+from spinepipe.sensitivity.pruning import collapse_complexities, pruned_predictions
+from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _Growth
+from spinepipe.statistics import Ended
+
+MILEAGE = np.array(
+    [
+        *(33, 33, 37, 32, 32, 26, 33, 28, 25, 34, 29, 35, 26, 20, 27, 19, 30, 33, 27, 24),
+        *(26, 28, 27, 23, 26, 25, 24, 26, 24, 25, 21, 21, 23, 24, 23, 27, 23, 20, 21, 22),
+        *(22, 22, 22, 23, 23, 21, 22, 21, 21, 23, 23, 18, 20, 18, 18, 18, 19, 20, 20, 19),
+    ],
+    dtype=float,
+)
+WEIGHT = np.array(
+    [
+        *(2560, 2345, 1845, 2260, 2440, 2285, 2275, 2350, 2295, 1900, 2390, 2075, 2330, 3320),
+        *(2885, 3310, 2695, 2170, 2710, 2775, 2840, 2485, 2670, 2640, 2655, 3065, 2750, 2920),
+        *(2780, 2745, 3110, 2920, 2645, 2575, 2935, 2920, 2985, 3265, 2880, 2975, 3450, 3145),
+        *(3190, 3610, 2885, 3480, 3200, 2765, 3220, 3480, 3325, 3855, 3850, 3195, 3735, 3665),
+        *(3735, 3415, 3185, 3690),
+    ],
+    dtype=float,
+)
+"""Fuel consumption (miles per gallon) and weight (lb) of 60 cars: car.test.frame of rpart."""
+
+RPART_SPLITS = (2567.5, 3087.5, 2747.5)
+RPART_COMPLEXITIES = (0.595349, 0.134528, 0.012828)
+RPART_ERRORS = {1: 1.0, 2: 0.40465, 3: 0.27012, 4: 0.25729}
+"""Printed by rpart(Mileage ~ Weight): print.rpart, printcp; error by number of leaves."""
+
+
+def grown(x, y, **options) -> DecisionTreeRegressor:
+    return DecisionTreeRegressor(
+        min_samples_split=20, min_samples_leaf=7, random_state=0, **options
+    ).fit(x, y)
+
+
+def data(n: int, d: int, seed: int):
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(n, d))
+    return x, np.abs(x[:, 0]) + 0.5 * x[:, 1] * (x[:, 2] > 0) + 0.3 * rng.normal(size=n)
+
+
+def test_the_cars_are_those_of_rpart() -> None:
+    assert len(MILEAGE) == len(WEIGHT) == 60
+    assert MILEAGE.mean() == pytest.approx(24.58333, abs=5e-6)
+    assert ((MILEAGE - MILEAGE.mean()) ** 2).sum() == pytest.approx(1354.583, abs=5e-4)
+
+
+def test_the_sequence_of_subtrees_is_that_of_rpart() -> None:
+    model = grown(WEIGHT[:, None], MILEAGE)
+    collapse = collapse_complexities(model)
+    kept = collapse > 0.01  # rpart's default complexity
+    np.testing.assert_allclose(np.sort(collapse[kept])[::-1], RPART_COMPLEXITIES, atol=5e-7)
+    np.testing.assert_allclose(
+        np.sort(model.tree_.threshold[kept]), np.sort(RPART_SPLITS), rtol=1e-12
+    )
+
+
+def test_the_pruned_tree_is_one_of_rparts() -> None:
+    leaves = []
+    for seed in range(12):
+        found = regression_tree(WEIGHT[:, None], MILEAGE, ["weight"], seed)
+        assert 1.0 - found.r2_training == pytest.approx(RPART_ERRORS[found.leaves], abs=5e-6)
+        assert found.complexity == pytest.approx(
+            (0.595349, 0.134528, 0.012828, 0.01)[found.leaves - 1], abs=5e-7
+        )
+        # rpart: 0.45 +- 0.08 for three or four leaves, 0.61 +- 0.11 for two
+        assert 0.3 < found.r2_cross_validated < 0.75
+        leaves.append(found.leaves)
+    # rpart's own folds: 0.44826 + 0.076998 allows 0.45153, three leaves, but not 0.60508
+    assert max(set(leaves), key=leaves.count) == 3
+
+
+def test_pruning_is_that_of_scikit_learn() -> None:
+    x, y = data(400, 4, seed=1)
+    model, variance = grown(x, y), float(y.var())
+    path = model.cost_complexity_pruning_path(x, y).ccp_alphas / variance
+    np.testing.assert_allclose(
+        np.unique(np.round(collapse_complexities(model), 12)), np.unique(np.round(path, 12))
+    )
+    between = np.append(np.sqrt(path[1:-1] * path[2:]), 2.0)[::3]
+    predicted = pruned_predictions(model, x, between)
+    for complexity, row in zip(between, predicted, strict=True):
+        refitted = grown(x, y, ccp_alpha=complexity * variance)
+        np.testing.assert_allclose(row, refitted.predict(x), rtol=1e-9)
+
+
+def test_importance_is_the_share_of_the_variance_taken() -> None:
+    first, second = np.repeat([0.0, 1.0], 40), np.tile([0.0, 1.0], 40)
+    y = 3.0 * first + second
+    x = np.stack([second, np.ones(80), first], axis=1)
+    found = regression_tree(x, y, ["second", "none", "first"], seed=1)
+    # variances 1/4 and 9/4
+    np.testing.assert_allclose(found.importance, [0.1, 0.0, 0.9], atol=1e-9)
+    assert (found.leaves, found.depth) == (4, 2)
+    assert found.r2_training == pytest.approx(1.0, abs=1e-9)
+    assert found.r2_cross_validated == pytest.approx(1.0, abs=1e-9)
+    assert found.names == ("second", "none", "first")
+
+
+def test_noise_is_left_one_leaf() -> None:
+    rng = np.random.default_rng(2)
+    found = regression_tree(rng.normal(size=(200, 3)), rng.normal(size=200), "abc", seed=3)
+    assert (found.leaves, found.depth, found.status) == (1, 0, Ended.DONE)
+    assert found.importance.tolist() == [0.0, 0.0, 0.0]
+    assert found.r2_training == pytest.approx(0.0, abs=1e-12)
+    # the mean of nine tenths predicts a little worse than that of all
+    assert -0.1 < found.r2_cross_validated < 0.0
+    assert "no split" in found.message
+
+
+def test_a_pose_learnt_by_heart_is_not_praised() -> None:
+    """40 poses with ten rows each and an output that nothing but the pose itself explains."""
+    rng = np.random.default_rng(4)
+    poses, groups = rng.normal(size=(40, 3)), np.repeat(np.arange(40), 10)
+    y = np.repeat(rng.normal(size=40), 10) + 0.1 * rng.normal(size=400)
+    split = regression_tree(poses[groups], y, "xyz", seed=1)
+    together = regression_tree(poses[groups], y, "xyz", seed=1, groups=groups)
+    assert split.r2_cross_validated > 0.8
+    assert together.r2_cross_validated < 0.2
+    assert together.leaves < split.leaves
+
+
+def test_repeated_rows_of_a_group_do_not_sharpen_the_standard_error() -> None:
+    """At a complexity where the tree is its mean, which repeating does not move."""
+    x, y = data(50, 3, seed=13)
+    growth, root = _Growth(0.01, seed=1), np.array([BEYOND_ROOT])
+    once = _cross_validated(growth, x, y, root, np.arange(50), 5)
+    often = [np.tile(values, reps) for values, reps in ((x, (4, 1)), (y, 4), (np.arange(50), 4))]
+    repeated = _cross_validated(growth, *often[:2], root, often[2], 5)
+    np.testing.assert_allclose(repeated, once, rtol=1e-9)
+    # by leaving one out, where (y - mean of the others) = n / (n - 1) (y - mean)
+    error, standard_error = _cross_validated(growth, x, y, root, np.arange(50), 50)
+    squared = (50 / 49 * (y - y.mean())) ** 2 / y.var()
+    assert error[0] == pytest.approx(squared.mean())
+    assert standard_error[0] == pytest.approx(squared.std() / np.sqrt(50))
+
+
+def test_fewer_groups_than_folds_are_left_out_one_by_one() -> None:
+    x, y = data(60, 2 + 1, seed=5)
+    few = regression_tree(x, y, "abc", seed=1, folds=10, groups=np.arange(60) % 3)
+    three = regression_tree(x, y, "abc", seed=1, folds=3, groups=np.arange(60) % 3)
+    assert few.r2_cross_validated == three.r2_cross_validated
+
+
+def test_same_seed_same_tree() -> None:
+    x, y = data(300, 4, seed=6)
+    one, same, other = (regression_tree(x, y, "abcd", seed) for seed in (7, 7, 8))
+    assert one.importance.tobytes() == same.importance.tobytes()
+    assert one.r2_cross_validated == same.r2_cross_validated != other.r2_cross_validated
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e9])
+def test_the_unit_of_the_output_does_not_matter(scale: float) -> None:
+    x, y = data(300, 3, seed=9)
+    one, other = (regression_tree(x, factor * y, "abc", 1) for factor in (1.0, scale))
+    assert other.leaves == one.leaves > 1
+    np.testing.assert_allclose(other.importance, one.importance, rtol=1e-6)
+    assert other.r2_cross_validated == pytest.approx(one.r2_cross_validated, rel=1e-6)
+
+
+def test_one_row_that_differs_makes_no_tree() -> None:
+    """The fold that leaves it out has nothing to learn from."""
+    y = np.zeros(50)
+    y[17] = 1.0
+    found = regression_tree(np.arange(50.0)[:, None], y, ["x"], seed=1)
+    assert (found.status, found.leaves) == (Ended.DONE, 1)
+
+
+@pytest.mark.parametrize(
+    ("n", "groups", "status"),
+    [(19, None, Ended.TOO_FEW), (40, np.zeros(40, int), Ended.TOO_FEW)],
+)
+def test_too_few_rows_or_groups(n: int, groups, status: Ended) -> None:
+    x, y = data(n, 3, seed=10)
+    found = regression_tree(x, y, "abc", 1, groups=groups)
+    assert (found.status, found.leaves) == (status, 1)
+    assert (found.r2_cross_validated, found.r2_training) == (None, None)
+
+
+def test_a_constant_output_has_no_tree() -> None:
+    found = regression_tree(data(50, 3, seed=11)[0], np.full(50, 0.1), "abc", 1)
+    assert (found.status, found.r2_training) == (Ended.CONSTANT, None)
+    assert found.importance.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"names": "ab"}, "shapes"),
+        ({"y": np.ones(29)}, "shapes"),
+        ({"groups": np.ones(29, int)}, "shapes"),
+        ({"y": np.full(30, np.nan)}, "finite"),
+        ({"folds": 1}, "folds"),
+        ({"complexity": 0.0}, "complexity"),
+    ],
+)
+def test_what_cannot_be_grown_is_refused(change, message) -> None:
+    x, y = data(30, 3, seed=12)
+    with pytest.raises(ValueError, match=message):
+        regression_tree(**({"x": x, "y": y, "names": "abc", "seed": 1} | change))
