@@ -29,6 +29,9 @@ SAME_OPTIMUM = 1e-3
 ARRIVED = 1e-4
 """A descent this close to a known optimum, in all unknowns, would end in it."""
 
+CLOSE = 10.0
+"""An optimum this many last steps away, by slope and curvature, is reached."""
+
 LEVEL = 1e-2
 """Slope of the cost at an optimum, as a share of it per unknown's unit (logarithm or prior SD)."""
 
@@ -216,7 +219,7 @@ def _least_squares(
         method="dogbox",
         x_scale=problem.scale,
         ftol=1e-11,
-        xtol=LAST_STEP if problem.course is None else LAST_SETTLING_STEP,
+        xtol=_last_step(problem),
         gtol=1e-14,
         max_nfev=MOST_EVALUATIONS,
         callback=stop_where_known,
@@ -259,8 +262,15 @@ def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bo
     residual, jacobian = evaluation.residual, evaluation.jacobian
     assert residual is not None
     assert jacobian is not None
-    slope = 2.0 * np.abs(residual @ jacobian * problem.scale)[at_bound == 0]
-    return bool(slope.max(initial=0.0) <= LEVEL * (residual @ residual) + 1e-9)
+    slope = 2.0 * np.abs(residual @ jacobian * problem.scale)
+    bend = 2.0 * np.sum((jacobian * problem.scale) ** 2, axis=0)
+    near = slope <= CLOSE * _last_step(problem) * bend  # where nothing is left, a slope is no share
+    level = near | (slope <= LEVEL * (residual @ residual) + 1e-9)
+    return bool(level[at_bound == 0].all())
+
+
+def _last_step(problem: Problem) -> float:
+    return LAST_STEP if problem.course is None else LAST_SETTLING_STEP
 
 
 def _on_bounds(problem: Problem, x: Array) -> Array:

@@ -13,7 +13,7 @@ FLAGS = ("solved", "near_start_any", "near_start_all", "outlier", "reduced")
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``counts.parquet`` from the table ``success`` and, where there is one, ``bootstrap``."""
+    """Write ``counts.parquet`` from ``success`` and, where there is one, ``bootstrap``."""
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
     parts = [("poses", frames["success"].assign(loading="equilibrium"))]

@@ -41,15 +41,14 @@ def run(root: str, study: str, errors: str, precision: str, required: str) -> No
 def measured_errors(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Largest errors by kind of motion: a row per SD, a column per pose; infinite without result.
 
-    Kinds of motion that were not measured are left out.
+    Kinds of motion that were not measured are left out; where no pose has a result, none is.
     """
     grids = {
         kind: rows.pivot(index="sd_mm", columns="pose", values=column)
         for kind, column in COLUMNS.items()
     }
-    return {
-        kind: grid.fillna(np.inf) for kind, grid in grids.items() if grid.notna().any(axis=None)
-    }
+    measured = {kind: grid for kind, grid in grids.items() if grid.notna().any(axis=None)}
+    return {kind: grid.fillna(np.inf) for kind, grid in (measured or grids).items()}
 
 
 def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:

@@ -18,16 +18,28 @@ ALWAYS = (
 
 COMPARED = (
     *("summary", "counts", "statistics", "importance", "variance_shares", "success_by_method"),
-    *("bootstrap", "agreement", "required_precision", "landmark_precision"),
-    *("poses", "calibrations", "success"),
+    *("bootstrap", "required_precision", "landmark_precision", "landmarks"),
+    *("calibrations", "simulations", "success"),
 )
 """Tables that are compared with the paper's."""
 
-METHODS = ("exact", "forward_run_default_step", "forward_run_sane_step")
+METHODS = (
+    "exact",
+    "forward_run_default_step",
+    "forward_run_sane_step",
+    "forward_run_raw_units",
+)
+"""Ways of fitting that are compared."""
+
 FIGURES: dict[str, tuple[str, ...]] = {
     "stiffness": ("calibrations",),
     "errors": ("simulations",),
     "joint_pose": ("poses",),
+    "bootstrap": ("bootstrap",),
+    "success_by_method": ("success_by_method", "method_fits"),
+    "agreement": ("agreement", "simulations", "success"),
+    "pose_against_stiffness": ("variance_shares", "importance"),
+    "landmark_precision": ("landmark_precision", "required_precision"),
 }
 """Figures and the tables each is drawn from."""
 

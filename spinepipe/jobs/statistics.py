@@ -139,7 +139,7 @@ class Specimen:
         measured = {name for name, _ in measured_coordinates(own)}
         names = list(COORDINATES)
         grouped = own[own["joint"].isin(measured)].groupby("pose")[names]
-        return grouped.mean().loc[self.kept]
+        return grouped.mean().reindex(self.kept)  # empty where all runs are lost
 
     def _calibrated_fits(self) -> Iterator[Tested]:
         """Errors and stiffness of the poses' own fits against each other and against the pose."""

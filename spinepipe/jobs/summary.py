@@ -120,6 +120,8 @@ def _pose_rows(
 def _stiffness_rows(
     settings: JointPoseSensitivity, part: _Part, fits: pd.DataFrame
 ) -> Iterator[dict[str, Any]]:
+    if settings.calibration.grouping == "per_joint":
+        fits = fits[fits["joint"] != "*"]  # a refused fit has one row for all joints
     for joint, rows in fits.groupby("joint", sort=False):
         for name in settings.calibration.free:
             column = STIFFNESS_COLUMNS[COORDINATES.index(name)]

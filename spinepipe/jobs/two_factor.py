@@ -95,15 +95,9 @@ class Grown:
         of_pose = [str(name) for name in self.parameters.columns]
         of_stiffness = self._stiffness_names()
         pose = self.parameters.loc[grid.index].to_numpy(float)
-        stiffness = np.array([self._stiffness(str(name)) for name in grid.columns]).reshape(
-            grid.shape[1], -1
-        )
-        x = np.hstack(
-            [
-                np.repeat(pose, grid.shape[1], axis=0),
-                np.tile(stiffness.reshape(grid.shape[1], len(of_stiffness)), (len(grid), 1)),
-            ]
-        )
+        sets = [self._stiffness(str(name)) for name in grid.columns]
+        stiffness = np.array(sets).reshape(grid.shape[1], len(of_stiffness))  # there may be none
+        x = np.hstack([np.repeat(pose, grid.shape[1], axis=0), np.tile(stiffness, (len(grid), 1))])
         groups = np.repeat(np.arange(len(grid)), grid.shape[1])
         names = (*of_pose, *of_stiffness)
         tree = regression_tree(x, grid.to_numpy(float).ravel(), names, self.seed, groups=groups)

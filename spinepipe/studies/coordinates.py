@@ -4,15 +4,24 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-__all__ = ["FORM", "Coordinate", "Damping", "Shift", "Stiffness", "Weights"]
+__all__ = [
+    "FORM",
+    "Coordinate",
+    "Damping",
+    "Rotational",
+    "Shift",
+    "Stiffness",
+    "Translational",
+    "Weights",
+]
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 """Unknown keys, `yes` for a number and NaN are errors."""
 
 Coordinate = Literal["anterior", "superior", "right", "extension", "right_bending", "left_rotation"]
 
-_Translational = Annotated[float, Field(ge=1.0, le=1e9)]
-_Rotational = Annotated[float, Field(ge=1e-4, le=1e6)]
+Translational = Annotated[float, Field(ge=1.0, le=1e9)]
+Rotational = Annotated[float, Field(ge=1e-4, le=1e6)]
 _Weight = Annotated[float, Field(ge=0, le=1e6)]
 _Millimetres = Annotated[float, Field(ge=-200, le=200)]
 
@@ -22,18 +31,16 @@ class Stiffness(BaseModel):
 
     model_config = FORM
 
-    anterior_n_per_m: _Translational = Field(default=24600.0, description="anterior stiffness, N/m")
-    superior_n_per_m: _Translational = Field(
-        default=110000.0, description="superior stiffness, N/m"
-    )
-    right_n_per_m: _Translational = Field(default=13500.0, description="lateral stiffness, N/m")
-    extension_nm_per_rad: _Rotational = Field(
+    anterior_n_per_m: Translational = Field(default=24600.0, description="anterior stiffness, N/m")
+    superior_n_per_m: Translational = Field(default=110000.0, description="superior stiffness, N/m")
+    right_n_per_m: Translational = Field(default=13500.0, description="lateral stiffness, N/m")
+    extension_nm_per_rad: Rotational = Field(
         default=37.0, description="flexion-extension stiffness, N m/rad"
     )
-    right_bending_nm_per_rad: _Rotational = Field(
+    right_bending_nm_per_rad: Rotational = Field(
         default=64.0, description="lateral bending stiffness, N m/rad"
     )
-    left_rotation_nm_per_rad: _Rotational = Field(
+    left_rotation_nm_per_rad: Rotational = Field(
         default=268.0, description="axial rotation stiffness, N m/rad"
     )
 

@@ -1,14 +1,16 @@
 """Parts of a joint-pose study beyond its poses: filters, bootstraps, methods, precision."""
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from spinepipe.anatomy import published
-from spinepipe.studies.coordinates import FORM, Stiffness
+from spinepipe.studies.coordinates import FORM, Rotational, Stiffness, Translational
+from spinepipe.units import COORDINATES
 
 _BOX = published("gould_2024a")["start_stiffness_box"]
+_LOW, _HIGH = _BOX["low"], _BOX["high"]
 
 
 def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -77,17 +79,69 @@ class Bootstrap(BaseModel):
     )
 
 
+class LowestStart(Stiffness):
+    """Smallest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
+
+    anterior_n_per_m: Translational = Field(
+        default=_LOW["anterior_n_per_m"], description="anterior stiffness, N/m"
+    )
+    superior_n_per_m: Translational = Field(
+        default=_LOW["superior_n_per_m"], description="superior stiffness, N/m"
+    )
+    right_n_per_m: Translational = Field(
+        default=_LOW["right_n_per_m"], description="lateral stiffness, N/m"
+    )
+    extension_nm_per_rad: Rotational = Field(
+        default=_LOW["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
+    )
+    right_bending_nm_per_rad: Rotational = Field(
+        default=_LOW["right_bending_nm_per_rad"], description="lateral bending stiffness, N m/rad"
+    )
+    left_rotation_nm_per_rad: Rotational = Field(
+        default=_LOW["left_rotation_nm_per_rad"], description="axial rotation stiffness, N m/rad"
+    )
+
+
+class HighestStart(Stiffness):
+    """Largest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
+
+    anterior_n_per_m: Translational = Field(
+        default=_HIGH["anterior_n_per_m"], description="anterior stiffness, N/m"
+    )
+    superior_n_per_m: Translational = Field(
+        default=_HIGH["superior_n_per_m"], description="superior stiffness, N/m"
+    )
+    right_n_per_m: Translational = Field(
+        default=_HIGH["right_n_per_m"], description="lateral stiffness, N/m"
+    )
+    extension_nm_per_rad: Rotational = Field(
+        default=_HIGH["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
+    )
+    right_bending_nm_per_rad: Rotational = Field(
+        default=_HIGH["right_bending_nm_per_rad"], description="lateral bending stiffness, N m/rad"
+    )
+    left_rotation_nm_per_rad: Rotational = Field(
+        default=_HIGH["left_rotation_nm_per_rad"], description="axial rotation stiffness, N m/rad"
+    )
+
+
 class StartBootstrap(Bootstrap):
     """Does the start decide about the fitted stiffness?"""
 
-    lowest: Stiffness = Field(
-        default_factory=lambda: Stiffness(**_BOX["low"]),
-        description="smallest sampled stiffness (Gould 2024a, Table 1)",
+    lowest: LowestStart = Field(
+        default_factory=LowestStart, description="smallest sampled stiffness"
     )
-    highest: Stiffness = Field(
-        default_factory=lambda: Stiffness(**_BOX["high"]),
-        description="largest sampled stiffness (Gould 2024a, Table 1)",
+    highest: HighestStart = Field(
+        default_factory=HighestStart, description="largest sampled stiffness"
     )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        ends = zip(self.lowest.in_order(), self.highest.in_order(), strict=True)
+        wrong = [name for name, (low, high) in zip(COORDINATES, ends, strict=True) if low > high]
+        if wrong:
+            raise ValueError(f"highest at least lowest (not so: {', '.join(wrong)})")
+        return self
 
 
 class DampingBootstrap(Bootstrap):

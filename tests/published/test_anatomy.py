@@ -16,6 +16,7 @@ MM = ("anterior_mm", "superior_mm", "right_mm")
 DEG = ("right_bending_deg", "left_rotation_deg", "extension_deg")
 N_PER_M = ("anterior_n_per_m", "superior_n_per_m", "right_n_per_m")
 NM_PER_RAD = ("right_bending_nm_per_rad", "left_rotation_nm_per_rad", "extension_nm_per_rad")
+FITTED_COORDINATES = ("anterior", "superior", "extension")
 FITTED_STIFFNESS = ("anterior_n_per_m", "superior_n_per_m", "extension_nm_per_rad")
 SAGITTAL = ("anterior_mm", "superior_mm", "extension_deg")
 
@@ -49,10 +50,15 @@ SECTIONS_2024A = {
     **row("start_stiffness", N_PER_M + NM_PER_RAD, (24_600, 110_000, 13_500, 64, 268, 37)),
     "damping.translation_n_s_per_m": 1000,
     "damping.rotation_nm_s_per_rad": 1.4,
+    "settling.time_s": 1.5,
     **row("cost_weights", ("anterior", "superior", "right", "extension"), (10, 100, 1, 1)),
     "landmarks.palpations": 5,
     "landmarks.largest_resultant_sd_mm": 2.9,
     "success_rule.failed_within_percent_of_start": 1,
+    "success_rule.outlier_times_start": 10,
+    "outlier.extension_nm_per_rad": 470,
+    "outlier.extension_error_percent": 97,
+    "significance.p_below": 0.05,
     "counts.pose_samples": 500,
     "counts.pose_samples_successful": 124,
     "counts.pose_samples_reduced": 123,
@@ -78,6 +84,19 @@ SECTION_3 = {
     **row("measured_motion.L3L4", SAGITTAL, (0.33, -0.25, -1.8)),
     **row("measurement_uncertainty", SAGITTAL[:2], (0.0013, 8.1e-4)),
     **row("nominal_model_error", SAGITTAL, (0.32, 0.05, 0.26)),
+    **row("nominal_model_error_percent", FITTED_COORDINATES, (93, 37, 12)),
+    **row("best_model.largest_error_percent", FITTED_COORDINATES, (5, 41, 5.3)),
+    "best_model.superior_error_of_L2L3.error_mm": 0.02,
+    "best_model.superior_error_of_L2L3.percent": 15,
+    **row("bootstrap_stiffness_range.damping", FITTED_STIFFNESS, (12_000, 230_000, 0.5)),
+    **row("bootstrap_stiffness_range.start", FITTED_STIFFNESS, (550_000, 390_000, 3528)),
+    **row(
+        "bootstrap_stiffness_range.start_without_outliers",
+        FITTED_STIFFNESS,
+        (233_000, 390_000, 4.4),
+    ),
+    "ten_best_anterior_stiffness_percent_of_median.iqr": 72,
+    "ten_best_anterior_stiffness_percent_of_median.range": 112,
     **row("best_model.stiffness", FITTED_STIFFNESS, (11_900, 437_000, 14.9)),
     **row("best_model.largest_error", SAGITTAL, (0.033, 0.11, 0.077)),
     **row("reduced_stiffness.median", FITTED_STIFFNESS, (28_900, 365_000, 13.4)),
@@ -87,6 +106,68 @@ SECTION_3 = {
     "reduced_error_bound.rotation_deg": 0.8,
     "pose_correlation.p": 0.045,
     "pose_correlation.r": 0.18,
+    "pose_correlation.significant_pairs_with_stiffness": 1,
+    "pose_correlation.significant_pairs_with_error": 0,
+    "friedman.p_below": 0.05,
+    "tree.more_influential": "pose",
+    "tree.less_influential": "stiffness",
+    "reduced_against_complete.origin_median_mm": 1,
+    "reduced_against_complete.origin_iqr_mm": 0.2,
+    "reduced_against_complete.orientation_deg": 1,
+    "reduced_against_complete.extension_iqr_drop_deg.L1L2": 5.6,
+    "reduced_against_complete.extension_iqr_drop_deg.L3L4": 4.3,
+}
+
+SECTION_4 = {
+    "spread_bound.origin_iqr_mm": 1.25,
+    "spread_bound.bending_and_rotation_iqr_deg": 3.6,
+    "spread_bound.extension_iqr_deg": 8.5,
+    **row("ten_best_error_in_discussion.median", SAGITTAL, (0.15, 0.12, 0.15)),
+    **row("ten_best_error_in_discussion.iqr", SAGITTAL, (0.18, 0.06, 0.15)),
+    "target_error.translation_mm": 1,
+    "target_error.rotation_deg": 1,
+}
+
+# Rows of Tables 2 and 3: per direction (L2 median, range, L3 median, range, largest percent).
+BOOTSTRAP_ROWS = {
+    ("damping", "quasi_static"): (
+        (0.42, 0.01, 0.19, 0.07, 102),
+        (5e-4, 0.35, 0.1, 0.16, 35),
+        (0.14, 0.05, 0.25, 0.12, 13),
+    ),
+    ("damping", "dynamic"): (
+        (0.45, 0.06, 0.28, 0.1, 110),
+        (0.06, 0.14, 0.05, 0.06, 35),
+        (0.48, 1.2, 0.52, 1.5, 29),
+    ),
+    ("start", "quasi_static"): (
+        (0.42, 0.24, 0.31, 0.41, 102),
+        (4e-4, 0.36, 0.09, 0.26, 35),
+        (0.03, 1.5, 0.07, 1.9, 4),
+    ),
+    ("start", "dynamic"): (
+        (0.41, 0.11, 0.31, 0.34, 102),
+        (9e-4, 0.36, 0.09, 0.27, 35),
+        (0.04, 1.5, 0.09, 1.9, 5),
+    ),
+}
+
+# Cells of Table 6 that are not NA: row, then error, then the printed ends.
+TABLE_6 = {
+    "two_factor_correlation.orientation.L3L4.left_rotation.extension": (0.18, 0.20),
+    "two_factor_correlation.orientation.L2L3.extension.anterior": (0.19, 0.22),
+    "two_factor_correlation.orientation.L2L3.extension.extension": (-0.18, -0.12),
+    "two_factor_correlation.orientation.L3L4.extension.anterior": (-0.49, -0.47),
+    "two_factor_correlation.orientation.L3L4.extension.superior": (0.47, 0.48),
+    "two_factor_correlation.orientation.L3L4.extension.extension": (-0.16, -0.12),
+    "two_factor_correlation.stiffness.L2L3.anterior.anterior": (-0.99, -0.95),
+    "two_factor_correlation.stiffness.L2L3.extension.anterior": (-0.98, -0.67),
+    "two_factor_correlation.stiffness.L2L3.extension.extension": (0.67, 1.00),
+    "two_factor_correlation.stiffness.L3L4.extension.extension": (0.85, 1.00),
+    "two_factor_correlation.p_below_of_caption": 0.5,
+    "two_factor_correlation.anterior_stiffness_fewer_models_than": 38,
+    "two_factor_correlation.extension_stiffness_fewer_models_than": 60,
+    "two_factor_correlation.extension_orientation_stiffness_sets": 2,
 }
 
 # Rows of Table 4: errors as (L2 median, IQR, range), (L3 median, IQR, range), then the stiffness.
@@ -160,6 +241,20 @@ def table_4() -> dict[str, Any]:
     return expected
 
 
+def bootstrap_tables() -> dict[str, Any]:
+    """Tables 2 and 3 turned from printed rows into keys."""
+    expected = {}
+    for (what, loading), directions in BOOTSTRAP_ROWS.items():
+        prefix = f"{what}_bootstrap_error.{loading}"
+        for name, direction, numbers in zip(SAGITTAL, FITTED_COORDINATES, directions, strict=True):
+            expected[f"{prefix}.L2L3.median.{name}"] = numbers[0]
+            expected[f"{prefix}.L2L3.range.{name}"] = numbers[1]
+            expected[f"{prefix}.L3L4.median.{name}"] = numbers[2]
+            expected[f"{prefix}.L3L4.range.{name}"] = numbers[3]
+            expected[f"{prefix}.largest_percent.{direction}"] = numbers[4]
+    return expected
+
+
 def pose_table(name: str, columns: tuple[str, ...], rows: Mapping[Any, Any]) -> dict[str, Any]:
     """Table 7 or 8 turned from printed rows into keys."""
     expected = {}
@@ -170,7 +265,8 @@ def pose_table(name: str, columns: tuple[str, ...], rows: Mapping[Any, Any]) -> 
 
 
 def test_gould_2024a_is_entered_twice() -> None:
-    expected = SECTIONS_2024A | TABLE_1 | SECTION_3 | table_4() | TABLE_5
+    expected = SECTIONS_2024A | TABLE_1 | SECTION_3 | SECTION_4
+    expected |= bootstrap_tables() | table_4() | TABLE_5 | TABLE_6
     expected |= pose_table("joint_origin", MM, TABLE_7_ROWS)
     expected |= pose_table("joint_orientation", DEG, TABLE_8_ROWS)
     assert dict(leaves(published("gould_2024a"))) == expected

@@ -1,7 +1,7 @@
 """The house keeps its plan: who imports whom, and what no tracked file may hold.
 
-Rooms stand as in the plan of the house, but for two: `report` comes before `jobs`, which draw its
-figures, and `tables` after `statics`, whose status they store.
+Rooms stand as in the plan of the house, but for three: `report` comes before `jobs`, which draw its
+figures, `tables` after `statics`, whose status they store, and `statistics` has left `sensitivity`.
 """
 
 import ast
@@ -17,7 +17,8 @@ PACKAGE = "spinepipe"
 
 ROOMS = (
     *("units", "problems", "files", "frames", "anatomy", "effects", "model", "world", "statics"),
-    *("calibrate", "designs", "tables", "cohort", "studies", "report", "jobs", "cli"),
+    *("calibrate", "designs", "statistics", "sensitivity"),
+    *("tables", "comparison", "cohort", "studies", "report", "jobs", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it."""
 

@@ -3,6 +3,8 @@
 import pytest
 from small_project import Project
 
+from spinepipe.jobs.layout import FIGURES
+
 pytestmark = pytest.mark.slow
 
 
@@ -15,4 +17,4 @@ def test_figures_are_in_the_report(project: Project) -> None:
     done = project.snakemake("--report", "report.html")
     assert done.returncode == 0, done.stdout
     report = project.path("report.html").read_text()
-    assert all(f"{name}.svg" in report for name in ("stiffness", "errors", "joint_pose"))
+    assert all(f"{name}.svg" in report for name in FIGURES)

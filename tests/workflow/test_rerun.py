@@ -5,15 +5,25 @@ from pathlib import Path
 import pytest
 from small_project import Project, written
 
+from spinepipe.jobs import layout
+from spinepipe.tables import TABLES as TABLE_SCHEMAS
+
 pytestmark = pytest.mark.slow
 
 SIMULATION = "small/jobs/specimen=s01/pose=0005/stiffness=best02.parquet"
+BOOTSTRAP = "small/bootstrap/specimen=s01/bootstrap=start/loading=dynamic/set=001.parquet"
 CALIBRATION = "small/calibrations/specimen=s01/pose=0002.parquet"
-FIGURES = {
-    f"small/figures/{n}.{kind}"
-    for n in ("stiffness", "errors", "joint_pose")
-    for kind in ("svg", "png")
+FIGURES = {f"small/figures/{name}.{kind}" for name in layout.FIGURES for kind in ("svg", "png")}
+TABLES = {f"small/{name}.parquet" for name in TABLE_SCHEMAS}
+OF_SIMULATIONS = {
+    f"small/{name}.parquet"
+    for name in (
+        *("summary", "statistics", "agreement", "variance_shares", "importance"),
+        "against_gould_2024a",
+    )
 }
+"""Tables that are made of the table of simulations."""
+
 # Appended to the ranking of the copied package: other bytes, same meaning.
 OTHER_RANKING = """
 
@@ -43,9 +53,10 @@ def simulations(files: set[str]) -> set[str]:
 
 def test_a_run_makes_every_table_and_figure(project: Project) -> None:
     files = set(project.files())
-    tables = {f"small/{name}.parquet" for name in ("landmarks", "poses", "calibrations")}
-    assert tables | FIGURES | {"small/simulations.parquet", "small/best.json"} <= files
+    others = {"small/best.json", "small/model.yaml", "small/report.html"}
+    assert TABLES | FIGURES | others <= files
     assert len(simulations(files)) == 6 * 3
+    assert len([name for name in files if name.startswith("small/bootstrap/")]) == 3 * 3 + 2
     assert not list(project.path("results").rglob("*.log"))
 
 
@@ -57,8 +68,10 @@ def test_a_deleted_simulation_is_computed_alone(project: Project) -> None:
     content = project.contents()
     delete(project, SIMULATION)
     block = "small/blocks/simulations/specimen=s01/block=001.parquet"
-    redrawn = {name for name in FIGURES if "errors" in name}
-    assert rerun(project) == {SIMULATION, block, "small/simulations.parquet"} | redrawn
+    again = rerun(project)
+    made_of_it = FIGURES | OF_SIMULATIONS | {"small/report.html"}
+    assert again - made_of_it == {SIMULATION, block, "small/simulations.parquet"}
+    assert OF_SIMULATIONS | {"small/report.html"} <= again
     assert project.contents() == content
 
 
@@ -71,6 +84,23 @@ def test_a_deleted_calibration_reruns_no_simulation_when_the_ranking_stays(
     assert {CALIBRATION, "small/calibrations.parquet", "small/best.json"} <= again
     assert simulations(again) == set()
     assert project.contents() == content
+
+
+def test_a_deleted_bootstrap_fit_is_computed_alone(project: Project) -> None:
+    content = project.contents()
+    delete(project, BOOTSTRAP)
+    jobs = ("small/bootstrap/", "small/jobs/", "small/calibrations/", "small/methods/")
+    assert {name for name in rerun(project) if name.startswith(jobs)} == {BOOTSTRAP}
+    assert project.contents() == content
+
+
+def test_a_new_limit_computes_no_fit_again(project: Project) -> None:
+    """Filters and limits are applied to fits that are there."""
+    project.edit("config/studies/small.yaml", "poses: 4", "poses: 4, rotation_limit_deg: 2.0")
+    again = rerun(project)
+    assert "small/required_precision.parquet" in again
+    folders = ("small/precision/", "small/bootstrap/", "small/jobs/", "small/calibrations/")
+    assert not [name for name in again if name.startswith(folders)]
 
 
 def test_a_new_ranking_reruns_the_simulations_that_use_it(project: Project) -> None:

@@ -3,9 +3,11 @@
 import numpy as np
 import pandas as pd
 import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 import pytest
 from small_project import Project
 
+from spinepipe.tables import TABLES
 from spinepipe.units import COORDINATE_COLUMNS
 
 pytestmark = pytest.mark.slow
@@ -28,10 +30,17 @@ def test_errors_of_a_calibration_are_those_of_its_simulation(project: Project) -
 
 
 def test_no_number_is_nan_or_infinite(project: Project) -> None:
-    for name in ("landmarks", "poses", "calibrations", "simulations"):
+    for name in TABLES:
         for column in table(project, name).select_dtypes("number"):
             values = ds.dataset(project.path(f"results/small/{name}.parquet")).to_table([column])
             assert np.isfinite(values[column].drop_null().to_numpy()).all(), column
+
+
+def test_every_table_keeps_its_schema_and_names_its_makers(project: Project) -> None:
+    for name, schema in TABLES.items():
+        found = pq.read_table(project.path(f"results/small/{name}.parquet"))
+        assert found.schema.remove_metadata() == schema.schema, name
+        assert {b"seed", b"code_digest", b"config_digest"} <= set(found.schema.metadata), name
 
 
 def test_job_files_open_as_one_data_set(project: Project) -> None:

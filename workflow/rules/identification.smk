@@ -114,7 +114,6 @@ rule study_report:
         tables=lambda wildcards: layout(wildcards.study).report_tables(),
         figures=lambda wildcards: layout(wildcards.study).figure_files(),
         captions=lambda wildcards: layout(wildcards.study).captions(),
-        best=f"{RESULTS}/best.json",
     output:
         output=f"{RESULTS}/report.html",
     log:

@@ -1,0 +1,65 @@
+"""Job: what each way of fitting makes of the same poses."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from statsmodels.stats.proportion import proportion_confint
+
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.provenance import provenance
+from spinepipe.tables import SUCCESS_BY_METHOD, from_rows, read_frame, write
+
+ARRIVED = 1.01
+"""A fit has arrived when its cost is at most this many times the least found for its pose."""
+
+
+def run(root: str, study: str, fits: str, output: str) -> None:
+    """Write ``success_by_method.parquet``."""
+    settings, cohort = study_and_cohort(root, study)
+    rows = count_by_method(read_frame(fits), settings.success.failed_when)
+    table = from_rows(SUCCESS_BY_METHOD, rows)
+    write(table, output, provenance("success_by_method", settings, cohort))
+
+
+def count_by_method(fits: pd.DataFrame, failed_when: str) -> list[dict[str, Any]]:
+    """One row per specimen and method; refused fits count as tried and not successful.
+
+    Parameters
+    ----------
+    failed_when : ``all`` or ``any`` of the free stiffnesses near their start make a failed fit.
+    """
+    fits = fits.copy()
+    fits["cost"] = fits["cost"].astype(float)
+    least = fits.groupby(["specimen", "pose"])["cost"].transform("min")
+    fits["arrived"] = fits["cost"] <= ARRIVED * least
+    groups = fits.groupby(["specimen", "method"], sort=False)
+    return [
+        {"specimen": specimen, "method": method, **_counted(part, failed_when)}
+        for (specimen, method), part in groups
+    ]
+
+
+def _counted(fits: pd.DataFrame, failed_when: str) -> dict[str, Any]:
+    solved = fits["cost"].notna()
+    near = {how: fits[f"near_start_{how}"].eq(True) & solved for how in ("any", "all")}
+    successful = int((solved & ~near[failed_when]).sum())
+    low, high = proportion_confint(successful, len(fits), method="wilson")
+    error = fits["derivative_error"].astype(float)
+    known = bool(error.notna().any())
+    return {
+        "fits": len(fits),
+        "solved": int(solved.sum()),
+        "near_start_any": int(near["any"].sum()),
+        "near_start_all": int(near["all"].sum()),
+        "claimed": int(fits["claims_success"].sum()),
+        "successful": successful,
+        "success": successful / len(fits),
+        "success_low": float(np.clip(low, 0.0, 1.0)),
+        "success_high": float(np.clip(high, 0.0, 1.0)),
+        "arrived": int(fits["arrived"].sum()),
+        "evaluations_median": float(fits["evaluations"].median()),
+        "evaluations_largest": int(fits["evaluations"].max()),
+        "derivative_error_median": float(error.median()) if known else None,
+        "derivative_error_largest": float(error.max()) if known else None,
+    }
