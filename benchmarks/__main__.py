@@ -1,21 +1,35 @@
-"""`python -m benchmarks`: measure, print, and write benchmarks/results/foundation.{md,json}."""
+"""`python -m benchmarks [PART ...]`: measure, print, write benchmarks/results/PART.{md,json}."""
 
 import json
+import sys
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
+from typing import Any
 
-from benchmarks import engine, study
+from benchmarks import engine, identification, study
 from benchmarks.timing import machine
 
 RESULTS = Path(__file__).parent / "results"
 
 
 def main() -> None:
-    """Run everything and write one table of each kind."""
-    about = {"date": date.today().isoformat(), **machine()}
-    lines = ["# Speed", "", "Written by `make bench`. CPU seconds of one core, medians.", ""]
-    lines += [f"{key}: {value}  " for key, value in about.items()]
+    """Run the parts that are asked for, or all."""
+    parts: dict[str, Callable[[], None]] = {
+        "foundation": foundation,
+        "identification": identification_parts,
+    }
+    for name in sys.argv[1:] or parts:
+        if name not in parts:
+            sys.exit(f"no benchmark {name!r}: {', '.join(parts)}")
+        parts[name]()
+
+
+def foundation() -> None:
+    """Equilibrium, calibration and the whole study: one table of each kind."""
+    about = _about()
+    lines = _head("Speed", about)
     lines += [
         "",
         "| what | spinepipe ms | peer | peer ms | ratio | agreement |",
@@ -47,10 +61,54 @@ def main() -> None:
     per_target = 1e3 * study_rows[0]["engine_s"] / study.targets()
     lines += ["", f"Snakemake's own CPU per target of the cold run: {per_target:.1f} ms (goal 7)."]
     print(lines[-1], flush=True)
-    RESULTS.mkdir(exist_ok=True)
-    (RESULTS / "foundation.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
     data = {"machine": about, "engine": engine_rows, "study": study_rows}
-    (RESULTS / "foundation.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    _write("foundation", lines, data)
+
+
+def identification_parts() -> None:
+    """Bootstrap fits, settling runs, and the same fits done in several ways."""
+    about = _about()
+    lines = _head("Speed and success of identification", about)
+    lines += ["", "| what | spinepipe ms | OpenSim CPodes ms | goal |", "|---|---|---|---|"]
+    speeds, fits = [], []
+    for speed in identification.speeds():
+        speeds.append(asdict(speed))
+        peer = "" if speed.peer_s is None else f"{1e3 * speed.peer_s:.1f}"
+        lines.append(f"| {speed.what} | {1e3 * speed.ours_s:.1f} | {peer} | {speed.goal} |")
+        print(lines[-1], flush=True)
+    lines += [
+        "",
+        "Fits of three stiffnesses. Near start: within 1 %. Cost: relative to the exact fit's.",
+        "Derivative error: of the cost at the start, relative; the exact one is the reference.",
+        "",
+        "| joint poses | method | says success | near start | cost | derivative error | runs "
+        "| CPU s |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in identification.fits():
+        fits.append(asdict(row))
+        error = "" if row.derivative_error is None else f"{row.derivative_error:.1e}"
+        lines.append(
+            f"| {row.pose} | {row.method} | {'yes' if row.claims_success else 'no'} "
+            f"| {row.near_start} | {row.cost_ratio:.3f} | {error} | {row.runs} | {row.cpu_s:.2f} |"
+        )
+        print(lines[-1], flush=True)
+    _write("identification", lines, {"machine": about, "speeds": speeds, "fits": fits})
+
+
+def _about() -> dict[str, str]:
+    return {"date": date.today().isoformat(), **machine()}
+
+
+def _head(title: str, about: dict[str, str]) -> list[str]:
+    lines = [f"# {title}", "", "Written by `make bench`. CPU seconds of one core, medians.", ""]
+    return lines + [f"{key}: {value}  " for key, value in about.items()]
+
+
+def _write(name: str, lines: list[str], data: dict[str, Any]) -> None:
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{name}.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    (RESULTS / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -15,10 +15,10 @@ L1-L4 segment, accuracy 1e-5), median and largest:
     scipy's BDF, exact Jacobian         8e-8    2e-7
     `settle`                            6e-8    3e-7
 
-At a step of 1e-3 all have 1.7e-3, the curvature of the cost. So the noise is that of the iteration
-with a rough Jacobian, and what follows from it is understated here. OpenSim's default integrator
-(explicit Runge-Kutta-Merson) has 1e-3 and 29 s per run. scipy's VODE, CPodes' own parent, transposes
-the Jacobian in release 1.17 (scipy issue 24933) and cannot be used.
+At a step of 1e-3 all have 1.7e-3, the curvature of the cost. So the noise is that of iterating
+with a rough Jacobian, and what follows from it is understated here. OpenSim's default integrator,
+explicit Runge-Kutta-Merson, has 1e-3 (one stiffness set), at 29 s per run. scipy's VODE, nearest
+kin of CPodes, transposes the Jacobian in release 1.17 (scipy issue 24933) and cannot be used.
 """
 
 import warnings

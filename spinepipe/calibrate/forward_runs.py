@@ -10,25 +10,23 @@ not: fmincon needs about half the runs.
 """
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.optimize import Bounds, approx_fprime, minimize
+from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
-from spinepipe.calibrate.forward_run import forward_run
-from spinepipe.calibrate.problem import Evaluator, Problem
+from spinepipe.calibrate.forward_cost import LOST, ForwardCost, OutOfRuns
+from spinepipe.calibrate.problem import Problem
 from spinepipe.effects.contract import Array
-from spinepipe.model import RefusedModel
-from spinepipe.statics import Program, Status, moved, settle
+from spinepipe.statics import Status
 
 DEFAULT_STEP = float(np.sqrt(np.finfo(float).eps))
 """Difference step of an optimiser that is told none, relative to the unknown."""
 
 MOST_EVALUATIONS = 300
-LAST_BARRIER = 1e-8
-
-LOST = 1e6
-"""Cost (mm2, deg2) of a point whose run is lost: any optimiser turns back there."""
+BARRIER: Any = {"initial_barrier_parameter": 1e-8, "initial_barrier_tolerance": 1e-8}
+"""trust-constr's own last barrier, taken as the first too."""
 
 NEAR_BOUND = 1e-2
 """A barrier keeps this far (logarithm) from a bound that it runs into."""
@@ -72,6 +70,7 @@ def fit_by_forward_runs(
     relative_step : of the forward differences, as a share of the unknown.
     accuracy : relative accuracy asked of each run.
     raw_units : unknowns are stiffness in SI; else stiffness divided by its start.
+    most_evaluations : runs after which the optimiser is stopped; more than there are unknowns.
 
     Raises
     ------
@@ -80,16 +79,21 @@ def fit_by_forward_runs(
     ValueError
         For an unknown that is not logarithmic.
     """
+    cost = ForwardCost(problem, duration_s, accuracy, most_evaluations)
+    return fit_by_cost(cost, relative_step, raw_units)
+
+
+def fit_by_cost(runs: ForwardCost, relative_step: float, raw_units: bool) -> ForwardFit:
+    """The same with any runs; see `fit_by_forward_runs`."""
+    problem = runs.problem
     if not all(parameter.logarithmic for parameter in problem.free):
         raise ValueError("forward runs fit stiffness, not parameters that may be negative")
-    runs = _Runs(problem, duration_s, accuracy)
     start = np.array([_first_value(problem, index) for index in range(len(problem.free))])
     search = _Search(runs, start if raw_units else np.ones_like(start), relative_step)
     if runs.cost(np.zeros_like(start)) >= LOST:
         message = "the forward run with the start's stiffness is lost"
         return _ended(search, start, False, Status.UNSTABLE, message, None)
     gradient = search.gradient(search.unit) * search.unit
-    runs.most = most_evaluations
     claims, status, message = search.run()
     usable = gradient if np.abs(gradient).max() < LOST else None
     return _ended(search, start, claims, status, message, usable)
@@ -116,54 +120,10 @@ def _first_value(problem: Problem, index: int) -> float:
     )
 
 
-class _OutOfRuns(Exception):
-    """The optimiser has had all the runs it may have."""
-
-
-class _Runs(Evaluator):
-    """The cost of a problem by forward runs; each point is run once."""
-
-    def __init__(self, problem: Problem, duration_s: float, accuracy: float) -> None:
-        super().__init__(replace(problem, course=None))
-        self._duration_s, self._accuracy = duration_s, accuracy
-        self.costs: dict[bytes, float] = {}
-        self.most = MOST_EVALUATIONS
-        for system in self._systems:  # a run of no time tells whether the chain can move at all
-            nothing = Program.constant(system.slots.unloaded())
-            end = settle(system, nothing, 0.0)
-            if end.status is Status.REFUSED:
-                raise RefusedModel(end.message)
-
-    def cost(self, x: Array) -> float:
-        """Sum of weight times squared error with the unknowns at x (m,)."""
-        point = x.tobytes()
-        if point not in self.costs:
-            if len(self.costs) >= self.most:
-                raise _OutOfRuns
-            self.costs[point] = self._run(x)
-        return self.costs[point]
-
-    def _run(self, x: Array) -> float:
-        model = moved(self.problem.model, self.problem.free, x)
-        total = 0.0
-        for number, system in enumerate(self._systems):
-            there = system.with_model(model)
-            ends = [
-                forward_run(there, loading, self._duration_s, self._accuracy)
-                for loading in (there.slots.loading(s.wrenches) for s in there.case.steps)
-            ]
-            poses = [end for end in ends if end is not None]
-            if len(poses) < len(ends):
-                return LOST
-            residual = self._residual(number, there, np.stack(poses))
-            total += float(residual @ residual)
-        return min(total, LOST)
-
-
 class _Search:
     """The optimiser on unknowns that are ``unit`` (m,) at the start."""
 
-    def __init__(self, runs: _Runs, unit: Array, relative_step: float) -> None:
+    def __init__(self, runs: ForwardCost, unit: Array, relative_step: float) -> None:
         self.runs, self.unit, self.relative_step = runs, unit, relative_step
         self.last = unit
 
@@ -181,6 +141,7 @@ class _Search:
     def run(self) -> tuple[bool, Status, str]:
         """Whether the optimiser claims success, the status and its message."""
         problem = self.runs.problem
+        arrive: Any = self._arrive
         low, high = self.unit * np.exp(problem.lower), self.unit * np.exp(problem.upper)
         with warnings.catch_warnings(record=True) as notes:
             warnings.simplefilter("always")
@@ -191,19 +152,16 @@ class _Search:
                     method="trust-constr",
                     jac=self.gradient,
                     bounds=Bounds(low, high, keep_feasible=True),
-                    callback=self._arrive,
-                    options={
-                        "initial_barrier_parameter": LAST_BARRIER,
-                        "initial_barrier_tolerance": LAST_BARRIER,
-                    },
+                    callback=arrive,
+                    options=BARRIER,
                 )
-            except _OutOfRuns:
+            except OutOfRuns:
                 message = f"no optimum within {self.runs.most} runs of the model"
                 return False, Status.NOT_CONVERGED, message
         self.last = result.x
         return self._verdict(bool(result.success), str(result.message), notes)
 
-    def _arrive(self, unknowns: Array, *_state: object) -> None:
+    def _arrive(self, unknowns: Array, _state: OptimizeResult) -> None:
         self.last = unknowns.copy()
 
     def _verdict(

@@ -14,7 +14,7 @@ CONFIDENCE = (2.5, 97.5)
 class Required:
     """The largest SD that will do, with its 95 % interval.
 
-    None where it lies outside the sampled SDs; the message says on which side.
+    None where one lies outside the sampled SDs; the message says on which side.
     """
 
     sd: float | None
@@ -41,7 +41,8 @@ def required_precision(
     drawn = np.random.default_rng(seed).integers(0, n, (bootstraps, n))
     repeated = np.array([_crossing(sds, below[:, row].mean(axis=1), share) for row in drawn])
     low, high = np.percentile(repeated, CONFIDENCE, method="inverted_cdf")
-    return Required(_inside(found), _inside(low), _inside(high), _message(sds, found))
+    message = _message(sds, found) or _beyond(sds, low, high)
+    return Required(_inside(found), _inside(low), _inside(high), message)
 
 
 def _crossing(sds: Array, below: Array, share: float) -> float:
@@ -69,3 +70,10 @@ def _message(sds: Array, found: float) -> str:
     if found == -np.inf:
         return f"{sds[0]:g} mm will not do, the smallest that was sampled"
     return ""
+
+
+def _beyond(sds: Array, low: float, high: float) -> str:
+    """Which ends of the interval lie outside the sampled SDs, "" for none."""
+    ends = [f"begins below {sds[0]:g} mm"] if low == -np.inf else []
+    ends += [f"ends above {sds[-1]:g} mm"] if high == np.inf else []
+    return f"the interval {' and '.join(ends)}" if ends else ""

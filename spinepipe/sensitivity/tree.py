@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.model_selection import GroupKFold
+from sklearn.base import clone
+from sklearn.model_selection import GroupKFold, cross_val_predict
 from sklearn.tree import DecisionTreeRegressor
 
-from spinepipe.sensitivity.pruning import collapse_complexities, pruned_predictions
 from spinepipe.statistics import Ended
 from spinepipe.statistics.outcome import Array
 
@@ -51,25 +51,6 @@ class Tree:
     message: str = ""
 
 
-@dataclass(frozen=True)
-class _Growth:
-    """What every tree of one analysis is grown with."""
-
-    complexity: float
-    seed: int
-
-    def grow(self, x: Array, y: Array, complexity: float | None = None) -> DecisionTreeRegressor:
-        """The tree of x (n, d), y (n,) pruned at a complexity relative to the variance of y."""
-        cost = (self.complexity if complexity is None else complexity) * float(y.var())
-        model = DecisionTreeRegressor(
-            min_samples_split=FEWEST_TO_SPLIT,
-            min_samples_leaf=FEWEST_IN_LEAF,
-            ccp_alpha=cost,
-            random_state=self.seed,
-        )
-        return model.fit(x, y)
-
-
 def regression_tree(
     x: ArrayLike,
     y: ArrayLike,
@@ -110,8 +91,22 @@ def regression_tree(
         return _without(tuple(names), complexity, Ended.CONSTANT, "all outputs are the same")
     # scaled, since scikit-learn takes a variance below 1e-16 or so for none
     output = (output - output.mean()) / output.std()
-    growth = _Growth(complexity, seed)
-    return _chosen(growth, inputs, output, tuple(names), units, min(folds, n_units))
+    growth = _growth(complexity, seed)
+    splitter = GroupKFold(min(folds, n_units), shuffle=True, random_state=seed)
+    return _chosen(growth, splitter, inputs, output, tuple(names), units)
+
+
+def _growth(complexity: float, seed: int) -> DecisionTreeRegressor:
+    """What every tree of one analysis is grown with, for outputs of variance 1.
+
+    As in rpart, a split that saves less than the complexity is not attempted.
+    """
+    return DecisionTreeRegressor(
+        min_samples_split=FEWEST_TO_SPLIT,
+        min_samples_leaf=FEWEST_IN_LEAF,
+        min_impurity_decrease=complexity,
+        random_state=seed,
+    )
 
 
 def _check(
@@ -132,17 +127,22 @@ def _without(names: tuple[str, ...], complexity: float, status: Ended, message: 
 
 
 def _chosen(
-    growth: _Growth, x: Array, y: Array, names: tuple[str, ...], units: Groups, folds: int
+    growth: DecisionTreeRegressor,
+    splitter: GroupKFold,
+    x: Array,
+    y: Array,
+    names: tuple[str, ...],
+    units: Groups,
 ) -> Tree:
     """The tree after cross-validation of the whole sequence of subtrees."""
-    ends = np.unique(collapse_complexities(growth.grow(x, y)))
-    ends = np.concatenate(([growth.complexity], ends[ends > growth.complexity]))
+    ends = growth.cost_complexity_pruning_path(x, y).ccp_alphas
+    ends[0] = growth.min_impurity_decrease  # below it the whole tree stands
     # as in rpart: each subtree is tried at the geometric mean of the ends of its range
     inner = np.append(np.sqrt(ends[:-1] * ends[1:]), BEYOND_ROOT)
-    error, standard_error = _cross_validated(growth, x, y, inner, units, folds)
+    error, standard_error = _cross_validated(growth, splitter, x, y, inner, units)
     best = int(np.argmin(error))
     index = int(np.flatnonzero(error <= error[best] + standard_error[best])[-1])
-    model = growth.grow(x, y, float(inner[index]))
+    model = _pruned(growth, inner[index]).fit(x, y)
     message = "no split is worth its leaf" if model.get_n_leaves() == 1 else ""
     return Tree(
         names,
@@ -157,16 +157,26 @@ def _chosen(
     )
 
 
+def _pruned(growth: DecisionTreeRegressor, complexity: float) -> DecisionTreeRegressor:
+    """The same growth, cut back at a complexity."""
+    return clone(growth).set_params(ccp_alpha=float(complexity))
+
+
 def _cross_validated(
-    growth: _Growth, x: Array, y: Array, complexities: Array, units: Groups, folds: int
+    growth: DecisionTreeRegressor,
+    splitter: GroupKFold,
+    x: Array,
+    y: Array,
+    complexities: Array,
+    units: Groups,
 ) -> tuple[Array, Array]:
-    """Error (k,) in folds left out, as a share of the variance, and its standard error (k,)."""
-    squared = np.empty((len(complexities), len(y)))
-    splitter = GroupKFold(folds, shuffle=True, random_state=growth.seed)
-    for training, left_out in splitter.split(x, y, units):
-        model = growth.grow(x[training], y[training])
-        predicted = pruned_predictions(model, x[left_out], complexities)
-        squared[:, left_out] = (y[left_out] - predicted) ** 2
+    """Error (k,) in folds left out, as a share of the variance, and its standard error (k,).
+
+    A complexity costs the same per row in every fold, as in rpart.
+    """
+    trees = (_pruned(growth, complexity) for complexity in complexities)
+    predicted = [cross_val_predict(tree, x, y, groups=units, cv=splitter) for tree in trees]
+    squared = (y - np.array(predicted)) ** 2
     _, unit = np.unique(units, return_inverse=True)
     sums = np.array([np.bincount(unit, row) for row in squared])
     whole = len(y) * float(y.var())
