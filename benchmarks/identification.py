@@ -6,7 +6,7 @@ of OpenSim itself (CPodes), on the same model, so that a reader sees how good th
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -106,7 +106,7 @@ def peer_chain(model: SpineModel, step: LoadStep) -> PeerChain:
     )
 
 
-def problems() -> Iterator[tuple[str, Problem]]:
+def problems(numbers: Sequence[int] = SAMPLED) -> Iterator[tuple[str, Problem]]:
     """The study's problem in the cohort's own joint poses and in sampled ones."""
     settings, cohort = study_and_cohort(ROOT, STUDY)
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
@@ -116,7 +116,7 @@ def problems() -> Iterator[tuple[str, Problem]]:
         sampled = sampled_poses(poses)
     own = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).nominal
     yield "the cohort's own", calibration_problem(ROOT, settings, SPECIMEN, own)
-    for pose in SAMPLED:
+    for pose in numbers:
         frames, reason = sampled.of(SPECIMEN, pose)
         assert frames is not None, reason
         yield f"sampled {pose}", calibration_problem(ROOT, settings, SPECIMEN, frames)

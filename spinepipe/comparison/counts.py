@@ -19,6 +19,7 @@ METHODS = {
     "exact": "fits with exact derivatives",
     "forward_run_default_step": "forward runs, differences with an optimiser's default step",
     "forward_run_sane_step": "forward runs, differences with a step chosen with care",
+    "forward_run_raw_units": "forward runs, default step, on stiffness in N/m and N m/rad",
 }
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = "spinepipe"
-_DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json")
+_DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json", ".html", ".css")
 
 
 @cache

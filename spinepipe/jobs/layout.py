@@ -34,12 +34,12 @@ METHODS = (
 FIGURES: dict[str, tuple[str, ...]] = {
     "stiffness": ("calibrations",),
     "errors": ("simulations",),
-    "joint_pose": ("poses",),
-    "bootstrap": ("bootstrap",),
-    "success_by_method": ("success_by_method", "method_fits"),
     "agreement": ("agreement", "simulations", "success"),
+    "joint_pose": ("poses",),
     "pose_against_stiffness": ("variance_shares", "importance"),
     "landmark_precision": ("landmark_precision", "required_precision"),
+    "bootstrap": ("bootstrap",),
+    "success_by_method": ("success_by_method", "method_fits"),
 }
 """Figures and the tables each is drawn from."""
 

@@ -9,7 +9,10 @@ from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.studies import Study
 
-_LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pybullet", "SALib", "spinepipe")
+_LIBRARIES = (
+    *("numpy", "scipy", "pandas", "pyarrow", "pybullet", "SALib", "scikit-learn", "statsmodels"),
+    *("matplotlib", "plotly", "Jinja2", "spinepipe"),
+)
 
 
 @cache

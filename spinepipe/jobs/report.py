@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import pyarrow.parquet as pq
+
 from spinepipe.files import appearing
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.page import Results, study_page
-from spinepipe.tables import read, read_frames
+from spinepipe.report.page import READ, Results, study_page
+from spinepipe.tables import read_frames
 
 
 def run(
@@ -14,7 +16,7 @@ def run(
     """Write the page from the files of all tables, pictures (SVG) and captions."""
     settings, cohort = study_and_cohort(root, study)
     results = Results(
-        tables=read_frames(tables),
+        tables=read_frames([path for path in tables if Path(path).stem in READ]),
         metadata={Path(path).stem: _metadata(path) for path in tables},
         pictures=_texts(figures),
         captions=_texts(captions),
@@ -25,7 +27,7 @@ def run(
 
 
 def _metadata(path: str) -> dict[str, str]:
-    found = read(path).schema.metadata or {}
+    found = pq.read_schema(path).metadata or {}
     return {key.decode(): value.decode() for key, value in found.items()}
 
 

@@ -134,7 +134,7 @@ def _frames(axis: Axes, side: _Side, cohort: Cohort, view: SpecimenView) -> None
 
 def _loads(axis: Axes, side: _Side, view: SpecimenView, size: float) -> None:
     """The largest load of each test: force as an arrow, moment in this plane as an arc."""
-    chosen = [(case, wrench) for case in view.cases for wrench in _largest(case)]
+    chosen = [(case, wrench) for case in view.cases for wrench in largest_load(case)]
     forces = [float(np.linalg.norm(wrench.force)) for _, wrench in chosen]
     most = max(forces, default=0.0)
     words: dict[tuple[float, float], list[str]] = {}
@@ -165,7 +165,7 @@ def _spot(point: Array) -> tuple[float, float]:
     return float(point[0]), float(point[1])
 
 
-def _largest(case: LoadCase) -> tuple[Wrench, ...]:
+def largest_load(case: LoadCase) -> tuple[Wrench, ...]:
     """Loads of the step of a test with the largest forces, or moments where there is no force."""
 
     def total(wrenches: tuple[Wrench, ...]) -> tuple[float, float]:

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, grid, head, label_rows, mark_start, row_height
+from spinepipe.report.log_axis import log_ticks
 from spinepipe.report.published import paper_of
 from spinepipe.report.rows import EVERY_JOINT, Rows, rows_of
 from spinepipe.report.spread import (
@@ -25,7 +25,7 @@ from spinepipe.report.spread import (
     quartiles,
 )
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
-from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit, tick
+from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
 from spinepipe.statics.status import Status
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
@@ -179,21 +179,7 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     low, high = min([low, *near]), max([high, *near])
     margin = 10 ** max(0.06, 0.07 * log10(high / low))
     axis.set_xlim(low / margin, high * margin)
-    _ticks(axis, low / margin, high * margin)
-
-
-def _ticks(axis: Axes, low: float, high: float) -> None:
-    """Few ticks with plain numbers: even ones within half a decade, else 1, 2, 5 or decades."""
-    decades = log10(high / low)
-    if decades < 0.5:
-        even = [x for x in MaxNLocator(4).tick_values(low, high) if low <= x <= high]
-        axis.xaxis.set_major_locator(FixedLocator(even))
-        axis.xaxis.set_minor_locator(NullLocator())
-    else:
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,)))
-        axis.xaxis.set_minor_locator(LogLocator(subs=range(1, 10)))
-    axis.xaxis.set_major_formatter(lambda x, _: tick(x))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    log_ticks(axis.xaxis, low / margin, high * margin)
 
 
 def _shown(axis: Axes, x: float) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from spinepipe.files import appearing
 
-BLACK, GREY = "#000000", "#767676"
+BLACK, GREY, WHITE = "#000000", "#767676", "#FFFFFF"
 BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
 """Okabe and Ito, Color Universal Design, 2008."""
 
@@ -90,6 +90,21 @@ def note(panel: Axes, x: float, y: float, words: str, color: str = BLACK, **how:
     panel.text(x, y, words, transform=across, bbox=behind, in_layout=False, **settings)
 
 
+_NO_DATE: dict[str, dict[str, None]] = {
+    "svg": {"Date": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+}
+"""Kinds of pictures, and what of their metadata changes from run to run."""
+
+
+def picture(figure: Figure, kind: str) -> bytes:
+    """A figure as the bytes of an ``svg``, ``png`` or ``pdf``, always the same."""
+    content = io.BytesIO()
+    figure.savefig(content, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
+    return content.getvalue()
+
+
 def save(figure: Figure, path: str | Path) -> None:
     """Write a picture, SVG, PNG or PDF by its name; it appears whole or not at all.
 
@@ -99,15 +114,9 @@ def save(figure: Figure, path: str | Path) -> None:
         For any other kind of picture.
     """
     path = Path(path)
-    nothing: dict[str, dict[str, None]] = {
-        ".svg": {"Date": None},
-        ".png": {"Software": None},
-        ".pdf": {"CreationDate": None},
-    }
-    if path.suffix not in nothing:
-        raise ValueError(f"{path.name}: a picture is .svg, .png or .pdf")
-    picture = io.BytesIO()
     kind = path.suffix.removeprefix(".")
-    figure.savefig(picture, format=kind, dpi=DPI, metadata=nothing[path.suffix])
+    if kind not in _NO_DATE:
+        raise ValueError(f"{path.name}: a picture is .svg, .png or .pdf")
+    content = picture(figure, kind)
     with appearing(path) as temporary:
-        temporary.write_bytes(picture.getvalue())
+        temporary.write_bytes(content)

@@ -1,0 +1,124 @@
+"""Figure: predicted against measured motion after Bland and Altman."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.agreement_rows import draw_rows
+from spinepipe.report.layout import explain, head
+from spinepipe.report.style import BLACK, GREY, OURS, VERMILLION, blank, saying
+from spinepipe.report.words import AXIS, POSITIVE, count, fixed, unit
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+
+MOST_PANELS = 12
+"""With more of them, bias and limits are drawn in rows instead, without the readings."""
+
+_DATASET, _OWN = "reduced", "calibrated"
+_ACROSS_AT_MOST, _PANEL_MM, _KEY_MM = 3, 48.0, 16.0
+_MOST_OUTLINES = 300
+LIMITS = VERMILLION
+_KEY = ["specimen", "joint", "coordinate"]
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One joint and coordinate of a specimen: the row of the table and the readings behind it."""
+
+    row: pd.Series
+    readings: pd.DataFrame
+    title: str
+
+
+def agreement_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel per joint and coordinate, or where there are many a row for each."""
+    known = _usable(tables["agreement"], cohort)
+    if known.empty:
+        total = count(len(tables["agreement"]), "row")
+        return saying(f"No agreement can be shown: none of {total} has two different readings.")
+    if len(known) > MOST_PANELS:
+        return draw_rows(cohort, known)
+    panels = [_panel(row, tables, len(cohort.specimen_names)) for _, row in known.iterrows()]
+    figure, axes = _grid(len(panels), known["coordinate"].nunique())
+    for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
+        head(axis, index, panel.title)
+        _draw(axis, panel)
+    bars = {OURS: "a reading with the pose's own stiffness", BLACK: "bias", LIMITS: "limits"}
+    words = "Reduced poses; bands: 95 % intervals of bias and limits of agreement (bias ± 1.96 SD)."
+    explain(figure, bars, words)
+    return figure
+
+
+def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
+    """Rows with a result of the reduced dataset, by specimen, coordinate and joint from above."""
+    rows = table[(table["status"] == "done") & (table["dataset"] == _DATASET)]
+    single = rows[rows["joint"] != "*"]
+    orders = {
+        "specimen": list(cohort.specimen_names),
+        "joint": list(reversed(cohort.joint_names)),
+        "coordinate": list(COORDINATES),
+    }
+    places = [single[name].map(order.index) for name, order in orders.items()]
+    found = single.assign(_specimen=places[0], _joint=places[1], _coordinate=places[2])
+    return found.sort_values(["_specimen", "_joint", "_coordinate"])
+
+
+def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int) -> _Panel:
+    column = COORDINATE_COLUMNS[COORDINATES.index(row["coordinate"])]
+    success, runs = tables["success"], tables["simulations"]
+    kept = success.loc[success["reduced"] & (success["specimen"] == row["specimen"]), "pose"]
+    chosen = runs["stiffness"].eq(_OWN) & runs["specimen"].eq(row["specimen"])
+    chosen &= runs["joint"].eq(row["joint"]) & runs["pose"].isin(kept)
+    predicted = runs.loc[chosen, f"predicted_{column}"]
+    measured = runs.loc[chosen, f"measured_{column}"]
+    readings = pd.DataFrame(
+        {"mean": (predicted + measured) / 2.0, "difference": predicted - measured}
+    ).dropna()
+    words = [row["specimen"]] if n_specimens > 1 else []
+    title = ", ".join([*words, row["joint"], AXIS[row["coordinate"]].lower()])
+    return _Panel(row, readings, title)
+
+
+def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
+    across = min(n, n_coordinates if n_coordinates > 1 else _ACROSS_AT_MOST)
+    down = -(-n // across)
+    figure = blank(down * _PANEL_MM + _KEY_MM)
+    panels = list(figure.subplots(down, across, squeeze=False).ravel())
+    for spare in panels[n:]:
+        spare.set_visible(False)
+    return figure, panels[:n]
+
+
+def _draw(axis: Axes, panel: _Panel) -> None:
+    row, readings = panel.row, panel.readings
+    axis.plot(
+        readings["mean"], readings["difference"], "o", color=OURS, ms=2.0, mew=0.0, alpha=0.35,
+        rasterized=len(readings) > _MOST_OUTLINES, zorder=3,
+    )  # fmt: skip
+    axis.axhline(0.0, color=GREY, lw=0.5, zorder=1)
+    _line(axis, row["bias"], (row["bias_low"], row["bias_high"]), BLACK)
+    sd_band = row["lower_limit"] - row["lower_limit_low"]
+    _line(axis, row["lower_limit"], (row["lower_limit_low"], row["lower_limit"] + sd_band), LIMITS)
+    upper = row["upper_limit"]
+    _line(axis, upper, (2.0 * upper - row["upper_limit_high"], row["upper_limit_high"]), LIMITS)
+    axis.margins(y=0.18)
+    axis.xaxis.set_major_locator(MaxNLocator(4))
+    axis.yaxis.set_major_locator(MaxNLocator(5))
+    name = row["coordinate"]
+    axis.set_xlabel(f"mean of both ({unit(name)}), + is {POSITIVE[name]}")
+    axis.set_ylabel(f"predicted less measured ({unit(name)})")
+    limits = f"({fixed(row['lower_limit'])} to {fixed(row['upper_limit'])})"
+    words = f"bias {fixed(row['bias'])} {limits}, n = {row['n']}"
+    axis.text(0.02, 0.995, words, transform=axis.transAxes, fontsize=6.0, va="top")
+
+
+def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:
+    axis.axhspan(*ends, color=color, alpha=0.15, lw=0, zorder=1)
+    axis.axhline(y, color=color, lw=0.9, ls="-" if color == BLACK else (0, (5, 2)), zorder=4)

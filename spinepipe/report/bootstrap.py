@@ -1,0 +1,145 @@
+"""Figure: how much fitted stiffness and errors hang on start values, damping and loading."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.bootstrap_paper import draw_errors, write_range
+from spinepipe.report.bootstrap_rows import FIT, bootstrap_rows
+from spinepipe.report.layout import explain, head, label_rows, mark_start
+from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.published import paper_of
+from spinepipe.report.rows import EVERY_JOINT, Rows
+from spinepipe.report.sections import sections
+from spinepipe.report.spread import Array, finite
+from spinepipe.report.strip import STRIP_KEY, draw_strip
+from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
+from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
+from spinepipe.statics.status import Status
+from spinepipe.studies import JointPoseSensitivity
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
+
+MOST_ROWS_WITH_WORDS = 14
+_ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 4.2, 15.0, 16.0
+_LEAST_SPREAD = 1.05
+"""An axis shows at least 5 % to either side: smaller spreads are to look small."""
+
+
+def bootstrap_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Upper panels: fitted stiffness; lower panels: errors; every fit a dot."""
+    fits = tables["bootstrap"]
+    solved = fits[fits["status"].isin([status.value for status in Status if status.usable])]
+    tried, found = (len(frame[FIT].drop_duplicates()) for frame in (fits, solved))
+    if not found:
+        return saying(f"No stiffness was found in any of {count(tried, 'bootstrap fit')}.")
+    free: list[str] = [name for name in COORDINATES if name in study.calibration.free]
+    measured = [name for name in COORDINATES if solved[_error(name)].notna().any()]
+    columns = [_stiffness(name) for name in free] + [_error(name) for name in measured]
+    shared = study.calibration.grouping == "per_specimen"
+    joints = (EVERY_JOINT,) if shared else cohort.joint_names
+    upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints)
+    moving = [name for name in cohort.joint_names if _has_error(solved, name, measured)]
+    lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving)
+    parts = [(len(free), _height(upper)), (len(measured), _height(lower))]
+    (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM)
+    below = others[0] if others else []
+    for index, (name, axis) in enumerate(zip(free, above, strict=True)):
+        head(axis, index, f"{AXIS[name]} stiffness")
+        _draw_stiffness(name, axis, upper, study, pooled, cohort.name)
+    for index, (name, axis) in enumerate(zip(measured, below, strict=True)):
+        head(axis, len(free) + index, f"{AXIS[name]} error")
+        _draw_errors(name, axis, lower, relative, cohort.name)
+    words = _words(tried, found, upper)
+    explain(figure, _bars(cohort.name), words, dashed="" if pooled else "start of the other fits")
+    return figure
+
+
+def _stiffness(name: str) -> str:
+    return STIFFNESS_COLUMNS[COORDINATES.index(name)]
+
+
+def _error(name: str) -> str:
+    return f"{name}_error_{'mm' if name in TRANSLATIONS else 'deg'}"
+
+
+def _has_error(solved: pd.DataFrame, joint: str, measured: Sequence[str]) -> bool:
+    rows = solved.loc[solved["joint"] == joint, [_error(name) for name in measured]]
+    return bool(rows.notna().any(axis=None))
+
+
+def _height(rows: Rows) -> float:
+    return len(rows) * (_ROW_MM if len(rows) <= MOST_ROWS_WITH_WORDS else _NARROW_MM) + _AROUND_MM
+
+
+def _draw_stiffness(
+    name: str, axis: Axes, rows: Rows, study: JointPoseSensitivity, relative: bool, cohort: str
+) -> None:
+    index = COORDINATES.index(name)
+    box = study.start_bootstrap
+    ends = (box.lowest.in_order()[index], box.highest.in_order()[index])
+    axis.set_xscale("log")
+    if not relative:
+        mark_start(axis, study.stiffness.in_order()[index])
+    samples = [finite(frame[_stiffness(name)]) for frame in rows.frames]
+    for y, (frame, values) in enumerate(zip(rows.frames, samples, strict=True)):
+        start = frame["bootstrap"].iloc[0] == "start"
+        if start and not relative:
+            axis.plot(ends, [y, y], color=GREY, lw=7.0, alpha=0.2, solid_capstyle="butt", zorder=1)
+        draw_strip(axis, values, y, OURS)
+        if len(rows) <= MOST_ROWS_WITH_WORDS:
+            _tell(axis, y, values, relative)
+            write_range(axis, cohort, name, frame, y - 0.36)
+    _limit(axis, samples, [] if relative else list(ends))
+    label_rows(axis, rows, below=0.5, above=0.75)
+    axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
+
+
+def _limit(axis: Axes, samples: Sequence[Array], more: list[float]) -> None:
+    low = min([*(values.min() for values in samples), *more]) / _LEAST_SPREAD
+    high = max([*(values.max() for values in samples), *more]) * _LEAST_SPREAD
+    axis.set_xlim(low, high)
+    log_ticks(axis.xaxis, low, high)
+
+
+def _draw_errors(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
+    axis.xaxis.set_major_locator(MaxNLocator(4))
+    for y, frame in enumerate(rows.frames):
+        values = finite(frame[_error(name)])
+        if not len(values):
+            continue
+        draw_strip(axis, values, y, OURS)
+        if not relative:
+            draw_errors(axis, cohort, name, frame, y - 0.32)
+        if len(rows) <= MOST_ROWS_WITH_WORDS:
+            _tell(axis, y, values, relative)
+    if not relative:
+        axis.set_xlim(0.0, max(1.05 * axis.get_xlim()[1], 0.1))
+    label_rows(axis, rows, below=0.6, above=0.75)
+    what = "error less own median" if relative else "mean absolute error"
+    axis.set_xlabel(f"{what} ({unit(name)})")
+
+
+def _tell(axis: Axes, y: float, values: Array, relative: bool) -> None:
+    """Median, width of the range and n of a row; a relative median says nothing."""
+    width = f"range {number(float(values.max() - values.min()), 2)}, n = {len(values)}"
+    words = width if relative else f"{number(float(np.median(values)))}, {width}"
+    note(axis, 0.02, y + 0.4, words, OURS)
+
+
+def _bars(cohort: str) -> dict[str, str]:
+    bars = {OURS: "fits in the cohort's own joint poses"}
+    paper = paper_of(cohort)
+    return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
+
+
+def _words(tried: int, found: int, rows: Rows) -> str:
+    solved = f"{count(found, 'fit')} of {tried} with a stiffness"
+    grey = "" if rows.note else "grey: where start values were drawn"
+    return "; ".join(part for part in (solved, rows.note, STRIP_KEY, grey) if part) + "."

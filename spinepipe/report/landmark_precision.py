@@ -1,0 +1,160 @@
+"""Figure: how precise landmarks must be for errors below a limit."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.layout import explain, head
+from spinepipe.report.published import paper_of
+from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
+from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.studies import JointPoseSensitivity
+
+COLORS = {"calibrated": OURS, "nominal": BEST}
+WHOSE = {
+    "calibrated": "stiffness fitted to each pose",
+    "nominal": "stiffness of the cohort's own pose",
+}
+MOTIONS = {"translation": "mm", "rotation": "°"}
+_HEIGHT_MM = 125.0
+
+
+def landmark_precision_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Above: quantiles of the largest error over landmark SD; below: share under the limit."""
+    curves, required = tables["landmark_precision"], tables["required_precision"]
+    if curves.empty or not curves["median"].notna().any():
+        return saying("No error can be shown: no sampled pose has a result at any landmark SD.")
+    figure = blank(_HEIGHT_MM)
+    axes = figure.subplots(2, len(MOTIONS), sharex=True)
+    for index, (motion, symbol) in enumerate(MOTIONS.items()):
+        here = curves[curves["motion"] == motion]
+        upper, lower = axes[0][index], axes[1][index]
+        head(upper, index, f"Largest {motion} error")
+        head(lower, index + len(MOTIONS), f"Poses below the limit of {motion}")
+        _draw_errors(upper, here, symbol)
+        _draw_shares(lower, here, required[required["motion"] == motion], study)
+        _mark_paper(upper, lower, cohort)
+        lower.set_xlabel("SD of each landmark, per axis (mm)")
+    axes[1][0].set_ylabel("share of poses (%)")
+    bars = {
+        COLORS[name]: words for name, words in WHOSE.items() if name in set(curves["stiffness"])
+    }
+    explain(figure, bars, _words(study, cohort, curves, required))
+    return figure
+
+
+def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
+    alone = here["specimen"].nunique() == 1
+    for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
+        rows = rows.sort_values("sd_mm")
+        color = COLORS[str(whose)]
+        axis.plot(rows["sd_mm"], rows["median"], color=color, marker="o", ms=2.5,
+                  lw=1.2 if alone else 0.5, alpha=1.0 if alone else 0.4)  # fmt: skip
+        if alone:
+            axis.fill_between(
+                rows["sd_mm"], rows["median"], rows["p95"], color=color, alpha=0.15, lw=0
+            )
+            axis.plot(rows["sd_mm"], rows["p95"], color=color, lw=0.8, ls=(0, (4, 2)))
+    if not alone:
+        for whose, rows in here.groupby("stiffness"):
+            middle = rows.groupby("sd_mm")["median"].median()
+            axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
+    limit = float(here["limit"].iloc[0])
+    axis.axhline(limit, color=GREY, lw=0.8, ls=":")
+    axis.annotate(
+        f"limit {tick(limit)} {symbol}", (1.0, limit), (0, 2), xycoords=("axes fraction", "data"),
+        textcoords="offset points", ha="right", fontsize=6.0, color=INK[GREY],
+    )  # fmt: skip
+    axis.set_ylim(0.0, None)
+    axis.set_ylabel(f"error ({symbol})")
+
+
+def _draw_shares(
+    axis: Axes, here: pd.DataFrame, required: pd.DataFrame, study: JointPoseSensitivity
+) -> None:
+    alone = here["specimen"].nunique() == 1
+    for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
+        rows = rows.sort_values("sd_mm")
+        color = COLORS[str(whose)]
+        axis.plot(rows["sd_mm"], 100.0 * rows["below"], color=color, marker="o", ms=2.5,
+                  lw=1.2 if alone else 0.5, alpha=1.0 if alone else 0.4)  # fmt: skip
+        if alone:
+            low, high = 100.0 * rows["below_low"], 100.0 * rows["below_high"]
+            axis.fill_between(rows["sd_mm"], low, high, color=color, alpha=0.15, lw=0)
+    asked = 100.0 * study.landmark_precision.share
+    axis.axhline(asked, color=GREY, lw=0.8, ls=":")
+    axis.annotate(
+        f"{tick(asked)} % asked for", (0.0, asked), (3, -2), xycoords=("axes fraction", "data"),
+        textcoords="offset points", ha="left", va="top", fontsize=6.0, color=INK[GREY],
+    )  # fmt: skip
+    for place, (whose, rows) in enumerate(required.groupby("stiffness")):
+        _mark_required(axis, rows, COLORS[str(whose)], 6.0 + 8.0 * place)
+    axis.set_ylim(-2.0, 106.0)
+    axis.set_xlim(0.0, None)
+
+
+def _mark_required(axis: Axes, rows: pd.DataFrame, color: str, y: float) -> None:
+    """Required SD with its interval near the foot of the panel, and its number."""
+    for _, row in rows.dropna(subset=["sd_mm"]).iterrows():
+        ends = row[["sd_low_mm", "sd_high_mm"]].fillna(row["sd_mm"]).to_numpy(float)
+        axis.plot(ends, [y, y], color=color, lw=1.2, solid_capstyle="butt")
+        axis.plot([row["sd_mm"]], [y], "^", color=color, ms=4.5, mec="white", mew=0.4, zorder=5)
+    if len(rows) == 1:
+        row = rows.iloc[0]
+        known = np.isfinite(row["sd_mm"])
+        ends = row[["sd_low_mm", "sd_mm", "sd_high_mm"]].dropna().to_numpy(float)
+        left = known and ends.max() > 0.6 * axis.get_xlim()[1]
+        x = (ends.min() if left else ends.max()) if known else 0.0
+        axis.annotate(required_words(row), (float(x), y), (-4 if left else 4, 0),
+                      textcoords="offset points", va="center", ha="right" if left else "left",
+                      fontsize=6.0, color=INK[color])  # fmt: skip
+
+
+def required_words(row: pd.Series) -> str:
+    """``1.20 mm (1.05–1.40)``, or why there is no such SD; an open end of the interval is a ?."""
+    if not np.isfinite(row["sd_mm"]):
+        return str(row["message"]) or "none"
+    ends = [fixed(row[name]) if np.isfinite(row[name]) else "?" for name in _ENDS]
+    return f"{fixed(row['sd_mm'])} mm ({ends[0]}–{ends[1]})"
+
+
+_ENDS = ("sd_low_mm", "sd_high_mm")
+
+
+def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
+    """The SD that the paper reports for its landmarks."""
+    paper = paper_of(cohort.name)
+    if paper is None:
+        return
+    sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
+    for axis in (upper, lower):
+        axis.axvline(sd, color=THEIRS, lw=0.9, zorder=1)
+    upper.annotate(
+        f"{paper[0]}: {number(sd, 2)} mm", (sd, 1.0), (2, -1), xycoords=("data", "axes fraction"),
+        textcoords="offset points", va="top", fontsize=6.0, color=INK[THEIRS],
+    )  # fmt: skip
+
+
+def _words(
+    study: JointPoseSensitivity, cohort: Cohort, curves: pd.DataFrame, required: pd.DataFrame
+) -> str:
+    specimens = curves["specimen"].nunique()
+    poses = f"{count(int(curves['n'].max()), 'pose')} per SD"
+    lines = "line: median, dashed: 95th percentile"
+    if specimens > 1:
+        lines = f"thin: each of {specimens} specimens, thick: their median"
+    shown = "triangle: largest SD that will do, with 95 % interval; band: 95 % interval (Wilson)"
+    both = required[required["motion"] == "both"]
+    told = [
+        f"below both limits with {WHOSE[row['stiffness']]}: {required_words(row)}"
+        for _, row in both.iterrows()
+        if specimens == 1
+    ]
+    paper = "the paper's SD is the largest resultant, not per axis" if paper_of(cohort.name) else ""
+    return "; ".join(part for part in (poses, lines, shown, *told, paper) if part) + "."

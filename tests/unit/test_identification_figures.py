@@ -1,0 +1,237 @@
+"""Figures of the study's later parts: drawn for any cohort, and their words true to the tables."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from identification_cases import identification, write_table
+from matplotlib.figure import Figure
+from PIL import Image
+from study_cases import STUDY, Size, project, results
+
+from spinepipe.jobs import figures
+from spinepipe.jobs.layout import FIGURES
+from spinepipe.report.bootstrap_paper import draw_errors
+from spinepipe.report.bootstrap_rows import bootstrap_rows
+from spinepipe.report.pose_against_stiffness import importance_by_factor
+from spinepipe.report.sections import sections
+from spinepipe.report.style import DPI, WIDTH_MM
+from spinepipe.report.words import number
+from spinepipe.units import COORDINATES
+
+NEW = (
+    *("bootstrap", "success_by_method", "agreement"),
+    *("pose_against_stiffness", "landmark_precision"),
+)
+ONE = Size(("a",), 2, 12)
+SIZES = {
+    "one specimen": ONE,
+    "one joint": Size(("a",), 1, 12, ("extension",)),
+    "many specimens": Size(tuple(f"s{n:02d}" for n in range(12)), 4, 4, COORDINATES, "per_joint"),
+    "nothing solved": Size(solved=False),
+}
+
+
+def tables(root: Path, size: Size) -> Path:
+    """Made-up results; returns their folder."""
+    folder = results(project(root, size), size)
+    identification(folder, size)
+    return folder
+
+
+def draw(root: Path, folder: Path, name: str) -> Path:
+    """One figure of made-up results; returns its SVG."""
+    svg, png = (folder / "figures" / f"{name}.{kind}" for kind in ("svg", "png"))
+    files = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
+    figures.run(str(root), STUDY, name, files, str(svg), str(png))
+    return svg
+
+
+def words(svg: Path) -> str:
+    """Words of an SVG; matplotlib notes them beside the outlines."""
+    parts = svg.read_text().split("<!--")[1:]
+    return " ".join(" ".join(part.split("-->")[0].split()) for part in parts)
+
+
+def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
+    assert set(figures.DRAW) == set(FIGURES)
+    captions = Path(__file__).resolve().parents[2] / "workflow" / "report"
+    assert {path.stem for path in captions.glob("*.rst")} == set(FIGURES)
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+def test_new_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
+    folder = tables(tmp_path, size)
+    for name in NEW:
+        with Image.open(draw(tmp_path, folder, name).with_suffix(".png")) as picture:
+            assert picture.width == int(WIDTH_MM / 25.4 * DPI), name
+            assert np.asarray(picture.convert("L")).min() < 128, f"{name}: nothing is drawn"
+
+
+def test_new_figures_have_the_same_bytes_twice(tmp_path: Path) -> None:
+    folder = tables(tmp_path, ONE)
+    for name in NEW:
+        first = draw(tmp_path, folder, name).read_bytes()
+        assert draw(tmp_path, folder, name).read_bytes() == first, name
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("bootstrap", "No stiffness was found in any of 150 bootstrap fits."),
+        ("success_by_method", "0 of 12 (0 %)"),
+        ("success_by_method", "could not be compared"),
+        ("agreement", "none of 8 rows has two different readings"),
+        ("pose_against_stiffness", "no error varies over the grid"),
+        ("landmark_precision", "no sampled pose has a result at any landmark SD"),
+    ],
+)
+def test_what_has_no_result_is_said(tmp_path: Path, name: str, told: str) -> None:
+    folder = tables(tmp_path, Size(solved=False))
+    assert told in words(draw(tmp_path, folder, name))
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_tables_without_rows_are_told_not_drawn(tmp_path: Path, name: str) -> None:
+    folder = tables(tmp_path, ONE)
+    for table in set(FIGURES[name]) - {"simulations"}:
+        write_table(folder, table, [])
+    svg = draw(tmp_path, folder, name)
+    told = {
+        "bootstrap": "any of 0 bootstrap fits",
+        "success_by_method": "No fit was done in several ways",
+        "agreement": "none of 0 rows",
+        "pose_against_stiffness": "cannot be compared",
+        "landmark_precision": "No error can be shown",
+    }
+    assert told[name] in words(svg)
+
+
+def test_bootstrap_tells_median_range_and_n_of_each_row(tmp_path: Path) -> None:
+    folder = tables(tmp_path, ONE)
+    told = words(draw(tmp_path, folder, "bootstrap"))
+    frame = pd.read_parquet(folder / "bootstrap.parquet")
+    row = frame[(frame["bootstrap"] == "damping") & (frame["loading"] == "dynamic")]
+    one = row[row["joint"] == "V1V2"]
+    for column in ("extension_nm_per_rad", "extension_error_deg"):
+        values = one[column]
+        width = number(values.max() - values.min(), 2)
+        assert f"{number(values.median())}, range {width}, n = 5" in told
+    assert "75 fits of 75 with a stiffness" in told, "(20 + 5) sets under three loadings"
+    assert "Gould" not in told, "the cohort was not rebuilt from a paper"
+
+
+def test_pooled_bootstrap_is_relative_to_each_own_median() -> None:
+    """Two specimens of 2 and 200 N/m: pooled they would seem to spread, though neither does."""
+    rows = [
+        {"specimen": f"s{n:02d}", "bootstrap": "start", "loading": "dynamic", "set": k,
+         "joint": "J", "superior_n_per_m": (2.0 if n % 2 else 200.0) * (1.0 + 0.1 * k),
+         "superior_error_mm": n + 0.5 * k}
+        for n in range(50)
+        for k in (-1, 0, 1)
+    ]  # fmt: skip
+    columns = ["superior_n_per_m", "superior_error_mm"]
+    names = [f"s{n:02d}" for n in range(50)]
+    pooled, relative = bootstrap_rows(pd.DataFrame(rows), columns, names, ["J"])
+    assert relative
+    assert pooled.labels == ("start, dynamic",)
+    (frame,) = pooled.frames
+    assert sorted(set(frame["superior_n_per_m"].round(12))) == [0.9, 1.0, 1.1]
+    assert sorted(set(frame["superior_error_mm"])) == [-0.5, 0.0, 0.5]
+    few, relative = bootstrap_rows(pd.DataFrame(rows), columns, names[:40], ["J"])
+    assert not relative
+    assert len(few) == 40
+    assert few.labels[-1] == "start, dynamic, s00", "the first specimen on top"
+
+
+@pytest.mark.parametrize(
+    ("sampled", "loading", "joint", "name", "ends", "median"),
+    [  # Gould et al. 2024a, Tables 2 and 3
+        ("damping", "quasi_static", "L2L3", "anterior", (0.415, 0.425), 0.42),
+        ("damping", "quasi_static", "L2L3", "superior", (0.0, 0.35), 0.0005),
+        ("start", "dynamic", "L3L4", "anterior", (0.14, 0.48), 0.31),
+    ],
+)
+def test_published_median_and_range_are_drawn(
+    sampled: str, loading: str, joint: str, name: str, ends: tuple[float, float], median: float
+) -> None:
+    axis = Figure().subplots()
+    row = pd.DataFrame([{"bootstrap": sampled, "loading": loading, "joint": joint}])
+    draw_errors(axis, "palanca_l1l4", name, row, 0.0)
+    line, tick, diamond = axis.lines
+    np.testing.assert_allclose(line.get_xdata(), ends, atol=1e-12)
+    assert float(tick.get_xdata()[0]) == float(diamond.get_xdata()[0]) == median
+    other = Figure().subplots()
+    draw_errors(other, "straight", name, row, 0.0)
+    draw_errors(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
+    assert not other.lines, "no paper, or a loading that the paper does not have"
+
+
+def test_success_tells_counts_of_each_method(tmp_path: Path) -> None:
+    told = words(draw(tmp_path, tables(tmp_path, ONE), "success_by_method"))
+    for share in ("6 of 6 (100 %)", "1 of 6 (17 %)", "5 of 6 (83 %)", "least cost: 1 of 6"):
+        assert share in told
+    assert "all free stiffnesses within 1 % of the start" in told
+
+
+def test_agreement_tells_bias_and_limits(tmp_path: Path) -> None:
+    told = words(draw(tmp_path, tables(tmp_path, ONE), "agreement"))
+    assert told.count("bias 0.01 (\u22120.19 to 0.21), n = 12") == 4, "2 joints x 2 coordinates"
+    many = Size(("a", "b"), 4, 4)
+    rows = words(draw(tmp_path / "m", tables(tmp_path / "m", many), "agreement"))
+    assert "bias with 95 % interval" in rows, "16 panels do not fit on a page: rows"
+
+
+def test_only_reduced_poses_are_readings_of_agreement(tmp_path: Path) -> None:
+    folder = tables(tmp_path, ONE)
+    success = pd.read_parquet(folder / "success.parquet")
+    success["reduced"] = success["pose"] < 3
+    write_table(folder, "success", success.to_dict("records"))
+    few = draw(tmp_path, folder, "agreement").read_text().count("<use ")
+    success["reduced"] = True
+    write_table(folder, "success", success.to_dict("records"))
+    all_ = draw(tmp_path, folder, "agreement").read_text().count("<use ")
+    assert all_ > few
+
+
+def test_shares_and_trees_are_told(tmp_path: Path) -> None:
+    told = words(draw(tmp_path, tables(tmp_path, ONE), "pose_against_stiffness"))
+    for share in ("70 %", "20 %", "10 %", "pose 80 %; 5 leaves, r² 0.60"):
+        assert told.count(share) == 4
+    assert "Grid of 12 joint poses times 2 stiffness sets" in told
+
+
+def test_importance_is_summed_over_the_predictors_of_a_factor() -> None:
+    tree = {"specimen": "a", "joint": "J", "coordinate": "extension", "r2": 0.5, "leaves": 3}
+    rows = [
+        {
+            **tree,
+            "n": 9,
+            "predictor": name,
+            "factor": name[0],
+            "importance": share,
+            "status": "done",
+        }
+        for name, share in (("p1", 0.5), ("p2", 0.25), ("s1", 0.25))
+    ]
+    rows.append({**rows[0], "joint": "K", "status": "constant"})
+    found = importance_by_factor(pd.DataFrame(rows))
+    assert list(found["factor"]) == ["p", "s"], "trees that are not there have no row"
+    assert list(found["importance"]) == [0.75, 0.25]
+    assert list(found["predictors"]) == [2, 1]
+
+
+def test_required_precision_is_told_or_why_not(tmp_path: Path) -> None:
+    told = words(draw(tmp_path, tables(tmp_path, ONE), "landmark_precision"))
+    assert "1.25 mm (1.00–1.50)" in told
+    assert "too many poses are above the limit even at 0.5 mm" in told
+    assert "95 % asked for" in told
+
+
+def test_sections_wrap_after_three_panels() -> None:
+    (upper, lower), figure = sections([(5, 20.0), (1, 30.0)], 10.0)
+    assert [len(upper), len(lower)] == [5, 1]
+    shown = [axis for axis in figure.axes if axis.get_visible()]
+    assert shown == [*upper, *lower]
+    assert len(figure.axes) == 9, "two lines of three, and one of three"
