@@ -1,4 +1,4 @@
-"""How many fits are lost by the published way with OpenSim's own runs: the paper's count, redone."""
+"""How many fits the published way loses with OpenSim's own runs: the paper's count, redone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

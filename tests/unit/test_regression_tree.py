@@ -1,12 +1,11 @@
-"""Regression tree against rpart's published example, scikit-learn's own pruning, and laws."""
+"""Regression tree against rpart's published example, and laws."""
 
 import numpy as np
 import pytest
-from sklearn.tree import DecisionTreeRegressor
+from sklearn.model_selection import GroupKFold
 
 from spinepipe.sensitivity import regression_tree
-from spinepipe.sensitivity.pruning import collapse_complexities, pruned_predictions
-from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _Growth
+from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _growth
 from spinepipe.statistics import Ended
 
 MILEAGE = np.array(
@@ -35,12 +34,6 @@ RPART_ERRORS = {1: 1.0, 2: 0.40465, 3: 0.27012, 4: 0.25729}
 """Printed by rpart(Mileage ~ Weight): print.rpart, printcp; error by number of leaves."""
 
 
-def grown(x, y, **options) -> DecisionTreeRegressor:
-    return DecisionTreeRegressor(
-        min_samples_split=20, min_samples_leaf=7, random_state=0, **options
-    ).fit(x, y)
-
-
 def data(n: int, d: int, seed: int):
     rng = np.random.default_rng(seed)
     x = rng.normal(size=(n, d))
@@ -53,14 +46,21 @@ def test_the_cars_are_those_of_rpart() -> None:
     assert ((MILEAGE - MILEAGE.mean()) ** 2).sum() == pytest.approx(1354.583, abs=5e-4)
 
 
-def test_the_sequence_of_subtrees_is_that_of_rpart() -> None:
-    model = grown(WEIGHT[:, None], MILEAGE)
-    collapse = collapse_complexities(model)
-    kept = collapse > 0.01  # rpart's default complexity
-    np.testing.assert_allclose(np.sort(collapse[kept])[::-1], RPART_COMPLEXITIES, atol=5e-7)
-    np.testing.assert_allclose(
-        np.sort(model.tree_.threshold[kept]), np.sort(RPART_SPLITS), rtol=1e-12
-    )
+def test_splits_and_sequence_of_subtrees_are_those_of_rpart() -> None:
+    miles = (MILEAGE - MILEAGE.mean()) / MILEAGE.std()
+    growth = _growth(complexity=0.01, seed=0)  # rpart's default
+    tree = growth.fit(WEIGHT[:, None], miles).tree_
+    splits = np.sort(tree.threshold[tree.children_left >= 0])
+    np.testing.assert_allclose(splits, np.sort(RPART_SPLITS), rtol=1e-12)
+    sequence = growth.cost_complexity_pruning_path(WEIGHT[:, None], miles).ccp_alphas
+    np.testing.assert_allclose(sequence[:0:-1], RPART_COMPLEXITIES, atol=5e-7)
+
+
+@pytest.mark.parametrize(("complexity", "leaves"), [(0.2, 2), (0.05, 3), (0.6, 1)])
+def test_a_split_that_saves_too_little_is_not_made(complexity: float, leaves: int) -> None:
+    """rpart's complexities of 0.595, 0.135 and 0.0128 are those of its splits."""
+    found = regression_tree(WEIGHT[:, None], MILEAGE, ["weight"], 1, complexity=complexity)
+    assert (found.leaves, found.complexity) == (leaves, complexity)
 
 
 def test_the_pruned_tree_is_one_of_rparts() -> None:
@@ -76,20 +76,6 @@ def test_the_pruned_tree_is_one_of_rparts() -> None:
         leaves.append(found.leaves)
     # rpart's own folds: 0.44826 + 0.076998 allows 0.45153, three leaves, but not 0.60508
     assert max(set(leaves), key=leaves.count) == 3
-
-
-def test_pruning_is_that_of_scikit_learn() -> None:
-    x, y = data(400, 4, seed=1)
-    model, variance = grown(x, y), float(y.var())
-    path = model.cost_complexity_pruning_path(x, y).ccp_alphas / variance
-    np.testing.assert_allclose(
-        np.unique(np.round(collapse_complexities(model), 12)), np.unique(np.round(path, 12))
-    )
-    between = np.append(np.sqrt(path[1:-1] * path[2:]), 2.0)[::3]
-    predicted = pruned_predictions(model, x, between)
-    for complexity, row in zip(between, predicted, strict=True):
-        refitted = grown(x, y, ccp_alpha=complexity * variance)
-        np.testing.assert_allclose(row, refitted.predict(x), rtol=1e-9)
 
 
 def test_importance_is_the_share_of_the_variance_taken() -> None:
@@ -131,13 +117,14 @@ def test_a_pose_learnt_by_heart_is_not_praised() -> None:
 def test_repeated_rows_of_a_group_do_not_sharpen_the_standard_error() -> None:
     """At a complexity where the tree is its mean, which repeating does not move."""
     x, y = data(50, 3, seed=13)
-    growth, root = _Growth(0.01, seed=1), np.array([BEYOND_ROOT])
-    once = _cross_validated(growth, x, y, root, np.arange(50), 5)
+    growth, root = _growth(0.01, seed=1), np.array([BEYOND_ROOT])
+    folds = GroupKFold(5, shuffle=True, random_state=1)
+    once = _cross_validated(growth, folds, x, y, root, np.arange(50))
     often = [np.tile(values, reps) for values, reps in ((x, (4, 1)), (y, 4), (np.arange(50), 4))]
-    repeated = _cross_validated(growth, *often[:2], root, often[2], 5)
+    repeated = _cross_validated(growth, folds, *often[:2], root, often[2])
     np.testing.assert_allclose(repeated, once, rtol=1e-9)
     # by leaving one out, where (y - mean of the others) = n / (n - 1) (y - mean)
-    error, standard_error = _cross_validated(growth, x, y, root, np.arange(50), 50)
+    error, standard_error = _cross_validated(growth, GroupKFold(50), x, y, root, np.arange(50))
     squared = (50 / 49 * (y - y.mean())) ** 2 / y.var()
     assert error[0] == pytest.approx(squared.mean())
     assert standard_error[0] == pytest.approx(squared.std() / np.sqrt(50))
