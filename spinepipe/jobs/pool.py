@@ -10,6 +10,7 @@ milliseconds. They end with the process that started them, even when that one is
 
 import contextlib
 import errno
+import gc
 import importlib
 import multiprocessing
 import os
@@ -27,7 +28,9 @@ from types import ModuleType
 from typing import Any
 
 _JOBS = Path(__file__).resolve().parent
-_NOT_JOBS = {"__init__", "digest", "layout", "pool", "progress", "provenance", "settings", "inputs"}
+_PRELOADED = ("calibrate", "simulate", "bootstrap", "collect")
+"""Jobs that come by the hundreds: imported once in the server, others when first asked for."""
+
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
 _REMEDIES = {
@@ -114,7 +117,7 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
 def warm_up() -> None:
     """Start the server that workers are forked from: its imports run while the caller plans."""
     with _starting, _environment():
-        _CONTEXT.set_forkserver_preload(["numpy", "scipy.spatial", "pandas", "pyarrow", *_jobs()])
+        _CONTEXT.set_forkserver_preload([f"spinepipe.jobs.{name}" for name in _PRELOADED])
         forkserver.ensure_running()
 
 
@@ -127,12 +130,6 @@ def _start() -> _Worker:
         process.start()
         theirs.close()
     return _Worker(process, ours)
-
-
-def _jobs() -> list[str]:
-    """All job modules, to be imported once in the server."""
-    names = sorted(path.stem for path in _JOBS.glob("*.py"))
-    return [f"spinepipe.jobs.{name}" for name in names if name not in _NOT_JOBS]
 
 
 @contextlib.contextmanager
@@ -166,6 +163,7 @@ def _environment() -> Iterator[None]:
 def _serve(connection: Connection) -> None:
     """Life of a worker: answer one job after the other until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.freeze()  # what was imported stays: no need to look through it at each collection
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:

@@ -73,7 +73,8 @@ def settle(
 ) -> Settled:
     """Let the chain move from rest in the neutral pose for ``duration`` seconds.
 
-    ``coarseness`` multiplies the tolerances, see `END_ONLY`. Status ``converged`` says that the run reached its end; ``remaining`` how far it still moves.
+    ``coarseness`` multiplies the tolerances, see `END_ONLY`. Status ``converged`` says that the
+    run reached its end; ``remaining`` how far it still moves.
     """
     refusal = no_settling(system)
     if refusal:
