@@ -174,7 +174,7 @@ class Methods(BaseModel):
 
     model_config = FORM
 
-    poses: int = Field(default=5, ge=0, le=1000, description="poses fitted; 0 leaves it out")
+    poses: int = Field(default=4, ge=0, le=1000, description="poses fitted; 0 leaves it out")
     sane_step: float = Field(
         default=1e-3, gt=0, lt=1, description="relative difference step chosen with care"
     )
