@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
@@ -46,19 +46,7 @@ def foundation() -> None:
                 f"| {row.ratio:.0f} | {row.agreement} |"
             )
             print(lines[-1], flush=True)
-    lines += [
-        "",
-        "| study l1l4_joint_pose, 2 cores | wall s | memory MiB | Snakemake's own CPU s | goal |",
-        "|---|---|---|---|---|",
-    ]
-    study_rows = []
-    for run in study.runs():
-        study_rows.append(asdict(run))
-        lines.append(
-            f"| {run.what} | {run.wall_s:.1f} | {run.peak_mib:.0f} | {run.engine_s:.1f} "
-            f"| {run.goal} |"
-        )
-        print(lines[-1], flush=True)
+    study_rows = _study_rows(lines, study.runs())
     per_target = 1e3 * study_rows[0]["engine_s"] / study.targets()
     lines += ["", f"Snakemake's own CPU per target of the cold run: {per_target:.1f} ms (goal 7)."]
     print(lines[-1], flush=True)
@@ -94,7 +82,27 @@ def identification_parts() -> None:
             f"| {row.near_start} | {row.cost_ratio:.3f} | {error} | {row.runs} | {row.cpu_s:.2f} |"
         )
         print(lines[-1], flush=True)
-    _write("identification", lines, {"machine": about, "speeds": speeds, "fits": fits})
+    whole = _study_rows(lines, study.whole_runs())
+    data = {"machine": about, "speeds": speeds, "fits": fits, "study": whole}
+    _write("identification", lines, data)
+
+
+def _study_rows(lines: list[str], runs: Iterable[study.Run]) -> list[dict[str, Any]]:
+    """Append the table of workflow runs to the lines; the same as data."""
+    lines += [
+        "",
+        "| study l1l4_joint_pose, 2 cores | wall s | memory MiB | Snakemake's own CPU s | goal |",
+        "|---|---|---|---|---|",
+    ]
+    rows = []
+    for run in runs:
+        rows.append(asdict(run))
+        lines.append(
+            f"| {run.what} | {run.wall_s:.1f} | {run.peak_mib:.0f} | {run.engine_s:.1f} "
+            f"| {run.goal} |"
+        )
+        print(lines[-1], flush=True)
+    return rows
 
 
 def lost_fits_parts() -> None:
