@@ -13,11 +13,11 @@ from spinepipe.comparison.paper import (
     P_BELOW,
     PAPER,
     REDUCED,
-    TRANSLATIONS,
     measured,
 )
 from spinepipe.comparison.ranges import IQR_PER_SD, Range, spearman_p, spearman_threshold
 from spinepipe.comparison.run import NotComputed, Run
+from spinepipe.units import TRANSLATIONS
 
 _MM_PER_M = 1000.0
 _POINTS = 2.0

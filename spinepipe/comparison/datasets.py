@@ -7,9 +7,10 @@ from itertools import product
 from spinepipe.comparison import summary
 from spinepipe.comparison.claim import Claim, Ours
 from spinepipe.comparison.joint_frames import DATASETS, END_JOINTS
-from spinepipe.comparison.paper import JOINTS, PAPER, ROTATIONS, TRANSLATIONS
+from spinepipe.comparison.paper import JOINTS, PAPER
 from spinepipe.comparison.ranges import Range, at_most, exactly
 from spinepipe.comparison.run import NotComputed, Run
+from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 _SHIFT = PAPER["reduced_against_complete"]
 _BOUND = PAPER["spread_bound"]

@@ -11,11 +11,10 @@ from spinepipe.comparison.paper import (
     MOTION_UNIT,
     PAPER,
     REDUCED,
-    ROTATIONS,
     SAMPLES,
-    TRANSLATIONS,
 )
 from spinepipe.comparison.ranges import half_width, normal_iqr
+from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 DATASETS = {"complete": ("all", SAMPLES), "reduced": ("reduced", REDUCED)}
 """The paper's word to the dataset of the summary and the paper's number of poses."""

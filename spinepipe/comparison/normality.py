@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterator
 
 from spinepipe.comparison.claim import Claim, Ours
-from spinepipe.comparison.paper import FITTED, JOINTS, P_BELOW, ROTATIONS, TRANSLATIONS
+from spinepipe.comparison.paper import FITTED, JOINTS, P_BELOW
 from spinepipe.comparison.ranges import Range
 from spinepipe.comparison.run import NotComputed, Run
 from spinepipe.comparison.tested import tested
+from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 _AT_LEAST_ONE = "the paper rejects normality without saying of which quantities: one at least"
 

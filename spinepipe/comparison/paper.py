@@ -1,6 +1,13 @@
 """Gould et al. 2024 as the comparison reads it: its numbers, its joints and directions."""
 
 from spinepipe.anatomy import published
+from spinepipe.units import (
+    COORDINATE_COLUMNS,
+    COORDINATES,
+    ROTATIONS,
+    STIFFNESS_COLUMNS,
+    TRANSLATIONS,
+)
 
 PAPER = published("gould_2024a")
 COUNTS = PAPER["counts"]
@@ -13,19 +20,13 @@ JOINTS = ("L1L2", "L2L3", "L3L4")
 FITTED = ("anterior", "superior", "extension")
 """Directions whose stiffness is fitted and whose error is reported."""
 
-TRANSLATIONS = ("anterior", "superior", "right")
-ROTATIONS = ("extension", "right_bending", "left_rotation")
-
 MOTION_UNIT = {**dict.fromkeys(TRANSLATIONS, "mm"), **dict.fromkeys(ROTATIONS, "deg")}
 STIFFNESS_UNIT = {
     **dict.fromkeys(TRANSLATIONS, "N/m"),
     **dict.fromkeys(ROTATIONS, "N m/rad"),
 }
-MOTION_KEY = {name: f"{name}_{unit}" for name, unit in MOTION_UNIT.items()}
-STIFFNESS_KEY = {
-    **{name: f"{name}_n_per_m" for name in TRANSLATIONS},
-    **{name: f"{name}_nm_per_rad" for name in ROTATIONS},
-}
+MOTION_KEY = dict(zip(COORDINATES, COORDINATE_COLUMNS, strict=True))
+STIFFNESS_KEY = dict(zip(COORDINATES, STIFFNESS_COLUMNS, strict=True))
 
 NO_RAW_DATA = (
     "the paper's value rests on scans, motion and load components that are not published, and "

@@ -6,9 +6,10 @@ from math import sqrt
 import pandas as pd
 
 from spinepipe.comparison.claim import Claim, Ours
-from spinepipe.comparison.paper import PAPER, TRANSLATIONS
+from spinepipe.comparison.paper import PAPER
 from spinepipe.comparison.ranges import IQR_PER_SD, Range, exactly
 from spinepipe.comparison.run import NotComputed, Run
+from spinepipe.units import TRANSLATIONS
 
 RESULTANT_MM = float(PAPER["landmarks"]["largest_resultant_sd_mm"])
 PER_AXIS_MM = RESULTANT_MM / sqrt(3.0)

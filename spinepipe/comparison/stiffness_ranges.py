@@ -48,7 +48,9 @@ def _stiffness_range(what: str, dataset: str, name: str) -> Callable[[Run], Ours
         fits = run.rows("bootstrap", bootstrap=what, loading="quasi_static")
         values = fits.groupby("set")[STIFFNESS_KEY[name]].first().dropna()
         close = int(((values - middle).abs() <= CLOSE * abs(middle)).sum())
-        note = f"ours: {close} of {len(values)} fits within {100.0 * CLOSE:g} % of the median"
+        which = "" if dataset == "all" else ", outliers counted,"
+        share = f"{100.0 * CLOSE:g} % of the median"
+        note = f"ours: {close} of {len(values)} fits{which} within {share}"
         return Ours(summary.value(run, "range", **where), note=note)
 
     return ours
@@ -69,19 +71,13 @@ def _start_over_damping(name: str) -> Callable[[Run], Ours]:
     def ours(run: Run) -> Ours:
         where = {"quantity": "stiffness", "joint": "*", "coordinate": name}
         start, damping = (
-            _relative_range(run, where_of(what, "quasi_static") | where)
+            summary.value(run, "range", **where_of(what, "quasi_static"), **where)
             for what in ("start", "damping")
         )
-        if max(start, damping) < SAME or damping == 0.0:
-            told = f"their ranges are {start:.1e} and {damping:.1e} of the median"
+        middle = summary.value(run, "median", **where_of("damping", "quasi_static"), **where)
+        if max(start, damping) < SAME * middle or damping == 0.0:
+            told = f"their ranges are {start / middle:.1e} and {damping / middle:.1e} of the median"
             raise NotComputed(f"all fits end in the same stiffness, {told}: no ratio has a meaning")
         return Ours(start / damping)
 
     return ours
-
-
-def _relative_range(run: Run, where: dict[str, str]) -> float:
-    middle = summary.value(run, "median", **where)
-    if middle == 0.0:
-        raise NotComputed("the median stiffness is 0")
-    return summary.value(run, "range", **where) / middle

@@ -7,10 +7,11 @@ from itertools import product
 import pandas as pd
 
 from spinepipe.comparison.claim import Claim, Ours
-from spinepipe.comparison.paper import FITTED, MEASURED_JOINTS, P_BELOW, PAPER, REDUCED, ROTATIONS
+from spinepipe.comparison.paper import FITTED, MEASURED_JOINTS, P_BELOW, PAPER, REDUCED
 from spinepipe.comparison.ranges import Range, exactly, kendall_p, spearman_p
 from spinepipe.comparison.run import NotComputed, Run
 from spinepipe.comparison.tested import tested
+from spinepipe.units import ROTATIONS
 
 _PRINTED = PAPER["two_factor_correlation"]
 _TEST = {"orientation": "kendall", "stiffness": "spearman"}

@@ -95,7 +95,7 @@ def _errors(
 
 
 def _fit(settings: JointPoseSensitivity, problem: Problem) -> Fit:
-    """A fit from the study's start; from its further starts too where that one finds no optimum."""
+    """A fit from the study's start; from further ones too where that ends at a bound or nowhere."""
     found = fit(problem)
     if found.status is Status.CONVERGED:
         return found

@@ -215,7 +215,7 @@ class Layout:
                 pose, which = divmod(number, len(METHODS))
                 return f"pose={pose:04d}/method={METHODS[which]}"
             case "precision_errors":
-                return f"sd_mm={self.study.landmark_precision.sd_mm[number]:g}"
+                return f"sd_mm={self.study.landmark_precision.sd_mm[number]:.15g}"
         raise ValueError(f"{table} is not made of job files")
 
 

@@ -8,7 +8,6 @@ import pandas as pd
 from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 ORIGIN_DISTANCE = "origin_distance"
-ORIENTATIONS = tuple(f"{name}_orientation" for name in ROTATIONS)
 _AXES: Mapping[str, str] = {
     **{f"{axis}_mm": f"{name}_origin" for axis, name in zip("xyz", TRANSLATIONS, strict=True)},
     **{f"{name}_deg": f"{name}_orientation" for name in ROTATIONS},

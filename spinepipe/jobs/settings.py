@@ -38,18 +38,19 @@ IRRELEVANT: dict[str, dict[str, Any]] = {
         **_whole("poses", "loading", "landmark_precision", "significance"),
         **_whole(*_GROUPING, *_BOOTSTRAPS),
         "methods": {"poses"},
+        "success": {"failed_when", "outlier_times_start"},
     },
     "success_by_method": _whole("block", *(_PARTS - {"success"})),
     "landmark_precision": _whole("block", *(_PARTS - {"landmark_precision"})),
     "success": _whole("block", *(_PARTS - {"success"})),
     "counts": _whole("block", *(_PARTS - {"success"})),
     "summary": _whole("block", *(_PARTS - {"success"})),
-    "statistics": _whole("block", *(_PARTS - {"success", "significance"})),
+    "statistics": _whole("block", *(_PARTS - {"success"})),
     "two_factor": _whole("block", *(_PARTS - {"success"})),
     "agreement": _whole("block", *(_PARTS - {"success"})),
     "against_gould_2024a": _whole("block"),
     "figures": _whole("block"),
-    "report": _whole("block"),
+    "report": {},  # it prints all of them
 }
 """Settings that a job does not look at. All others count, so one added later is not overlooked."""
 

@@ -23,7 +23,6 @@ _DATASET, _OWN = "reduced", "calibrated"
 _ACROSS_AT_MOST, _PANEL_MM, _KEY_MM = 3, 48.0, 16.0
 _MOST_OUTLINES = 300
 LIMITS = VERMILLION
-_KEY = ["specimen", "joint", "coordinate"]
 
 
 @dataclass(frozen=True)

@@ -31,12 +31,13 @@ def landmark_precision_figure(
     if curves.empty or not curves["median"].notna().any():
         return saying("No error can be shown: no sampled pose has a result at any landmark SD.")
     figure = blank(_HEIGHT_MM)
-    axes = figure.subplots(2, len(MOTIONS), sharex=True)
-    for index, (motion, symbol) in enumerate(MOTIONS.items()):
-        here = curves[curves["motion"] == motion]
+    measured = [motion for motion in MOTIONS if (curves["motion"] == motion).any()]
+    axes = figure.subplots(2, len(measured), sharex=True, squeeze=False)
+    for index, motion in enumerate(measured):
+        symbol, here = MOTIONS[motion], curves[curves["motion"] == motion]
         upper, lower = axes[0][index], axes[1][index]
         head(upper, index, f"Largest {motion} error")
-        head(lower, index + len(MOTIONS), f"Poses below the limit of {motion}")
+        head(lower, index + len(measured), f"Poses below the limit of {motion}")
         _draw_errors(upper, here, symbol)
         _draw_shares(lower, here, required[required["motion"] == motion], study)
         _mark_paper(upper, lower, cohort)

@@ -369,9 +369,19 @@ def test_start_over_damping_needs_a_spread() -> None:
     assert "all fits end in the same stiffness" in row["reason"]
 
 
+def test_start_over_damping_is_the_ratio_of_the_ranges() -> None:
+    """17 over 8.5, as the paper's number is; that the medians differ does not enter."""
+    where = {"quantity": "stiffness", "coordinate": "anterior", "part": "start_bootstrap"}
+    wide = with_cell(with_cell(summary(), "range", 17.0, **where), "median", 8.0, **where)
+    row = row_of("stiffness_range.start_over_damping.anterior", Run({"summary": wide}))
+    assert (row["ours"], row["verdict"]) == (2.0, "inside")
+
+
 def test_a_note_tells_how_many_fits_agree() -> None:
     row = row_of("stiffness_range.start.anterior", Run(tables()))
     assert "ours: 2 of 3 fits within 1 % of the median" in row["reason"]
+    kept = row_of("stiffness_range.start_without_outliers.anterior", Run(tables()))
+    assert "ours: 2 of 3 fits, outliers counted, within" in kept["reason"]
 
 
 def test_what_is_not_computed_carries_the_message_of_the_table() -> None:

@@ -229,6 +229,16 @@ def test_required_precision_is_told_or_why_not(tmp_path: Path) -> None:
     assert "95 % asked for" in told
 
 
+def test_precision_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -> None:
+    folder = tables(tmp_path, ONE)
+    for name in FIGURES["landmark_precision"]:
+        rows = pd.read_parquet(folder / f"{name}.parquet").query("motion == 'rotation'")
+        write_table(folder, name, rows.to_dict("records"))
+    told = words(draw(tmp_path, folder, "landmark_precision"))
+    assert "Largest rotation error" in told
+    assert "translation" not in told
+
+
 def test_sections_wrap_after_three_panels() -> None:
     (upper, lower), figure = sections([(5, 20.0), (1, 30.0)], 10.0)
     assert [len(upper), len(lower)] == [5, 1]

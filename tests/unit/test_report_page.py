@@ -19,6 +19,7 @@ from spinepipe.frames import Pose
 from spinepipe.jobs import report
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.report.page import Results, study_page
+from spinepipe.report.page.findings import findings
 from spinepipe.report.page.scene import MOST_POSES, as_script, scenes
 from spinepipe.report.page.significance import folded, in_full
 from spinepipe.report.page.solids import CORNERS, LONE_DISC_MM, solids
@@ -178,6 +179,16 @@ def test_findings_are_the_numbers_of_the_tables() -> None:
     assert many[0].startswith("27 fits of 27")
     assert "1.25 mm (9 of 9 specimens)" in many[3]
     assert "forward run default step 9 of 54" in many[4]
+
+
+def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -> None:
+    root = project(tmp_path, SIZES["one specimen"])
+    study, _ = study_and_cohort(str(root), STUDY)
+    row = {"specimen": "a", "stiffness": "calibrated", "motion": "rotation", "message": ""}
+    row |= {"sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
+    (told,) = findings(study, Results({"required_precision": pd.DataFrame([row])}, {}, {}, {}))
+    assert "to stay below 1°, the SD" in told
+    assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told
 
 
 def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:

@@ -111,10 +111,16 @@ def _precision(study: JointPoseSensitivity, results: Results) -> str:
     if rows.empty:
         return ""
     asked = study.landmark_precision
-    limits = f"{tick(asked.translation_limit_mm)} mm and {tick(asked.rotation_limit_deg)}°"
-    goal = f"For {tick(100 * asked.share)} % of poses to stay below {limits}"
-    both = rows[rows["motion"] == "both"]
-    parts = [f"with {WHOSE[whose]} {_required(part)}" for whose, part in _by_stiffness(both)]
+    limits = {
+        "translation": f"{tick(asked.translation_limit_mm)} mm",
+        "rotation": f"{tick(asked.rotation_limit_deg)}°",
+    }
+    limits = {"both": " and ".join(limits.values()), **limits}
+    # where there is no row of both, one kind of motion alone was measured
+    motion = next(name for name in limits if (rows["motion"] == name).any())
+    goal = f"For {tick(100 * asked.share)} % of poses to stay below {limits[motion]}"
+    chosen = rows[rows["motion"] == motion]
+    parts = [f"with {WHOSE[whose]} {_required(part)}" for whose, part in _by_stiffness(chosen)]
     return f"{goal}, the SD of a landmark per axis may be at most: {'; '.join(parts)}."
 
 
