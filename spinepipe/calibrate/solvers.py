@@ -13,7 +13,7 @@ from spinepipe.statics import (
     System,
     by_parameters,
     follow,
-    settle,
+    move,
     settled_by_parameters,
 )
 
@@ -82,7 +82,7 @@ class Settling:
             ends, derivatives = [], []
             for step in system.case.steps:
                 program = self._course.program(system.slots.loading(step.wrenches))
-                end = settle(system, program, self._course.duration_s, coarseness=END_ONLY)
+                end = move(system, program, self._course.duration_s, coarseness=END_ONLY)
                 if not end.status.usable:
                     return end.message
                 derivative = settled_by_parameters(system, program, end, self._free)

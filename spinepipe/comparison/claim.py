@@ -14,6 +14,8 @@ class Verdict(StrEnum):
 
     INSIDE = "inside"
     OUTSIDE = "outside"
+    CIRCULAR = "circular"
+    RECOMPUTED = "recomputed"
     CONTRADICTED = "contradicted"
     NOT_COMPUTED = "not_computed"
 
@@ -42,6 +44,8 @@ class Claim:
     outside : what is known of the reason, told only when ours is outside.
     note : what a reader must know in any case.
     contradicted : how the paper's own numbers exclude each other; empty where they do not.
+    evidence : what it is called when ours is inside: `CIRCULAR` where the cohort was built to have
+        the number, `RECOMPUTED` where it follows from the paper's other numbers alone.
     """
 
     id: str
@@ -54,6 +58,7 @@ class Claim:
     outside: str
     note: str = ""
     contradicted: str = ""
+    evidence: Verdict = Verdict.INSIDE
 
 
 def judge(claim: Claim, run: Run) -> dict[str, Any]:
@@ -89,17 +94,16 @@ def _verdict(claim: Claim, ours: Ours | None) -> Verdict:
         return Verdict.CONTRADICTED
     if ours is None:
         return Verdict.NOT_COMPUTED
-    return Verdict.INSIDE if claim.range.holds(ours.value) else Verdict.OUTSIDE
+    return claim.evidence if claim.range.holds(ours.value) else Verdict.OUTSIDE
 
 
 def _reason(claim: Claim, verdict: Verdict, ours: Ours | None, missing: str) -> str:
     """What the range is, why ours is outside it or absent, and the notes."""
     told = {
-        Verdict.INSIDE: [],
         Verdict.OUTSIDE: [_factor(claim, ours), claim.outside],
         Verdict.CONTRADICTED: [f"not compared: {claim.contradicted}", missing],
         Verdict.NOT_COMPUTED: [missing],
-    }[verdict]
+    }.get(verdict, [])
     compared = "" if verdict is Verdict.CONTRADICTED else f"range: {claim.range.what}"
     parts = [compared, *told, claim.note, ours.note if ours else ""]
     return "; ".join(part for part in parts if part)

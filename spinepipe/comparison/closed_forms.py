@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from math import sqrt
 
 from spinepipe.comparison.best_model import carried_force
-from spinepipe.comparison.claim import Claim, Ours
+from spinepipe.comparison.claim import Claim, Ours, Verdict
 from spinepipe.comparison.experiment import BEST, FORCE_N
 from spinepipe.comparison.paper import (
     FITTED,
@@ -40,7 +40,8 @@ def _fixed(name: str, where: str, quantity: str, unit: str, paper: float | None,
            ours: float, note: str) -> Claim:  # fmt: skip
     """A number that the paper's own numbers give."""
     return Claim(f"closed_form.{name}", where, quantity, unit, paper, allowed,
-                 lambda run: Ours(ours), _FORMULA, note)  # fmt: skip
+                 lambda run: Ours(ours), _FORMULA, note,
+                 evidence=Verdict.RECOMPUTED)  # fmt: skip
 
 
 def _compression() -> Claim:

@@ -8,8 +8,8 @@ from spinepipe.comparison.ranges import Range, binomial, wilson_percent
 from spinepipe.comparison.run import NotComputed, Run
 
 _EXACT = (
-    "fits use exact derivatives here; success_by_method shows what other ways of fitting make of "
-    "some of the same poses"
+    "fits are solved at rest with exact derivatives here; by this rule other ways of fitting may "
+    "succeed as often without arriving at the optimum, see success_by_method"
 )
 _EMULATED = (
     "an emulation of the published way (forward run, differences) on another engine and other "

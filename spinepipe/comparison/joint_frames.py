@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from spinepipe.comparison import summary
-from spinepipe.comparison.claim import Claim
+from spinepipe.comparison.claim import Claim, Verdict
 from spinepipe.comparison.paper import (
     JOINTS,
     MOTION_KEY,
@@ -63,12 +63,14 @@ def _coordinate(quantity: str, table: str, dataset: str, joint: str, name: str) 
     yield Claim(
         f"{key}.median", table, f"median {words}", unit, middle, half_width(middle, iqr),
         summary.median(**where), _FRAME_RULE if free else _KEPT, "" if free else _PUT_IN[dataset],
+        evidence=Verdict.INSIDE if free else Verdict.CIRCULAR,
     )  # fmt: skip
     yield Claim(
         f"{key}.iqr", table, f"IQR {words}", unit, iqr, normal_iqr(iqr, n),
         summary.statistic("iqr", **where), _spread(quantity, dataset),
         _CHOSEN if _chosen(quantity, joint, name) else "",
         _copied(quantity, dataset, joint, name),
+        Verdict.CIRCULAR if _chosen(quantity, joint, name) else Verdict.INSIDE,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate import Evaluator, Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array
@@ -43,7 +43,8 @@ def run(
     }
     try:
         problem = _problem(root, settings, cohort, specimen, start, damping)
-        found = fit(replace(problem, course=course(settings, loading)))
+        problem = replace(problem, course=course(settings, loading))
+        found = fit(problem)
     except RefusedModel as error:
         rows = _refused(cohort, str(error))
     else:
@@ -105,6 +106,7 @@ def _problem(
 def _fitted(cohort: Cohort, problem: Problem, found: Fit) -> list[dict[str, Any]]:
     """One row per joint: its stiffness and its own mean errors."""
     solved = found.status.usable
+    message = "; ".join(filter(None, (found.message, _no_rest(problem, found))))
     values = moved(problem.model, problem.free, found.x).effects[0].values
     rows = []
     for joint, errors in enumerate(np.moveaxis(absolute_errors(found.cases, found.poses), 1, 0)):
@@ -123,10 +125,19 @@ def _fitted(cohort: Cohort, problem: Problem, found: Fit) -> list[dict[str, Any]
                 "cost": found.cost if solved else None,
                 "evaluations": found.evaluations,
                 "status": found.status.value,
-                "message": found.message,
+                "message": message,
             }
         )
     return rows
+
+
+def _no_rest(problem: Problem, found: Fit) -> str:
+    """What must be said of a fit to a moving spine that has no equilibrium under its load."""
+    if problem.course is None or not found.status.usable:
+        return ""
+    if Evaluator(replace(problem, course=None)).at(found.x).residual is not None:
+        return ""
+    return "with this stiffness the spine was still moving away when it was read: no rest"
 
 
 def _refused(cohort: Cohort, message: str) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.jobs.provenance import provenance
+from spinepipe.statics import Status
 from spinepipe.tables import SUCCESS_BY_METHOD, from_rows, read_frame, write
 
 ARRIVED = 1.01
@@ -41,7 +42,7 @@ def count_by_method(fits: pd.DataFrame, failed_when: str) -> list[dict[str, Any]
 
 
 def _counted(fits: pd.DataFrame, failed_when: str) -> dict[str, Any]:
-    solved = fits["cost"].notna()
+    solved = fits["status"].isin([status.value for status in Status if status.usable])
     near = {how: fits[f"near_start_{how}"].eq(True) & solved for how in ("any", "all")}
     successful = int((solved & ~near[failed_when]).sum())
     low, high = proportion_confint(successful, len(fits), method="wilson")

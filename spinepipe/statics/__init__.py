@@ -8,7 +8,7 @@ from spinepipe.statics.path import SolvedStep, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
 from spinepipe.statics.program import Course, Program
 from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
-from spinepipe.statics.settling import END_ONLY, Settled, no_settling, settle
+from spinepipe.statics.settling import END_ONLY, Settled, move, no_settling, settle
 from spinepipe.statics.settling_sensitivity import settled_by_parameters
 from spinepipe.statics.status import Status
 from spinepipe.statics.system import Balance, System
@@ -35,6 +35,7 @@ __all__ = [
     "declared",
     "follow",
     "free_parameters",
+    "move",
     "moved",
     "no_settling",
     "observe",

@@ -7,7 +7,7 @@ microsecond steps otherwise. Its end is compared with the equilibrium under the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
@@ -51,7 +51,8 @@ class Settled:
     ----------
     q, rate : (n,) pose and rate at the end.
     history : (len(times), n) poses at asked times, NaN where the run did not get there.
-    remaining : (n,) equilibrium pose less end pose, or None when there is no equilibrium.
+    remaining : (n,) equilibrium pose less end pose; None when there is no equilibrium, or when it
+        was not looked for.
     sizes : s, the steps of time that were taken.
     """
 
@@ -65,16 +66,35 @@ class Settled:
 
 
 def settle(
+    system: System, program: Program, duration: float, times: Sequence[float] = ()
+) -> Settled:
+    """Let the chain move from rest in the neutral pose for ``duration`` seconds.
+
+    Status ``converged`` says that the run reached its end and that there is an equilibrium;
+    ``remaining`` how far it still moves.
+    """
+    end = move(system, program, duration, times)
+    if end.status is Status.REFUSED:
+        return end
+    final = program.at(duration)
+    equilibrium = solve(system, end.q, system.slots.unloaded(), final, NO_STATES)
+    if equilibrium.status is Status.CONVERGED:
+        return replace(end, remaining=equilibrium.q - end.q)
+    if not end.status.usable:
+        return end
+    return replace(end, status=Status.UNSTABLE, message=f"moving away: {equilibrium.message}")
+
+
+def move(
     system: System,
     program: Program,
     duration: float,
     times: Sequence[float] = (),
     coarseness: float = 1.0,
 ) -> Settled:
-    """Let the chain move from rest in the neutral pose for ``duration`` seconds.
+    """As `settle`, without looking for the equilibrium: ``converged`` means the end was reached.
 
-    ``coarseness`` multiplies the tolerances, see `END_ONLY`. Status ``converged`` says that the
-    run reached its end; ``remaining`` how far it still moves.
+    ``coarseness`` multiplies the tolerances, see `END_ONLY`.
     """
     refusal = no_settling(system)
     if refusal:
@@ -83,14 +103,7 @@ def settle(
         return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, ())
     run = _Run(system, program, coarseness)
     history = run.to(duration, times)
-    final = program.at(duration)
-    equilibrium = solve(system, run.q, system.slots.unloaded(), final, NO_STATES)
-    reachable = equilibrium.status is Status.CONVERGED
-    remaining = equilibrium.q - run.q if reachable else None
-    status, message = run.status, run.message
-    if status.usable and not reachable:
-        status, message = Status.UNSTABLE, f"moving away: {equilibrium.message}"
-    return Settled(run.q, run.rate, history, remaining, status, message, tuple(run.sizes))
+    return Settled(run.q, run.rate, history, None, run.status, run.message, tuple(run.sizes))
 
 
 def retrace(system: System, program: Program, sizes: Sequence[float]) -> Array | None:

@@ -165,7 +165,10 @@ class Dynamic(BaseModel):
         default=1.0, gt=0, le=60, description="time in which the load grows; then motion is read"
     )
     steps_per_s: float = Field(
-        default=25.0, gt=0, le=1000, description="times per second at which the load is given"
+        default=25.0,
+        gt=0,
+        le=1000,
+        description="times per second at which the load is given; straight in between",
     )
 
 

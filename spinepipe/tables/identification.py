@@ -57,7 +57,8 @@ BOOTSTRAP = Table(
         Column("damping_rotation_nm_s_per_rad", "number", "damping of rotations", "N m s/rad",
                low=0.0),
         *_stiffness("", "stiffness of this joint", NO_FIT),
-        *_errors("mean absolute error of this joint's predicted motion over its readings"),
+        *_errors("mean absolute error of this joint's motion over the readings of steps that enter "
+                 "the cost"),
         Column("cost", "number", "sum of weight times squared error", "mm2, deg2", null=NO_FIT,
                low=0.0),
         Column("evaluations", "integer", "evaluations of the fit", low=0),
@@ -181,12 +182,12 @@ SUCCESS_BY_METHOD = Table(
         SPECIMEN,
         Column("method", "text", "way of fitting, see the study's page"),
         Column("fits", "integer", "fits tried", low=0),
-        Column("solved", "integer", "fits that ended with a stiffness", low=0),
+        Column("solved", "integer", "fits that ended with a usable status", low=0),
         Column("near_start_any", "integer", "of these: one free stiffness or more near its start",
                low=0),
         Column("near_start_all", "integer", "of these: all near their start", low=0),
         Column("claimed", "integer", "fits whose optimiser says that it found an optimum", low=0),
-        Column("successful", "integer", "fits that ended, not near the start by the study's rule",
+        Column("successful", "integer", "solved fits not near the start by the study's rule",
                low=0),
         Column("success", "number", "share of successful fits", low=0.0, high=1.0),
         Column("success_low", "number", "lower end of its 95 % interval (Wilson)", low=0.0,
@@ -303,9 +304,12 @@ AGAINST = Table(
             )
         ),
         Column("verdict", "text",
-               "inside, outside: our value and the paper's range; contradicted: the paper's own "
-               "numbers exclude each other; not_computed: this run has no such value",
-               allowed=("inside", "outside", "contradicted", "not_computed")),
+               "inside, outside: our value and the paper's range; circular: inside, but the cohort "
+               "was built to have it; recomputed: the paper's number from its other numbers; "
+               "contradicted: the paper's own numbers exclude each other; not_computed: this run "
+               "has no such value",
+               allowed=("inside", "outside", "circular", "recomputed", "contradicted",
+                        "not_computed")),
         Column("reason", "text", "what the range is, and why ours is outside it"),
     ),
 )  # fmt: skip

@@ -90,7 +90,8 @@ CALIBRATIONS = Table(
             Column(
                 f"{name}_error_{length_or_angle(name)}",
                 "number",
-                "mean absolute error of the predicted motion over all measured readings",
+                "mean absolute error of the predicted motion over the readings of steps that enter "
+                "the cost",
                 length_or_angle(name),
                 null="not measured, or no pose was found",
                 low=0.0,

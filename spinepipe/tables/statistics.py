@@ -53,7 +53,8 @@ def _agreement(name: str, meaning: str) -> Column:
 AGREEMENT = Table(
     "agreement",
     "Predicted against measured motion after Bland and Altman: one row per dataset, joint and "
-    "coordinate. Differences are predicted less measured.",
+    "coordinate. Differences are predicted less measured. Intervals take pairs as independent; one "
+    "reading seen in many poses is not.",
     ("specimen", "dataset", "joint", "coordinate"),
     (
         SPECIMEN,
@@ -109,7 +110,7 @@ VARIANCE_SHARES = Table(
 IMPORTANCE = Table(
     "importance",
     "Regression tree of each error on joint pose and stiffness: share of the squared error that "
-    "splits on a predictor remove. The shares of a tree sum to one.",
+    "splits on a predictor remove. The shares of a tree sum to one, or are all 0 without a split.",
     ("specimen", "joint", "coordinate", "predictor"),
     (
         SPECIMEN,

@@ -208,7 +208,7 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     (told,) = found.text("li")
     assert "Of 7 published quantities ours are inside the paper's range for 3" in told
     assert "outside for 2; 1 are contradicted by other numbers" in told
-    assert told.endswith("not computed: 1.")
+    assert told.endswith("1 are not computed.")
     heads = found.text("button")
     assert heads == ["quantity", "unit", "paper", "ours", "verdict", "reason", "where"]
     assert found.text("td").count("as <it> is") == 7

@@ -18,6 +18,7 @@ from spinepipe.statics import (
     Status,
     System,
     free_parameters,
+    move,
     moved,
     settle,
     settled_by_parameters,
@@ -70,7 +71,7 @@ def sampled(model: SpineModel, case: LoadCase, course: Course, coarseness: float
     system = System(Chain(model), model, case)
     programs = [course.program(system.slots.loading(step.wrenches)) for step in case.steps]
     return np.stack(
-        [settle(system, one, course.duration_s, coarseness=coarseness).q for one in programs]
+        [move(system, one, course.duration_s, coarseness=coarseness).q for one in programs]
     )
 
 

@@ -43,6 +43,7 @@ def fits(method: str, costs: list[float | None], **columns: list[object]) -> pd.
         "near_start_all": [None if cost is None else False for cost in costs],
         "claims_success": True,
     }
+    rows["status"] = ["refused" if cost is None else "converged" for cost in costs]
     return pd.DataFrame({**rows, **columns})
 
 
@@ -67,6 +68,9 @@ def test_fits_are_counted_by_method() -> None:
     assert ours["derivative_error_median"] is None
     _, strict = count_by_method(pd.concat([exact, runs]), "any")
     assert strict["successful"] == 1
+    stopped = runs.assign(status=["not_converged", "converged", "converged", "converged"])
+    _, fewer = count_by_method(pd.concat([exact, stopped]), "all")
+    assert (fewer["solved"], fewer["successful"], fewer["arrived"]) == (3, 1, 2)
 
 
 @pytest.mark.parametrize(
