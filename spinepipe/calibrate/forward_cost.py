@@ -58,10 +58,17 @@ class ForwardCost(Evaluator):
 
     def _run(self, x: Array) -> float:
         model = moved(self.problem.model, self.problem.free, x)
+        known: dict[tuple[object, ...], Array | None] = {}  # cycles repeat their loads
         total = 0.0
         for number, system in enumerate(self._systems):
             there = system.with_model(model)
-            ends = [self.end(there, step) for step in there.case.steps]
+            ends = []
+            for step in there.case.steps:
+                loading = there.slots.loading(step.wrenches)
+                key = (there.case.test, there.slots, loading.key)
+                if key not in known:
+                    known[key] = self.end(there, step)
+                ends.append(known[key])
             poses = [end for end in ends if end is not None]
             if len(poses) < len(ends):
                 return LOST

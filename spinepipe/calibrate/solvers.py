@@ -10,6 +10,7 @@ from spinepipe.statics import (
     END_ONLY,
     Course,
     FreeParameter,
+    Loading,
     System,
     by_parameters,
     follow,
@@ -77,19 +78,30 @@ class Settling:
 
     def solve(self, x: Array, systems: Sequence[System]) -> Solution | str:
         """The solution with the unknowns at x (m,), or why there is none."""
+        known: dict[tuple[object, ...], tuple[Array, Array]] = {}  # cycles repeat their loads
         poses, by_x = [], []
         for system in systems:
-            ends, derivatives = [], []
+            ends = []
             for step in system.case.steps:
-                program = self._course.program(system.slots.loading(step.wrenches))
-                end = move(system, program, self._course.duration_s, coarseness=END_ONLY)
-                if not end.status.usable:
-                    return end.message
-                derivative = settled_by_parameters(system, program, end, self._free)
-                if derivative is None:
-                    return "the run does not repeat with slightly other stiffness"
-                ends.append(end.q)
-                derivatives.append(derivative)
-            poses.append(np.stack(ends))
-            by_x.append(np.stack(derivatives))
+                loading = system.slots.loading(step.wrenches)
+                key = (system.case.test, system.slots, loading.key)
+                if key not in known:
+                    found = self._end(system, loading)
+                    if isinstance(found, str):
+                        return found
+                    known[key] = found
+                ends.append(known[key])
+            poses.append(np.stack([end for end, _ in ends]))
+            by_x.append(np.stack([derivative for _, derivative in ends]))
         return Solution(tuple(poses), tuple(by_x))
+
+    def _end(self, system: System, loading: Loading) -> tuple[Array, Array] | str:
+        """End pose (n,) and its derivative (n, m), or why there is none."""
+        program = self._course.program(loading)
+        end = move(system, program, self._course.duration_s, coarseness=END_ONLY)
+        if not end.status.usable:
+            return end.message
+        derivative = settled_by_parameters(system, program, end, self._free)
+        if derivative is None:
+            return "the run does not repeat with slightly other stiffness"
+        return end.q, derivative

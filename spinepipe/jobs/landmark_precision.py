@@ -86,8 +86,15 @@ def _required(
     if len(relative) > 1:
         relative["both"] = pd.concat(relative.values()).groupby(level="sd_mm").max()
     for kind, grid in relative.items():
-        sds = grid.index.to_numpy(float)
+        sds, n = grid.index.to_numpy(float), grid.shape[1]
         found = required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
         ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
         numbers = {"sd_mm": found.sd, **ends, "message": found.message}
-        yield {"motion": kind, "share": asked.share, **numbers}
+        numbers["message"] = "; ".join(filter(None, (found.message, _too_few(n, asked.share))))
+        yield {"motion": kind, "share": asked.share, "n": n, **numbers}
+
+
+def _too_few(n: int, share: float) -> str:
+    """What must be said when not even all poses below the limit would show the share."""
+    low, _ = proportion_confint(n, n, method="wilson")
+    return f"{n} poses cannot show a share of {share:g}: take more" if low < share else ""

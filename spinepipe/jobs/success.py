@@ -51,6 +51,6 @@ def _judged(
     rows["outlier"] = above.any(axis=1)
     how = {"solved": "all", "near_start_any": "any", "near_start_all": "all", "outlier": "any"}
     judged = rows.groupby(keys, sort=False).agg(how).reset_index()
-    failed = judged[f"near_start_{rule.failed_when}"]
-    judged["reduced"] = judged["solved"] & ~failed & ~judged["outlier"]
+    judged["failed"] = judged["solved"] & judged[f"near_start_{rule.failed_when}"]
+    judged["reduced"] = judged["solved"] & ~judged["failed"] & ~judged["outlier"]
     return judged

@@ -14,6 +14,9 @@ from spinepipe.tables import SUCCESS_BY_METHOD, from_rows, read_frame, write
 ARRIVED = 1.01
 """A fit has arrived when its cost is at most this many times the least found for its pose."""
 
+NOTHING = 1e-6
+"""Cost (mm2, deg2) below which all fits are exact, and count as equal."""
+
 
 def run(root: str, study: str, fits: str, output: str) -> None:
     """Write ``success_by_method.parquet``."""
@@ -33,7 +36,7 @@ def count_by_method(fits: pd.DataFrame, failed_when: str) -> list[dict[str, Any]
     fits = fits.copy()
     fits["cost"] = fits["cost"].astype(float)
     least = fits.groupby(["specimen", "pose"])["cost"].transform("min")
-    fits["arrived"] = fits["cost"] <= ARRIVED * least
+    fits["arrived"] = fits["cost"] <= ARRIVED * least + NOTHING
     groups = fits.groupby(["specimen", "method"], sort=False)
     return [
         {"specimen": specimen, "method": method, **_counted(part, failed_when)}

@@ -65,7 +65,7 @@ def _shares(grid: pd.DataFrame) -> Iterator[dict[str, Any]]:
             "n_poses": found.n_rows,
             "n_stiffness": found.n_columns,
             "status": found.status.value,
-            "message": found.message,
+            "message": found.message.replace("row", "pose").replace("column", "stiffness"),
         }
 
 

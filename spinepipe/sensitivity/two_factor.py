@@ -173,7 +173,7 @@ def _estimates(raw: Array) -> Array:
     """(5,) shares with negative components set to 0."""
     parts = np.maximum(raw[:3], 0.0)
     row, column, rest = parts / parts.sum()
-    return np.array([row, column, rest, row + rest, column + rest])
+    return np.minimum([row, column, rest, row + rest, column + rest], 1.0)  # rounding
 
 
 def _message(raw: Array) -> str:

@@ -23,6 +23,11 @@ class Loading:
     moments: Array
     share: float
 
+    @property
+    def key(self) -> bytes:
+        """The same for the same loading of the same slots."""
+        return self.forces.tobytes() + self.moments.tobytes() + np.float64(self.share).tobytes()
+
     def towards(self, other: "Loading", fraction: float) -> "Loading":
         """The loading that far on the straight way to another."""
         return Loading(

@@ -37,7 +37,6 @@ _Loading = Literal["equilibrium", "quasi_static", "dynamic"]
 _Loadings = Annotated[
     tuple[_Loading, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
-_ALL_LOADINGS: tuple[_Loading, ...] = ("equilibrium", "quasi_static", "dynamic")
 _Millimetres = Annotated[float, Field(gt=0, le=20)]
 _SDs = Annotated[
     tuple[_Millimetres, ...], Field(strict=False, min_length=1), AfterValidator(_rising)
@@ -73,9 +72,9 @@ class Bootstrap(BaseModel):
 
     sets: int = Field(default=100, ge=0, le=1000, description="sampled sets; 0 leaves it out")
     loadings: _Loadings = Field(
-        default=_ALL_LOADINGS,
-        description="ways of loading each set is fitted under; quasi_static and dynamic need "
-        "masses and inertias",
+        default=("equilibrium",),
+        description="ways of loading each set is fitted under: equilibrium, quasi_static, dynamic; "
+        "the last two need masses and inertias, and a hundred times as long",
     )
 
 
@@ -147,7 +146,7 @@ class StartBootstrap(Bootstrap):
 class DampingBootstrap(Bootstrap):
     """Does damping decide about the fitted stiffness?"""
 
-    sets: int = Field(default=10, ge=0, le=1000, description="sampled sets; 0 leaves it out")
+    sets: int = Field(default=0, ge=0, le=1000, description="sampled sets; 0 leaves it out")
     factor: float = Field(
         default=10.0,
         gt=1,
@@ -177,7 +176,9 @@ class Methods(BaseModel):
 
     model_config = FORM
 
-    poses: int = Field(default=4, ge=0, le=1000, description="poses fitted; 0 leaves it out")
+    poses: int = Field(
+        default=0, ge=0, le=1000, description="poses fitted; 0 leaves it out. The dearest fits"
+    )
     sane_step: float = Field(
         default=1e-3, gt=0, lt=1, description="relative difference step chosen with care"
     )

@@ -78,6 +78,8 @@ SUCCESS = Table(
         Column("near_start_any", "flag",
                "one free stiffness at least ended near its start (success.near_start_percent)"),
         Column("near_start_all", "flag", "all free stiffnesses ended near their start"),
+        Column("failed", "flag",
+               "solved, but near its start by the study's rule (success.failed_when)"),
         Column("outlier", "flag",
                "a free stiffness ended far above its start (success.outlier_times_start)"),
         Column("reduced", "flag", "kept in the reduced dataset: solved, not failed, no outlier"),
@@ -270,6 +272,7 @@ REQUIRED_PRECISION = Table(
         Column("motion", "text", "kind of motion; both: below both limits",
                allowed=("translation", "rotation", "both")),
         Column("share", "number", "share of poses asked for", low=0.0, high=1.0),
+        Column("n", "integer", "poses per SD", low=0),
         *(
             Column(name, "number", meaning, "mm", low=0.0,
                    null="outside the sampled SDs, see message")

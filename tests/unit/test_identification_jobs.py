@@ -564,6 +564,8 @@ def test_bootstrap_fits_are_judged_by_their_own_start(tmp_path: Path) -> None:
 def test_sampled_starts_and_damping(tmp_path: Path) -> None:
     root = str(project(tmp_path, Size()))
     settings, _ = study_and_cohort(root, STUDY)
+    ten = settings.damping_bootstrap.model_copy(update={"sets": 10})
+    settings = settings.model_copy(update={"damping_bootstrap": ten})
     starts = bootstrap.sampled(settings, "a", "start")
     assert len(starts) == 100
     low, high = settings.start_bootstrap.lowest, settings.start_bootstrap.highest

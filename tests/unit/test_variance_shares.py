@@ -182,3 +182,15 @@ def test_two_rows_or_columns_are_too_few(shape) -> None:
 def test_what_is_no_full_grid_is_refused(grid) -> None:
     with pytest.raises(ValueError, match="full grid"):
         variance_shares(grid)
+
+
+def test_no_share_exceeds_the_whole() -> None:
+    """Sums of shares that round above 1 were refused by the table."""
+    rng = np.random.default_rng(5)
+    for size in ((8, 3), (10, 3), (459, 10)):
+        found = variance_shares(
+            rng.normal(size=(size[0], 1)) * np.ones(size) + 1e-9 * rng.normal(size=size)
+        )
+        assert found.total_row is not None
+        assert found.total_row.estimate <= 1.0
+        assert found.total_row.high <= 1.0

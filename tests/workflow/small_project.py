@@ -22,7 +22,7 @@ block: 4
 calibration:
   weights:
     {{anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}}
-start_bootstrap: {{sets: 3}}
+start_bootstrap: {{sets: 3, loadings: [equilibrium, quasi_static, dynamic]}}
 damping_bootstrap: {{sets: 2, loadings: [equilibrium]}}
 methods: {{poses: 1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
