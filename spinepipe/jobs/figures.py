@@ -24,7 +24,7 @@ Draw = Callable[[JointPoseSensitivity, Cohort, Tables], Figure]
 
 DRAW: dict[str, Draw] = {
     "stiffness": lambda study, cohort, rows: stiffness_figure(study, cohort, rows["calibrations"]),
-    "errors": lambda _, cohort, rows: errors_figure(cohort, rows["simulations"]),
+    "errors": lambda study, cohort, rows: errors_figure(cohort, rows["simulations"], study),
     "joint_pose": lambda _, cohort, rows: joint_pose_figure(cohort, rows["poses"]),
     "bootstrap": bootstrap_figure,
     "success_by_method": success_figure,

@@ -23,7 +23,7 @@ DEFAULT, SANE = "forward_run_default_step", "forward_run_sane_step"
 RAW_UNITS = "forward_run_raw_units"
 """As the default step, but on stiffness in N/m and N m/rad instead of multiples of its start."""
 
-ONE_STIFFNESS_ONLY = "compared for one stiffness shared by all joints only"
+ONE_STIFFNESS_ONLY = "it needs one stiffness shared by all joints"
 
 
 def run(

@@ -11,6 +11,8 @@ from matplotlib.ticker import MaxNLocator
 from spinepipe.cohort import Cohort
 from spinepipe.report.agreement_rows import draw_rows
 from spinepipe.report.layout import explain, head
+from spinepipe.report.rounding import EXACT, exact, rounded
+from spinepipe.report.settling import settling
 from spinepipe.report.style import BLACK, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, unit
 from spinepipe.studies import JointPoseSensitivity
@@ -43,16 +45,25 @@ def agreement_figure(
         total = count(len(tables["agreement"]), "row")
         return saying(f"No agreement can be shown: none of {total} has two different readings.")
     if len(known) > MOST_PANELS:
-        return draw_rows(cohort, known)
+        return draw_rows(cohort, known, settling(study))
     panels = [_panel(row, tables, len(cohort.specimen_names)) for _, row in known.iterrows()]
     figure, axes = _grid(len(panels), known["coordinate"].nunique())
     for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, panel.title)
         _draw(axis, panel)
-    bars = {OURS: "a reading with the pose's own stiffness", BLACK: "bias", LIMITS: "limits"}
     words = "Reduced poses; bands: 95 % intervals of bias and limits of agreement (bias ± 1.96 SD)."
-    explain(figure, bars, words)
+    bars = {OURS: "a reading with the pose's own stiffness"}
+    if all(exact(panel.readings["difference"]) for panel in panels):
+        words = "Reduced poses. No difference is larger than rounding, so there are no limits."
+    else:
+        bars |= {BLACK: "bias", LIMITS: "limits"}
+    explain(figure, bars, f"{words} {settling(study)}".strip())
     return figure
+
+
+def in_rows(table: pd.DataFrame, cohort: Cohort) -> bool:
+    """Whether there are too many joints and directions for a panel each."""
+    return len(_usable(table, cohort)) > MOST_PANELS
 
 
 def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
@@ -80,6 +91,7 @@ def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int)
     readings = pd.DataFrame(
         {"mean": (predicted + measured) / 2.0, "difference": predicted - measured}
     ).dropna()
+    readings["difference"] = rounded(readings["difference"])
     words = [row["specimen"]] if n_specimens > 1 else []
     title = ", ".join([*words, row["joint"], AXIS[row["coordinate"]].lower()])
     return _Panel(row, readings, title)
@@ -102,20 +114,29 @@ def _draw(axis: Axes, panel: _Panel) -> None:
         rasterized=len(readings) > _MOST_OUTLINES, zorder=3,
     )  # fmt: skip
     axis.axhline(0.0, color=GREY, lw=0.5, zorder=1)
+    axis.xaxis.set_major_locator(MaxNLocator(4))
+    name = row["coordinate"]
+    axis.set_xlabel(f"mean of both ({unit(name)}), + is {POSITIVE[name]}")
+    axis.set_ylabel(f"predicted less measured ({unit(name)})")
+    if exact(readings["difference"]):
+        axis.set_yticks([0.0])
+        axis.set_ylim(-1.0, 1.0)
+        words = f"{EXACT}, n = {row['n']}"
+    else:
+        _draw_limits(axis, row)
+        limits = f"({fixed(row['lower_limit'])} to {fixed(row['upper_limit'])})"
+        words = f"bias {fixed(row['bias'])} {limits}, n = {row['n']}"
+    axis.text(0.02, 0.995, words, transform=axis.transAxes, fontsize=6.0, va="top")
+
+
+def _draw_limits(axis: Axes, row: pd.Series) -> None:
     _line(axis, row["bias"], (row["bias_low"], row["bias_high"]), BLACK)
     sd_band = row["lower_limit"] - row["lower_limit_low"]
     _line(axis, row["lower_limit"], (row["lower_limit_low"], row["lower_limit"] + sd_band), LIMITS)
     upper = row["upper_limit"]
     _line(axis, upper, (2.0 * upper - row["upper_limit_high"], row["upper_limit_high"]), LIMITS)
     axis.margins(y=0.18)
-    axis.xaxis.set_major_locator(MaxNLocator(4))
     axis.yaxis.set_major_locator(MaxNLocator(5))
-    name = row["coordinate"]
-    axis.set_xlabel(f"mean of both ({unit(name)}), + is {POSITIVE[name]}")
-    axis.set_ylabel(f"predicted less measured ({unit(name)})")
-    limits = f"({fixed(row['lower_limit'])} to {fixed(row['upper_limit'])})"
-    words = f"bias {fixed(row['bias'])} {limits}, n = {row['n']}"
-    axis.text(0.02, 0.995, words, transform=axis.transAxes, fontsize=6.0, va="top")
 
 
 def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:

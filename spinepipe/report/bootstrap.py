@@ -14,20 +14,25 @@ from spinepipe.report.bootstrap_rows import FIT, bootstrap_rows
 from spinepipe.report.layout import explain, head, label_rows, mark_start
 from spinepipe.report.log_axis import log_ticks
 from spinepipe.report.published import paper_of
+from spinepipe.report.rounding import rounded
 from spinepipe.report.rows import EVERY_JOINT, Rows
-from spinepipe.report.sections import sections
+from spinepipe.report.sections import MOST_ACROSS, sections
 from spinepipe.report.spread import Array, finite
 from spinepipe.report.strip import STRIP_KEY, draw_strip
-from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
+from spinepipe.report.style import GREY, OURS, TALLEST_MM, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
 from spinepipe.statics.status import Status
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 MOST_ROWS_WITH_WORDS = 14
-_ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 4.2, 15.0, 16.0
+_ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 3.2, 15.0, 16.0
+_MOST_ACROSS, _FEW_TICKS, _TICK_PT = 4, 3, 5.5
 _LEAST_SPREAD = 1.05
 """An axis shows at least 5 % to either side: smaller spreads are to look small."""
+
+_LEAST_DIFFERENCE = 0.05
+"""So do differences of errors, mm or degrees."""
 
 
 def bootstrap_figure(
@@ -44,18 +49,25 @@ def bootstrap_figure(
     columns = [_stiffness(name) for name in free] + [_error(name) for name in measured]
     shared = study.calibration.grouping == "per_specimen"
     joints = (EVERY_JOINT,) if shared else cohort.joint_names
-    upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints)
+    most = _most_rows(len(free), len(measured))
+    upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints, most)
     moving = [name for name in cohort.joint_names if _has_error(solved, name, measured)]
-    lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving)
-    parts = [(len(free), _height(upper)), (len(measured), _height(lower))]
-    (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM)
+    lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving, most)
+    room = _room_for_words([(len(free), upper), (len(measured), lower)])
+    parts = [(len(free), _height(upper, room)), (len(measured), _height(lower, room))]
+    across = MOST_ACROSS if room else _MOST_ACROSS
+    (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM, across)
     below = others[0] if others else []
     for index, (name, axis) in enumerate(zip(free, above, strict=True)):
-        head(axis, index, f"{AXIS[name]} stiffness")
-        _draw_stiffness(name, axis, upper, study, pooled, cohort.name)
+        head(axis, index, AXIS[name])
+        _draw_stiffness(name, axis, upper, study, pooled)
+        if len(upper) <= room:
+            _tell_stiffness(name, axis, upper, pooled, cohort.name)
     for index, (name, axis) in enumerate(zip(measured, below, strict=True)):
-        head(axis, len(free) + index, f"{AXIS[name]} error")
+        head(axis, len(free) + index, AXIS[name])
         _draw_errors(name, axis, lower, relative, cohort.name)
+        if len(lower) <= room:
+            _tell(axis, lower, _error(name), relative)
     words = _words(tried, found, upper)
     explain(figure, _bars(cohort.name), words, dashed="" if pooled else "start of the other fits")
     return figure
@@ -74,12 +86,24 @@ def _has_error(solved: pd.DataFrame, joint: str, measured: Sequence[str]) -> boo
     return bool(rows.notna().any(axis=None))
 
 
-def _height(rows: Rows) -> float:
-    return len(rows) * (_ROW_MM if len(rows) <= MOST_ROWS_WITH_WORDS else _NARROW_MM) + _AROUND_MM
+def _most_rows(n_above: int, n_below: int) -> int:
+    """How many narrow rows a panel may have for all lines of panels to fit on the page."""
+    lines = sum(-(-n // _MOST_ACROSS) for n in (n_above, n_below))
+    return int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
+
+
+def _room_for_words(parts: Sequence[tuple[int, Rows]]) -> int:
+    """Up to how many rows of a panel have words: none where the page would be too small."""
+    height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
+    return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
+
+
+def _height(rows: Rows, room: int) -> float:
+    return len(rows) * (_ROW_MM if len(rows) <= room else _NARROW_MM) + _AROUND_MM
 
 
 def _draw_stiffness(
-    name: str, axis: Axes, rows: Rows, study: JointPoseSensitivity, relative: bool, cohort: str
+    name: str, axis: Axes, rows: Rows, study: JointPoseSensitivity, relative: bool
 ) -> None:
     index = COORDINATES.index(name)
     box = study.start_bootstrap
@@ -93,9 +117,6 @@ def _draw_stiffness(
         if start and not relative:
             axis.plot(ends, [y, y], color=GREY, lw=7.0, alpha=0.2, solid_capstyle="butt", zorder=1)
         draw_strip(axis, values, y, OURS)
-        if len(rows) <= MOST_ROWS_WITH_WORDS:
-            _tell(axis, y, values, relative)
-            write_range(axis, cohort, name, frame, y - 0.36)
     _limit(axis, samples, [] if relative else list(ends))
     label_rows(axis, rows, below=0.5, above=0.75)
     axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
@@ -105,32 +126,44 @@ def _limit(axis: Axes, samples: Sequence[Array], more: list[float]) -> None:
     low = min([*(values.min() for values in samples), *more]) / _LEAST_SPREAD
     high = max([*(values.max() for values in samples), *more]) * _LEAST_SPREAD
     axis.set_xlim(low, high)
-    log_ticks(axis.xaxis, low, high)
+    log_ticks(axis.xaxis, low, high, _FEW_TICKS)
+    axis.tick_params(axis="x", labelsize=_TICK_PT)
 
 
 def _draw_errors(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
-    axis.xaxis.set_major_locator(MaxNLocator(4))
+    axis.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS))
     for y, frame in enumerate(rows.frames):
-        values = finite(frame[_error(name)])
+        values = rounded(finite(frame[_error(name)]))
         if not len(values):
             continue
         draw_strip(axis, values, y, OURS)
         if not relative:
             draw_errors(axis, cohort, name, frame, y - 0.32)
-        if len(rows) <= MOST_ROWS_WITH_WORDS:
-            _tell(axis, y, values, relative)
     if not relative:
         axis.set_xlim(0.0, max(1.05 * axis.get_xlim()[1], 0.1))
+    else:
+        low, high = axis.get_xlim()
+        axis.set_xlim(min(low, -_LEAST_DIFFERENCE), max(high, _LEAST_DIFFERENCE))
     label_rows(axis, rows, below=0.6, above=0.75)
-    what = "error less own median" if relative else "mean absolute error"
+    what = "error less own median" if relative else "absolute error"
     axis.set_xlabel(f"{what} ({unit(name)})")
 
 
-def _tell(axis: Axes, y: float, values: Array, relative: bool) -> None:
-    """Median, width of the range and n of a row; a relative median says nothing."""
-    width = f"range {number(float(values.max() - values.min()), 2)}, n = {len(values)}"
-    words = width if relative else f"{number(float(np.median(values)))}, {width}"
-    note(axis, 0.02, y + 0.4, words, OURS)
+def _tell_stiffness(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
+    """Numbers of each row, and the paper's below them."""
+    _tell(axis, rows, _stiffness(name), relative)
+    for y, frame in enumerate(rows.frames):
+        write_range(axis, cohort, name, frame, y - 0.36)
+
+
+def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
+    """Median, width of the range and n of each row; a relative median says nothing."""
+    for y, frame in enumerate(rows.frames):
+        values = rounded(finite(frame[column]))
+        if len(values):
+            width = f"range {number(float(values.max() - values.min()), 2)}, n = {len(values)}"
+            words = width if relative else f"{number(float(np.median(values)))}, {width}"
+            note(axis, 0.02, y + 0.4, words, OURS)
 
 
 def _bars(cohort: str) -> dict[str, str]:

@@ -21,16 +21,20 @@ FIT = ["specimen", "bootstrap", "loading", "set"]
 
 
 def bootstrap_rows(
-    solved: pd.DataFrame, columns: Sequence[str], specimens: Sequence[str], joints: Sequence[str]
+    solved: pd.DataFrame,
+    columns: Sequence[str],
+    specimens: Sequence[str],
+    joints: Sequence[str],
+    most: int = MOST_ROWS,
 ) -> tuple[Rows, bool]:
-    """Rows from the bottom up, and whether they were pooled for want of room.
+    """Rows from the bottom up, and whether more than ``most`` of them were pooled.
 
     Where they were, each specimen and joint is taken relative to its own median: ``columns`` are
     then shares of it for stiffness, and differences from it for errors.
     """
     keys = list(product(SAMPLED, LOADINGS, specimens, reversed(joints)))
     parts = [(key, part) for key in keys if len(part := _part(solved, *key))]
-    if len(parts) <= MOST_ROWS:
+    if len(parts) <= most:
         labels = [_label(*key, len(specimens), len(joints)) for key, _ in reversed(parts)]
         return Rows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
     relative = pd.concat([_from_median(part, columns) for _, part in parts])

@@ -11,11 +11,14 @@ from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, grid, head, label_rows, row_height
+from spinepipe.report.rounding import EXACT, exact, rounded
 from spinepipe.report.rows import Rows, rows_of
+from spinepipe.report.settling import settling
 from spinepipe.report.spread import BAR_PT, KEY, THIN_BAR_PT, draw_bar, finite
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
 from spinepipe.statics.status import Status
+from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 OWN = "calibrated"
@@ -32,14 +35,22 @@ class _Set:
     rows: pd.DataFrame
 
 
-def errors_figure(cohort: Cohort, simulations: pd.DataFrame) -> Figure:
-    """Errors per measured coordinate and joint, and the share of runs without equilibrium."""
+def errors_figure(
+    cohort: Cohort, simulations: pd.DataFrame, study: JointPoseSensitivity | None = None
+) -> Figure:
+    """Errors per measured coordinate and joint, and the share of runs without equilibrium.
+
+    Where motion is zeroed at step 0, the zeros of that step are no readings. The study tells
+    whether motion was simulated at rest.
+    """
     measured = [
         name
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if simulations[f"error_{column}"].notna().any()
     ]
     runs = _failed_runs(simulations)
+    if cohort.zeroed_at_step_0:
+        simulations = simulations[simulations["step"] > 0]
     if not measured:
         total = count(len(runs), "simulation")
         return saying(f"No error can be shown: none of {total} reached a measured equilibrium.")
@@ -54,7 +65,7 @@ def errors_figure(cohort: Cohort, simulations: pd.DataFrame) -> Figure:
         _draw(name, axis, rows, sets)
     head(axes[-1], len(measured), "No equilibrium")
     _draw_failures(axes[-1], runs)
-    explain(figure, _bars(sets, runs, rows), _words(runs, rows))
+    explain(figure, _bars(sets, runs, rows), _words(runs, rows, study))
     return figure
 
 
@@ -70,12 +81,12 @@ def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
     thick = BAR_PT if rows.with_numbers else THIN_BAR_PT
     for y, frame in enumerate(rows.frames):
         for group in sets:
-            values = finite(frame.loc[frame.index.isin(group.rows.index), column])
+            values = rounded(finite(frame.loc[frame.index.isin(group.rows.index), column]))
             if len(values):
                 found = draw_bar(axis, values, y + group.offset, group.color, thick)
                 if rows.with_numbers:
                     ends = f"{fixed(found.low)} to {fixed(found.high)}"
-                    words = f"{fixed(found.median)} ({ends})"
+                    words = EXACT if exact(values) else f"{fixed(found.median)} ({ends})"
                     note(axis, 0.02, y + group.offset + 0.19, words, group.color)
     axis.set_xlabel(f"error ({unit(name)}), + is {POSITIVE[name]}")
     label_rows(axis, rows, below=0.45, above=0.55)
@@ -121,12 +132,13 @@ def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> dict[str, str
     }
 
 
-def _words(runs: pd.DataFrame, rows: Rows) -> str:
+def _words(runs: pd.DataFrame, rows: Rows, study: JointPoseSensitivity | None) -> str:
     own = runs["stiffness"] == OWN
     total = f"{count(int(own.sum()), 'run')} with the own calibration, {int((~own).sum())} with"
     meaning = "Error: predicted less measured, all measured load steps together, median (IQR)"
     parts = (meaning, KEY, rows.note, f"{total} best sets")
-    return "; ".join(part for part in parts if part) + "."
+    settled = "" if study is None else settling(study)
+    return " ".join(["; ".join(part for part in parts if part) + ".", settled]).strip()
 
 
 def _n_best(runs: pd.DataFrame) -> int:

@@ -1,6 +1,6 @@
 """Figure: how precise landmarks must be for errors below a limit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, head
 from spinepipe.report.published import paper_of
+from spinepipe.report.required import required_words
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
-from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.report.words import count, number, tick
 from spinepipe.studies import JointPoseSensitivity
 
 COLORS = {"calibrated": OURS, "nominal": BEST}
@@ -63,9 +64,7 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
             )
             axis.plot(rows["sd_mm"], rows["p95"], color=color, lw=0.8, ls=(0, (4, 2)))
     if not alone:
-        for whose, rows in here.groupby("stiffness"):
-            middle = rows.groupby("sd_mm")["median"].median()
-            axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
+        _draw_middle(axis, here, "median", 1.0)
     limit = float(here["limit"].iloc[0])
     axis.axhline(limit, color=GREY, lw=0.8, ls=":")
     axis.annotate(
@@ -74,6 +73,13 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
     )  # fmt: skip
     axis.set_ylim(0.0, None)
     axis.set_ylabel(f"error ({symbol})")
+
+
+def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
+    """Median over the specimens as a thick line."""
+    for whose, rows in here.groupby("stiffness"):
+        middle = factor * rows.groupby("sd_mm")[column].median()
+        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
 
 
 def _draw_shares(
@@ -88,6 +94,8 @@ def _draw_shares(
         if alone:
             low, high = 100.0 * rows["below_low"], 100.0 * rows["below_high"]
             axis.fill_between(rows["sd_mm"], low, high, color=color, alpha=0.15, lw=0)
+    if not alone:
+        _draw_middle(axis, here, "below", 100.0)
     asked = 100.0 * study.landmark_precision.share
     axis.axhline(asked, color=GREY, lw=0.8, ls=":")
     axis.annotate(
@@ -95,37 +103,34 @@ def _draw_shares(
         textcoords="offset points", ha="left", va="top", fontsize=6.0, color=INK[GREY],
     )  # fmt: skip
     for place, (whose, rows) in enumerate(required.groupby("stiffness")):
-        _mark_required(axis, rows, COLORS[str(whose)], 6.0 + 8.0 * place)
+        sampled = study.landmark_precision.sd_mm
+        _mark_required(axis, rows, COLORS[str(whose)], 6.0 + 8.0 * place, sampled)
     axis.set_ylim(-2.0, 106.0)
     axis.set_xlim(0.0, None)
 
 
-def _mark_required(axis: Axes, rows: pd.DataFrame, color: str, y: float) -> None:
-    """Required SD with its interval near the foot of the panel, and its number."""
-    for _, row in rows.dropna(subset=["sd_mm"]).iterrows():
-        ends = row[["sd_low_mm", "sd_high_mm"]].fillna(row["sd_mm"]).to_numpy(float)
-        axis.plot(ends, [y, y], color=color, lw=1.2, solid_capstyle="butt")
-        axis.plot([row["sd_mm"]], [y], "^", color=color, ms=4.5, mec="white", mew=0.4, zorder=5)
+def _mark_required(
+    axis: Axes, rows: pd.DataFrame, color: str, y: float, sampled: Sequence[float]
+) -> None:
+    """Required SD with its interval near the foot of the panel, and its number.
+
+    An open end of the interval goes as far as SDs were sampled, mm. Several specimens are drawn
+    fainter and a little apart, so that each keeps its interval.
+    """
+    found = rows.dropna(subset=["sd_mm"])
+    for index, (_, row) in enumerate(found.iterrows()):
+        lift = y + 4.0 * (index / len(found))
+        ends = row[["sd_low_mm", "sd_high_mm"]].to_numpy(float)
+        ends = np.where(np.isfinite(ends), ends, (min(sampled), max(sampled)))
+        axis.plot(ends, [lift, lift], color=color, lw=1.2 if len(found) == 1 else 0.7,
+                  solid_capstyle="butt")  # fmt: skip
+        axis.plot([row["sd_mm"]], [lift], "^", color=color, ms=4.5, mec="white", mew=0.4, zorder=5)
     if len(rows) == 1:
         row = rows.iloc[0]
         known = np.isfinite(row["sd_mm"])
-        ends = row[["sd_low_mm", "sd_mm", "sd_high_mm"]].dropna().to_numpy(float)
-        left = known and ends.max() > 0.6 * axis.get_xlim()[1]
-        x = (ends.min() if left else ends.max()) if known else 0.0
-        axis.annotate(required_words(row), (float(x), y), (-4 if left else 4, 0),
-                      textcoords="offset points", va="center", ha="right" if left else "left",
+        axis.annotate(required_words(row, sampled), (0.0, y + 2.0 if known else y), (4, 3.5),
+                      textcoords="offset points", va="bottom" if known else "center",
                       fontsize=6.0, color=INK[color])  # fmt: skip
-
-
-def required_words(row: pd.Series) -> str:
-    """``1.20 mm (1.05–1.40)``, or why there is no such SD; an open end of the interval is a ?."""
-    if not np.isfinite(row["sd_mm"]):
-        return str(row["message"]) or "none"
-    ends = [fixed(row[name]) if np.isfinite(row[name]) else "?" for name in _ENDS]
-    return f"{fixed(row['sd_mm'])} mm ({ends[0]}–{ends[1]})"
-
-
-_ENDS = ("sd_low_mm", "sd_high_mm")
 
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
@@ -150,10 +155,13 @@ def _words(
     lines = "line: median, dashed: 95th percentile"
     if specimens > 1:
         lines = f"thin: each of {specimens} specimens, thick: their median"
-    shown = "triangle: largest SD that will do, with 95 % interval; band: 95 % interval (Wilson)"
+    shown = "triangle: largest SD that will do, with 95 % interval"
+    if specimens == 1:
+        shown += "; band below: 95 % interval (Wilson)"
     both = required[required["motion"] == "both"]
+    sampled = study.landmark_precision.sd_mm
     told = [
-        f"below both limits with {WHOSE[row['stiffness']]}: {required_words(row)}"
+        f"below both limits with {WHOSE[row['stiffness']]}: {required_words(row, sampled)}"
         for _, row in both.iterrows()
         if specimens == 1
     ]

@@ -1,5 +1,6 @@
 """Figure: what errors hang on, joint pose or stiffness, by variance shares and by a tree."""
 
+import textwrap
 from collections.abc import Mapping
 
 import pandas as pd
@@ -13,37 +14,39 @@ from spinepipe.report.layout import explain, head, label_rows
 from spinepipe.report.rows import Rows, rows_of
 from spinepipe.report.sections import sections
 from spinepipe.report.style import BEST, GREY, OURS, note, saying
-from spinepipe.report.words import AXIS, fixed, percent
+from spinepipe.report.words import AXIS, count, fixed, percent
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import COORDINATES
 
 COLORS = {"pose": OURS, "stiffness": BEST, "interaction": GREY}
 _OFFSETS = {"pose": 0.24, "stiffness": 0.0, "interaction": -0.24}
 _ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 13.0, 4.6, 14.0, 16.0
-_ENDS = (-2.0, 102.0)
-"""Ends of the axis, %."""
+_ENDS = (-2.0, 118.0)
+"""Ends of the axis, %: beyond 100 stand the numbers."""
 
-_TREE = ["specimen", "joint", "coordinate"]
+_RESULT = {"variance": "share", "tree": "importance"}
+_LINE_LENGTH = 46
+TREE = ["specimen", "joint", "coordinate"]
+"""What one tree is known by."""
 
 
 def pose_against_stiffness_figure(
     study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """Per coordinate a panel of variance shares and, below it, one of the tree's importance."""
-    shares = _done(tables["variance_shares"])
-    trees = importance_by_factor(tables["importance"])
-    if shares.empty and trees.empty:
+    shares, grown = tables["variance_shares"], tables["importance"]
+    if _done(shares).empty and _done(grown).empty:
         return saying("Pose and stiffness cannot be compared: no error varies over the grid.")
-    known = pd.concat([shares, trees], ignore_index=True)
-    names = [name for name in COORDINATES if name in set(known["coordinate"])]
+    trees = pd.concat([importance_by_factor(grown), _without(grown)], ignore_index=True)
+    names = [name for name in COORDINATES if name in {*shares["coordinate"], *trees["coordinate"]}]
     upper, lower = (
         rows_of(frame, cohort.specimen_names, cohort.joint_names) for frame in (shares, trees)
     )
     parts = [(rows, what) for rows, what in ((upper, "variance"), (lower, "tree")) if len(rows)]
     panels, figure = sections([(len(names), _height(rows)) for rows, _ in parts], _KEY_MM)
-    for (rows, what), axes in zip(parts, panels, strict=True):
-        for name, axis in zip(names, axes, strict=True):
-            head(axis, figure.axes.index(axis), f"{AXIS[name]} error: {what}")
+    for part, ((rows, what), axes) in enumerate(zip(parts, panels, strict=True)):
+        for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
+            head(axis, part * len(names) + index, f"{AXIS[name]}: {what}")
             _draw(axis, rows, name, what)
     bars = {COLORS["pose"]: "joint pose", COLORS["stiffness"]: "stiffness set"}
     explain(figure, bars | {COLORS["interaction"]: "interaction"}, _words(tables, upper))
@@ -53,7 +56,7 @@ def pose_against_stiffness_figure(
 def importance_by_factor(importance: pd.DataFrame) -> pd.DataFrame:
     """Importance of a tree summed over the predictors of each factor; r2, leaves and n with it."""
     done = _done(importance)
-    keys = [*_TREE, "factor"]
+    keys = [*TREE, "factor"]
     return done.groupby(keys, sort=False, as_index=False).agg(
         importance=("importance", "sum"),
         predictors=("predictor", "count"),
@@ -67,6 +70,11 @@ def _done(table: pd.DataFrame) -> pd.DataFrame:
     return table[table["status"] == "done"]
 
 
+def _without(table: pd.DataFrame) -> pd.DataFrame:
+    """One row for each joint and coordinate that has no result."""
+    return table[table["status"] != "done"].drop_duplicates(TREE)
+
+
 def _height(rows: Rows) -> float:
     return len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM
 
@@ -74,12 +82,18 @@ def _height(rows: Rows) -> float:
 def _draw(axis: Axes, rows: Rows, name: str, what: str) -> None:
     for y, frame in enumerate(rows.frames):
         here = frame[frame["coordinate"] == name]
+        found = here[here[_RESULT[what]].notna()]
         if what == "variance":
-            _draw_shares(axis, y, here, rows)
+            _draw_shares(axis, y, found, rows)
         else:
-            _draw_tree(axis, y, here, rows)
+            _draw_tree(axis, y, found, rows)
+        if found.empty and len(here) and rows.with_numbers:
+            why = textwrap.fill(str(here["message"].iloc[0]), _LINE_LENGTH)
+            note(axis, 0.02, y, why, GREY)
     label_rows(axis, rows, below=0.5, above=0.6)
     axis.set_xlim(*_ENDS)
+    axis.set_xticks(range(0, 101, 20))
+    axis.spines["bottom"].set_bounds(0.0, 100.0)
     label = "share of the variance (%)" if what == "variance" else "share of importance (%)"
     axis.set_xlabel(label)
 
@@ -91,19 +105,8 @@ def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: Rows) -> None:
         ends = (100.0 * row["share_low"], 100.0 * row["share_high"])
         draw_interval(axis, 100.0 * row["share"], ends, at, color, crowded=bool(crowded))
         if rows.with_numbers and not crowded:
-            _tell_share(axis, at, row, color)
-
-
-def _tell_share(axis: Axes, at: float, row: pd.Series, color: str) -> None:
-    """The share as a number, on the side of its interval that has more room."""
-    if row["share_high"] < 0.85:
-        x, side, lift = row["share_high"] + 0.03, "left", 0.0
-    elif row["share_low"] > 0.15:
-        x, side, lift = row["share_low"] - 0.03, "right", 0.0
-    else:
-        x, side, lift = row["share"], "center", 0.11
-    across = (100.0 * x - _ENDS[0]) / (_ENDS[1] - _ENDS[0])
-    note(axis, across, at + lift, f"{fixed(100.0 * row['share'], 0)} %", color, ha=side)
+            words = f"{fixed(100.0 * row['share'], 0)} %"
+            note(axis, 1.0, at, words, color, ha="right")
 
 
 def _draw_tree(axis: Axes, y: int, here: pd.DataFrame, rows: Rows) -> None:
@@ -112,9 +115,10 @@ def _draw_tree(axis: Axes, y: int, here: pd.DataFrame, rows: Rows) -> None:
     height = 0.5 / max(1, len(trees))
     for index, (_, tree) in enumerate(trees):
         left, base = 0.0, y + 0.25 - (index + 1) * height
-        for _, row in tree.set_index("factor").reindex(["pose", "stiffness"]).dropna().iterrows():
-            width = 100.0 * row["importance"]
-            color = COLORS[str(row.name)]
+        shares = tree.set_index("factor")["importance"].reindex(["pose", "stiffness"]).dropna()
+        for factor, share in shares.items():
+            width = 100.0 * share
+            color = COLORS[str(factor)]
             axis.add_patch(Rectangle((left, base), width, height, fc=color, ec="none", alpha=0.75))
             left += width
         if rows.with_numbers and len(trees) == 1:
@@ -131,6 +135,16 @@ def _tell_tree(axis: Axes, y: int, tree: pd.DataFrame) -> None:
     note(axis, 0.02, y + 0.4, f"pose {percent(round(1000 * pose), 1000)}; {leaves}", GREY)
 
 
+def _reasons(table: pd.DataFrame, what: str) -> str:
+    """Why there are no results, where there is none or rows have no room to say it."""
+    without = _without(table)
+    if without.empty:
+        return ""
+    told = "; ".join(sorted(set(without["message"])))
+    cells = len(table.drop_duplicates(TREE))
+    return f"no {what} for {len(without)} of {count(cells, 'error')}: {told}"
+
+
 def _span(numbers: pd.Series) -> str:
     low, high = numbers.min(), numbers.max()
     return f"{low}" if low == high else f"{low}–{high}"
@@ -141,5 +155,6 @@ def _words(tables: Mapping[str, pd.DataFrame], rows: Rows) -> str:
     poses, sets = (_span(grid[name]) for name in ("n_poses", "n_stiffness"))
     told = f"Grid of {poses} joint poses times {sets} stiffness sets" if len(grid) else ""
     lines = "line: 95 % interval; tree: share of the squared error that splits remove, r² from "
-    parts = (told, rows.note, f"{lines}cross-validation")
+    parts = [told, rows.note, f"{lines}cross-validation"]
+    parts += [_reasons(grid, "shares"), _reasons(tables["importance"], "tree")]
     return "; ".join(part for part in parts if part) + "."

@@ -4,6 +4,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -78,7 +79,7 @@ def blank(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
 def saying(message: str) -> Figure:
     """A figure that has nothing to show and says why."""
     figure = blank(40.0)
-    figure.text(0.5, 0.5, message, ha="center", va="center", color=GREY, fontsize=9.0)
+    figure.text(0.5, 0.5, fill(message, 100), ha="center", va="center", color=GREY, fontsize=9.0)
     return figure
 
 

@@ -14,6 +14,7 @@ from spinepipe.report.intervals import draw_interval
 from spinepipe.report.layout import explain, head
 from spinepipe.report.log_axis import log_ticks
 from spinepipe.report.published import paper_of
+from spinepipe.report.refused import refused
 from spinepipe.report.spread import finite
 from spinepipe.report.strip import STRIP_KEY, draw_strip
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
@@ -34,7 +35,10 @@ def success_figure(
     shares, fits = tables["success_by_method"], tables["method_fits"]
     if not len(shares) or not shares["fits"].sum():
         return saying("No fit was done in several ways (methods: poses is 0).")
-    methods = list(dict.fromkeys(shares["method"]))[::-1]
+    why = refused(fits)
+    methods = [name for name in dict.fromkeys(shares["method"]) if name not in why][::-1]
+    if not methods:
+        return saying("Not compared: " + "; ".join(dict.fromkeys(why.values())) + ".")
     paper = _paper(cohort)
     figure = blank(_AROUND_MM + _ROW_MM * (len(methods) + bool(paper)))
     axes = figure.subplots(1, 3, sharey=True)
@@ -52,7 +56,7 @@ def success_figure(
     bars = {OURS: "the same poses, fitted in each way"}
     if paper:
         bars[THEIRS] = f"{paper[0]}, {paper[2]} poses"
-    explain(figure, bars, _words(study, len(set(shares["specimen"]))))
+    explain(figure, bars, _words(study, len(set(shares["specimen"])), why))
     return figure
 
 
@@ -115,7 +119,7 @@ def _draw_fits(axis: Axes, fits: pd.DataFrame, column: str, methods: Sequence[st
         axis.xaxis.set_major_formatter(lambda x, _: tick(x))
 
 
-def _words(study: JointPoseSensitivity, specimens: int) -> str:
+def _words(study: JointPoseSensitivity, specimens: int, why: Mapping[str, str]) -> str:
     success = study.success
     which = "all free stiffnesses" if success.failed_when == "all" else "a free stiffness"
     near = f"{which} within {tick(success.near_start_percent)} % of the start"
@@ -124,5 +128,6 @@ def _words(study: JointPoseSensitivity, specimens: int) -> str:
         "diamond: cost within 1 % of the least that any method found",
         f"{count(specimens, 'specimen')} pooled" if specimens > 1 else "",
         STRIP_KEY,
+        *(f"{method_name(name)} not compared: {message}" for name, message in why.items()),
     )
     return "; ".join(part for part in words if part) + "."

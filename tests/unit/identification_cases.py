@@ -68,7 +68,7 @@ def _fit_ended(size: Size) -> Row:
 
 def _success(size: Size, rng: np.random.Generator) -> Iterator[Row]:
     for specimen, pose in product(size.specimens, range(size.poses)):
-        flags = dict.fromkeys(("near_start_any", "near_start_all", "outlier"), False)
+        flags = dict.fromkeys(("near_start_any", "near_start_all", "failed", "outlier"), False)
         ends = {"solved": size.solved, "reduced": size.solved}
         yield {"specimen": specimen, "pose": pose, **flags, **ends}
 
@@ -184,6 +184,7 @@ def _required_precision(size: Size, rng: np.random.Generator) -> Iterator[Row]:
     motions = ("translation", "rotation", "both")
     for specimen, stiffness, motion in product(size.specimens, ("calibrated", "nominal"), motions):
         row = {"specimen": specimen, "stiffness": stiffness, "motion": motion, "share": 0.95}
+        row["n"] = 60
         if size.solved and stiffness == "calibrated":
             row |= {"sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5, "message": ""}
         else:

@@ -197,7 +197,7 @@ def test_the_job_refuses_runs_without_masses(tmp_path: Path, method: str) -> Non
 def test_the_job_compares_shared_stiffness_only(tmp_path: Path) -> None:
     found = row(tmp_path, "exact", Size(grouping="per_joint"))
     assert found["status"] == "refused"
-    assert found["message"] == "compared for one stiffness shared by all joints only"
+    assert found["message"] == "it needs one stiffness shared by all joints"
 
 
 def test_the_job_shows_what_a_capped_fit_came_to(

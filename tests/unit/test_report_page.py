@@ -171,13 +171,13 @@ def test_findings_are_the_numbers_of_the_tables() -> None:
     assert told[0].startswith("12 fits of 12 (100 %) are in the reduced dataset: 12 ended")
     assert "0 had not moved (all free stiffnesses within 1 % of the start)" in told[0]
     assert "flexion–extension 37.0 N m/rad (IQR 18.5 to 74.0)" in told[1]
-    assert "joint pose in 4, at most 70 % (95 % interval 65 to 75 %)" in told[2]
-    assert "Pose alone takes more than stiffness alone in 4." in told[2]
+    assert "more of the variance than stiffness in 4 and stiffness more in 0." in told[2]
     assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told[3]
     assert "forward run default step 1 of 6 (least cost reached: 1)" in told[4]
     many = page(SIZES["many specimens"])[0].text("li")
     assert many[0].startswith("27 fits of 27")
-    assert "1.25 mm (9 of 9 specimens)" in many[3]
+    assert "37.0 N m/rad in all 9 specimens" in many[1]
+    assert "1.25 mm (smallest of 9 specimens, s0)" in many[3]
     assert "forward run default step 9 of 54" in many[4]
 
 
@@ -185,7 +185,7 @@ def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path:
     root = project(tmp_path, SIZES["one specimen"])
     study, _ = study_and_cohort(str(root), STUDY)
     row = {"specimen": "a", "stiffness": "calibrated", "motion": "rotation", "message": ""}
-    row |= {"sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
+    row |= {"n": 100, "sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
     (told,) = findings(study, Results({"required_precision": pd.DataFrame([row])}, {}, {}, {}))
     assert "to stay below 1°, the SD" in told
     assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told

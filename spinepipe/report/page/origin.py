@@ -36,6 +36,17 @@ def origin(study: JointPoseSensitivity, metadata: Mapping[str, Mapping[str, str]
     return Origin(tuple(_facts(metadata)), digests, settings)
 
 
+def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
+    """Optional parts that the settings leave out, each with the setting that does."""
+    parts = (
+        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
+        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
+        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
+        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+    )
+    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
+
+
 def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
     names = sorted({name for found in metadata.values() for name in found})
     plain = [name for name in names if not name.startswith(_VERSION)]

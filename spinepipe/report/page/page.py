@@ -9,8 +9,9 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from spinepipe.cohort import Cohort
+from spinepipe.report.page.captions import caption
 from spinepipe.report.page.findings import findings
-from spinepipe.report.page.origin import origin
+from spinepipe.report.page.origin import left_out, origin
 from spinepipe.report.page.results import Results
 from spinepipe.report.page.scene import GROUPS, MOST_POSES, as_script, scenes
 from spinepipe.report.page.tables import SHOWN, shown_tables
@@ -34,7 +35,7 @@ TITLES = {
     "pose_against_stiffness": "Joint pose against stiffness",
     "landmark_precision": "Landmark precision needed",
 }
-READ = ("poses", *SHOWN)
+READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _MOST_NAMES = 12
@@ -63,9 +64,10 @@ def study_page(study: JointPoseSensitivity, cohort: Cohort, results: Results) ->
         question=QUESTION,
         specimens=_specimens(cohort),
         findings=findings(study, results),
-        pictures=[_picture(name, results) for name in results.pictures],
+        pictures=[_picture(name, study, cohort, results) for name in results.pictures],
         tables=shown_tables(study, results),
         origin=origin(study, results.metadata),
+        left_out=left_out(study),
         drawn=list(drawn),
         still=_address(_still(study, cohort)),
         groups=GROUPS,
@@ -88,11 +90,12 @@ def _specimens(cohort: Cohort) -> str:
     return f"{count(len(names), 'specimen')}: {shown}{more}"
 
 
-def _picture(name: str, results: Results) -> Picture:
+def _picture(name: str, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Picture:
     """A figure inside the page: as an image of its own it shares no ids with the others."""
     title = TITLES.get(name, name.replace("_", " "))
     address = _address(results.pictures[name].encode())
-    return Picture(name, title, address, " ".join(results.captions[name].split()))
+    words = caption(name, results.captions[name], study, cohort, results)
+    return Picture(name, title, address, words)
 
 
 def _still(study: JointPoseSensitivity, cohort: Cohort) -> bytes:

@@ -47,7 +47,7 @@ def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:
         *_vertebrae(view, cohort),
         *_frames(list(view.frames), "own", _OWN_MM, 8.0, 1.0),
         *_frames(_sampled(poses, view.specimen), "sampled", _SAMPLED_MM, 1.0, 0.3),
-        *_loads(view),
+        *_once(_loads(view)),
     ]
     axes = {
         f"{letter}axis": _axis(letter, title) for letter, title in zip("xyz", _TITLES, strict=True)
@@ -152,6 +152,15 @@ def _loads(view: SpecimenView) -> Iterator[Any]:
                 if size > 1e-9:
                     words = f"{case.test}: {size:.4g} {unit}"
                     yield from _arrow(point, length * vector / size, color, words)
+
+
+def _once(parts: Iterator[Any]) -> Iterator[Any]:
+    """The same traces, of which each name stands in the legend once: a cycle repeats its load."""
+    seen: set[str] = set()
+    for part in parts:
+        part.showlegend = part.type == "scatter3d" and part.name not in seen
+        seen.add(part.name)
+        yield part
 
 
 def _arrow(tip: Array, along: Array, color: str, words: str) -> Iterator[Any]:

@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.report.page.results import Results
 from spinepipe.report.page.significance import FOLDED, folded, in_full
 from spinepipe.report.page.sortable import Sortable, sortable
-from spinepipe.report.pose_against_stiffness import importance_by_factor
+from spinepipe.report.pose_against_stiffness import TREE, importance_by_factor
 from spinepipe.studies import JointPoseSensitivity
 from spinepipe.tables import AGAINST, IMPORTANCE, STATISTICS, TABLES
 from spinepipe.tables.schema import Column
@@ -35,6 +35,7 @@ _IMPORTANCE = (
     Column("importance", "number", "share of all predictors of this factor among all splits"),
     Column("predictors", "integer", "predictors of this factor"),
     *_BY_FACTOR[4:],
+    Column("message", "text", "why there is no tree"),
 )
 
 
@@ -67,11 +68,18 @@ def _of(
         yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
         yield _folded(frame, study.significance)
     elif name == "importance":
-        yield sortable(name, title, about, importance_by_factor(frame), _IMPORTANCE)
+        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
     elif name == AGAINST.name:
         yield sortable(name, title, about, frame, _AGAINST)
     else:
         yield sortable(name, title, about, frame, TABLES[name].columns)
+
+
+def _trees(importance: pd.DataFrame) -> pd.DataFrame:
+    """Importance by factor, and one row with its message for each tree that could not be grown."""
+    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
+    told = none[[*TREE, "n", "message"]]
+    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
 
 
 def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:
