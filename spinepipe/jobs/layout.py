@@ -6,6 +6,7 @@ files costs Snakemake quadratic time.
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 
 from spinepipe.report.published import paper_of
 from spinepipe.studies import JointPoseSensitivity
@@ -75,13 +76,13 @@ class Layout:
         """Where all results of the study are."""
         return f"results/{self.study.study}"
 
-    @property
+    @cached_property
     def stiffnesses(self) -> list[str]:
         """What a pose is simulated with: its own calibration and the best sets of all poses."""
         best = range(1, self.study.best_models + 1)
         return ["calibrated", *(f"best{rank:02d}" for rank in best)]
 
-    @property
+    @cached_property
     def bootstraps(self) -> list[str]:
         """Folders and names of all bootstrap fits of a specimen."""
         parts = {"start": self.study.start_bootstrap, "damping": self.study.damping_bootstrap}

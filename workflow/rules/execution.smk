@@ -2,6 +2,7 @@
 import os
 import sys
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 from snakemake.logging import logger
@@ -74,13 +75,19 @@ def sweep_logs():
                 os.rmdir(folder)
 
 
+@cache
+def simulations_to_do(name):
+    """Simulations of a study that had no file when first asked: none is made before the ranking."""
+    return layout(name).simulations_to_do()
+
+
 def totals():
     """Jobs per rule in this run. Until models are ranked, Snakemake does not know simulations."""
     jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
     counts = Counter(job.rule.name for job in jobs)
     if not counts["simulate"]:
         names = {job.wildcards.study for job in jobs if job.rule.name == "rank_models"}
-        counts["simulate"] = sum(layout(name).simulations_to_do() for name in names)
+        counts["simulate"] = sum(simulations_to_do(name) for name in names)
     return counts
 
 
