@@ -20,6 +20,7 @@ def main() -> None:
         "foundation": foundation,
         "identification": identification_parts,
         "lost_fits": lost_fits_parts,
+        "whole_study": whole_study,
     }
     for name in sys.argv[1:] or parts:
         if name not in parts:
@@ -82,9 +83,15 @@ def identification_parts() -> None:
             f"| {row.near_start} | {row.cost_ratio:.3f} | {error} | {row.runs} | {row.cpu_s:.2f} |"
         )
         print(lines[-1], flush=True)
-    whole = _study_rows(lines, study.whole_runs())
-    data = {"machine": about, "speeds": speeds, "fits": fits, "study": whole}
-    _write("identification", lines, data)
+    _write("identification", lines, {"machine": about, "speeds": speeds, "fits": fits})
+
+
+def whole_study() -> None:
+    """The whole study as a user runs it."""
+    about = _about()
+    lines = _head("The whole study", about)
+    rows = _study_rows(lines, study.whole_runs())
+    _write("whole_study", lines, {"machine": about, "study": rows})
 
 
 def _study_rows(lines: list[str], runs: Iterable[study.Run]) -> list[dict[str, Any]]:
