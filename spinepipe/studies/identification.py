@@ -196,7 +196,7 @@ class LandmarkPrecision(BaseModel):
         default=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0), description="sampled SDs of all landmarks, mm"
     )
     poses: int = Field(
-        default=60, ge=0, le=10000, description="poses sampled for each SD; 0 leaves it out"
+        default=80, ge=0, le=10000, description="poses sampled for each SD; 0 leaves it out"
     )
     translation_limit_mm: float = Field(
         default=1.0, gt=0, le=100, description="limit of translation errors, mm"
