@@ -13,8 +13,6 @@ from spinepipe.problems import InputError
 ROOT = os.getcwd()
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
-# Priority of the longest chain of jobs; bootstraps and methods, which none waits for, fill gaps.
-FIRST = 10
 # A constant: Snakemake asks for its default, an expression, again for each of thousands of jobs.
 TMPDIR = tempfile.gettempdir()
 

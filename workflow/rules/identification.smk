@@ -81,7 +81,6 @@ for job, read, written, ranked in ANALYSES:
             **{name: f"{RESULTS}/{table}.parquet" for name, table in written.items()},
         log:
             f"{LOGS}/{job}.log",
-        priority: FIRST
         params:
             digest=digest(job),
             job=job,

@@ -34,7 +34,6 @@ rule calibrate:
         output=f"{RESULTS}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
     log:
         f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
-    priority: FIRST
     resources:
         tmpdir=TMPDIR,
     params:
@@ -50,7 +49,6 @@ rule aggregate_block:
         f"{RESULTS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.parquet",
     log:
         f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
-    priority: FIRST
     params:
         digest=digests("collect"),
     run:
@@ -64,7 +62,6 @@ rule aggregate_table:
         f"{RESULTS}/{{table}}.parquet",
     log:
         f"{LOGS}/{{table}}.log",
-    priority: FIRST
     params:
         digest=digests("collect"),
     run:
@@ -80,7 +77,6 @@ checkpoint rank_models:
         output=f"{RESULTS}/best.json",
     log:
         f"{LOGS}/rank_models.log",
-    priority: FIRST
     params:
         digest=digest("rank"),
     run:
@@ -95,7 +91,6 @@ rule simulate:
         output=f"{RESULTS}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
-    priority: FIRST
     resources:
         tmpdir=TMPDIR,
     params:
