@@ -681,7 +681,7 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
         sets = landmark_errors._landmark_sets(settings, cohort, "a", sd)
         point = [s[exact["vertebra"]][exact["landmark"]] for s in sets]
         offsets.append(1000.0 * np.array(point) - exact[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
-    assert len(offsets[0]) == settings.landmark_precision.poses == 60
+    assert len(offsets[0]) == settings.landmark_precision.poses > 1
     np.testing.assert_allclose(offsets[1], 4.0 * offsets[0], rtol=0, atol=1e-9)
     assert np.abs(offsets[1]).std() > 0.5
 
