@@ -20,7 +20,7 @@ wildcard_constraints:
     specimen="[^/=]+",
     pose="[0-9]{4,5}",
     stiffness="calibrated|best[0-9]{2}",
-    table="calibrations|simulations|bootstrap|method_fits|precision_errors",
+    table="|".join(JOINED),
     bootstrap="start|damping",
     loading="equilibrium|quasi_static|dynamic",
     set="[0-9]{3,4}",
@@ -29,6 +29,7 @@ wildcard_constraints:
     block="[0-9]{3,5}",
 
 
+include: "workflow/rules/aggregation.smk"
 include: "workflow/rules/joint_pose_sensitivity.smk"
 include: "workflow/rules/identification.smk"
 

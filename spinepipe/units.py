@@ -32,6 +32,12 @@ STIFFNESS_COLUMNS = tuple(
 )
 """Column names of the six stiffnesses in files and tables."""
 
+COORDINATE_UNITS = {name: "mm" if name in TRANSLATIONS else "deg" for name in COORDINATES}
+"""Unit of each coordinate in files and tables."""
+
+STIFFNESS_UNITS = {name: "N/m" if name in TRANSLATIONS else "N m/rad" for name in COORDINATES}
+"""Unit of each stiffness in files and tables."""
+
 
 def to_si(coordinates: ArrayLike) -> NDArray[np.float64]:
     """(…, 6) coordinates in mm and deg to m and rad."""

@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,11 +21,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import Status
-from spinepipe.studies import JointPoseSensitivity, check, read
+from spinepipe.studies import JointPoseSensitivity, Study, check, read
 from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS
 
 Stamp = tuple[str, int, int]
+AnyStudy = TypeVar("AnyStudy", bound=Study)
 
 
 def stamp(path: str | Path) -> Stamp:
@@ -56,18 +58,23 @@ def _folder(name: str, root: str, _study_file: Stamp) -> Path:
 @lru_cache(maxsize=8)
 def _study(
     name: str, root: str, _study_file: Stamp, _cohort_files: tuple[Stamp, ...]
-) -> tuple[JointPoseSensitivity, Cohort]:
-    study, cohort = check(Path(root), name)
-    assert isinstance(study, JointPoseSensitivity)
-    return study, cohort
+) -> tuple[Study, Cohort]:
+    return check(Path(root), name)
 
 
 def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort]:
+    """A validated joint-pose study and its cohort, see `study_of_kind`."""
+    return study_of_kind(JointPoseSensitivity, root, name)
+
+
+def study_of_kind(kind: type[AnyStudy], root: str, name: str) -> tuple[AnyStudy, Cohort]:
     """The validated study and its cohort; read once per worker and state of the files."""
     study_file = stamp(os.path.join(root, "config", "studies", f"{name}.yaml"))
     with os.scandir(_folder(name, root, study_file)) as entries:
         files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in entries)
-    return _study(name, root, study_file, tuple(files))
+    study, cohort = _study(name, root, study_file, tuple(files))
+    assert isinstance(study, kind)
+    return study, cohort
 
 
 @lru_cache(maxsize=4)

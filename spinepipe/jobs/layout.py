@@ -1,13 +1,11 @@
-"""Which files the results of a study consist of, and which of them make up which table.
+"""Which files the results of a joint-pose study consist of, and which of them make up a table."""
 
-Job files are joined block by block before they become one table: a flat fan-in of thousands of
-files costs Snakemake quadratic time.
-"""
-
-import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.report.published import paper_of
 from spinepipe.studies import JointPoseSensitivity
 
@@ -49,32 +47,22 @@ _FILES_PER_BLOCK = 100
 
 
 @dataclass(frozen=True)
-class Layout:
-    """The result files of one study, as paths relative to the working directory.
+class Layout(StudyFiles):
+    """The result files of one joint-pose study.
 
     Attributes
     ----------
-    study
-        The study.
-    specimens
-        Names of the specimens of its cohort.
     rebuilt
         Whether its cohort was rebuilt from the paper that results are compared with.
     """
 
     study: JointPoseSensitivity
-    specimens: tuple[str, ...]
     rebuilt: bool
 
     @classmethod
-    def of(cls, study: JointPoseSensitivity, cohort: str, specimens: tuple[str, ...]) -> "Layout":
-        """The files of a study of a cohort of that name."""
-        return cls(study, specimens, paper_of(cohort) is not None)
-
-    @property
-    def folder(self) -> str:
-        """Where all results of the study are."""
-        return f"results/{self.study.study}"
+    def of(cls, study: JointPoseSensitivity, cohort: Cohort) -> "Layout":
+        """The files of a study of a cohort."""
+        return cls(study, cohort.specimen_names, paper_of(cohort.name) is not None)
 
     @cached_property
     def stiffnesses(self) -> list[str]:
@@ -107,34 +95,24 @@ class Layout:
         return (*ALWAYS, *(name for names, count in parts.items() if count for name in names))
 
     @property
-    def figures(self) -> tuple[str, ...]:
-        """The figures that this study has."""
-        return tuple(name for name, tables in FIGURES.items() if set(tables) <= set(self.tables))
+    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
+        """Figures and the tables each is drawn from."""
+        return FIGURES
 
-    def table_files(self, names: tuple[str, ...]) -> list[str]:
-        """Files of tables, of those that the study has."""
-        return [f"{self.folder}/{name}.parquet" for name in names if name in self.tables]
+    @property
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The tables of this study that are made of job files."""
+        return tuple(name for name in _JOBS if self._count(name))
 
-    def report_tables(self) -> list[str]:
-        """The tables that the report shows or speaks of."""
-        return self.table_files(self.tables)
-
-    def figure_files(self) -> list[str]:
-        """The figures that the report holds."""
-        return [f"{self.folder}/figures/{figure}.svg" for figure in self.figures]
-
-    def captions(self) -> list[str]:
-        """What is said below each figure."""
-        return [f"workflow/report/{figure}.rst" for figure in self.figures]
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The ranking and the base model."""
+        return "best.json", "model.yaml"
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""
         count = -(-self._count(table) // self._per_block(table))
         return [(name, f"{block:03d}") for name in self.specimens for block in range(count)]
-
-    def block_files(self, table: str) -> list[str]:
-        """The block files of which a table is made."""
-        return [self._block_file(table, *block) for block in self.blocks(table)]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
@@ -143,40 +121,9 @@ class Layout:
         numbers = range(first, min(first + size, self._count(table)))
         return [self._job_file(table, specimen, number) for number in numbers]
 
-    def results(self) -> list[str]:
-        """What a reader of the study wants to have: report, tables, ranking, model and figures."""
-        files = [*(f"{table}.parquet" for table in self.tables), "best.json", "model.yaml"]
-        files += [f"figures/{figure}.{kind}" for figure in self.figures for kind in ("svg", "png")]
-        return [f"{self.folder}/{file}" for file in [*files, "report.html"]]
-
-    def lost(self) -> list[str]:
-        """Job files that are missing although a table or block holds their rows.
-
-        Snakemake does not miss a deleted file once the table made of it exists.
-        """
-        tables = (name for name in _JOBS if self._count(name))
-        return [file for table in tables for file in self._absent(table, joined=True)]
-
     def simulations_to_do(self) -> int:
         """Number of simulations that have no file yet."""
-        return len(self._absent("simulations", joined=False))
-
-    def _absent(self, table: str, joined: bool) -> list[str]:
-        """Missing job files of a table; with `joined` of those blocks only that are in a table."""
-        return [
-            file
-            for specimen, block in self.blocks(table)
-            if not joined or self._is_joined(table, specimen, block)
-            for file in self.job_files(table, specimen, block)
-            if not os.path.exists(file)
-        ]
-
-    def _is_joined(self, table: str, specimen: str, block: str) -> bool:
-        whole = f"{self.folder}/{table}.parquet"
-        return os.path.exists(whole) or os.path.exists(self._block_file(table, specimen, block))
-
-    def _block_file(self, table: str, specimen: str, block: str) -> str:
-        return f"{self.folder}/blocks/{table}/specimen={specimen}/block={block}.parquet"
+        return len(self.absent("simulations", joined=False))
 
     def _count(self, table: str) -> int:
         """Number of job files of a table per specimen."""

@@ -1,6 +1,7 @@
 """Studies: what is asked of a cohort, validated before anything runs."""
 
 from spinepipe.studies.check import check
+from spinepipe.studies.cohort_stiffness import CohortStiffness, CrossValidation, LevelStiffness
 from spinepipe.studies.identification import (
     Bootstrap,
     DampingBootstrap,
@@ -11,22 +12,26 @@ from spinepipe.studies.identification import (
 )
 from spinepipe.studies.joint_pose_sensitivity import Calibration, JointPoseSensitivity
 from spinepipe.studies.read import KINDS, read
-from spinepipe.studies.selection import Selection, read_selection
+from spinepipe.studies.selection import Selection, names_of_kind, read_selection
 from spinepipe.studies.study import Study
 
 __all__ = [
     "KINDS",
     "Bootstrap",
     "Calibration",
+    "CohortStiffness",
+    "CrossValidation",
     "DampingBootstrap",
     "JointPoseSensitivity",
     "LandmarkPrecision",
+    "LevelStiffness",
     "Methods",
     "Selection",
     "StartBootstrap",
     "Study",
     "Success",
     "check",
+    "names_of_kind",
     "read",
     "read_selection",
 ]

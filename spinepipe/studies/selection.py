@@ -11,7 +11,7 @@ from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.coordinates import FORM
 from spinepipe.studies.read import STUDIES, displayed
 
-__all__ = ["Selection", "read_selection"]
+__all__ = ["Selection", "names_of_kind", "read_selection"]
 
 CONFIG = Path("config") / "config.yaml"
 
@@ -54,6 +54,16 @@ def read_selection(root: Path) -> Selection:
     if problems or selection is None:
         raise InputError(problems)
     return selection
+
+
+def names_of_kind(root: Path, kind: str) -> tuple[str, ...]:
+    """Names of the study files of a kind, sound or not; those that cannot be read have none."""
+    found = []
+    for path in sorted((root / STUDIES).glob("*.yaml")):
+        document, _ = read_yaml(path, displayed(path, root))
+        if document is not None and document.data.get("kind") == kind:
+            found.append(path.stem)
+    return tuple(found)
 
 
 def _name_problems(selection: Selection, document: Document, root: Path) -> list[Problem]:

@@ -1,5 +1,15 @@
 """Result tables: one schema each, from which files are checked and the docs are generated."""
 
+from spinepipe.tables.cohort_stiffness import (
+    ERRORS,
+    FINDINGS,
+    FITS,
+    MAE,
+    POOLING,
+    RANKING,
+    SIGN_CHECKS,
+    STIFFNESS,
+)
 from spinepipe.tables.identification import (
     AGAINST,
     BOOTSTRAP,
@@ -47,6 +57,14 @@ TABLES = {
         VARIANCE_SHARES,
         IMPORTANCE,
         AGAINST,
+        STIFFNESS,
+        FITS,
+        ERRORS,
+        POOLING,
+        MAE,
+        RANKING,
+        SIGN_CHECKS,
+        FINDINGS,
     )
 }
 
@@ -56,15 +74,23 @@ __all__ = [
     "BOOTSTRAP",
     "CALIBRATIONS",
     "COUNTS",
+    "ERRORS",
+    "FINDINGS",
+    "FITS",
     "IMPORTANCE",
     "LANDMARKS",
     "LANDMARK_PRECISION",
+    "MAE",
     "METHOD_FITS",
+    "POOLING",
     "POSES",
     "PRECISION_ERRORS",
+    "RANKING",
     "REQUIRED_PRECISION",
+    "SIGN_CHECKS",
     "SIMULATIONS",
     "STATISTICS",
+    "STIFFNESS",
     "SUCCESS",
     "SUCCESS_BY_METHOD",
     "SUMMARY",

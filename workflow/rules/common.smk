@@ -6,7 +6,8 @@ from pathlib import Path
 
 from spinepipe import studies
 from spinepipe.jobs.digest import code_digest, value_digest
-from spinepipe.jobs.layout import COMPARED, FIGURES, METHODS, Layout
+from spinepipe.jobs.layout import METHODS
+from spinepipe.jobs.layouts import JOINED, files_of
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.problems import InputError
 
@@ -15,6 +16,15 @@ RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
 # A constant: Snakemake asks for its default, an expression, again for each of thousands of jobs.
 TMPDIR = tempfile.gettempdir()
+
+
+def results_of(kind):
+    """Where results of studies of a kind go.
+
+    The pattern names the studies, so that rules of other kinds may write files of the same name.
+    """
+    names = studies.names_of_kind(Path(ROOT), kind)
+    return f"results/{{study,{'|'.join(names) or 'none of this kind'}}}"
 
 
 def selection():
@@ -62,7 +72,7 @@ def load(name):
 @cache
 def layout(name):
     study, cohort = load(name)
-    return Layout.of(study, cohort.name, tuple(cohort.specimen_names))
+    return files_of(study, cohort)
 
 
 def tables(*names):
@@ -111,7 +121,7 @@ def stiffness_source(wildcards):
     return {"calibration": f"{folder}/calibrations/{file}"}
 
 
-def shown(name):
+def shown(results, name):
     """The file of a figure, shown with its caption by `snakemake --report`."""
-    path = f"{RESULTS}/figures/{name}.svg"
+    path = f"{results}/figures/{name}.svg"
     return report(path, caption=f"../report/{name}.rst", category="{study}")

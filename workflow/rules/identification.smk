@@ -1,9 +1,10 @@
 # What a joint-pose study tells beyond its poses: bootstraps, methods, precision, tests, report.
+from spinepipe.jobs.layout import COMPARED, FIGURES
 
 
 rule bootstrap:
     output:
-        output=f"{RESULTS}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/set={{set}}.parquet",
+        output=f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/set={{set}}.parquet",
     log:
         f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{set}}.log",
     params:
@@ -16,7 +17,7 @@ rule fit_by_method:
     input:
         poses=f"{RESULTS}/poses.parquet",
     output:
-        output=f"{RESULTS}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet",
+        output=f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet",
     log:
         f"{LOGS}/methods/specimen={{specimen}}/pose={{pose}}-{{method}}.log",
     params:
@@ -27,7 +28,7 @@ rule fit_by_method:
 
 rule landmark_errors:
     output:
-        output=f"{RESULTS}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet",
+        output=f"{POSES}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet",
     log:
         f"{LOGS}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.log",
     params:
@@ -78,7 +79,7 @@ for job, read, written, ranked in ANALYSES:
             ),
             **({"best": f"{RESULTS}/best.json"} if ranked else {}),
         output:
-            **{name: f"{RESULTS}/{table}.parquet" for name, table in written.items()},
+            **{name: f"{POSES}/{table}.parquet" for name, table in written.items()},
         log:
             f"{LOGS}/{job}.log",
         params:
@@ -96,8 +97,8 @@ for figure, drawn_from in FIGURES.items():
         input:
             tables=tables(*drawn_from),
         output:
-            svg=shown(figure),
-            png=f"{RESULTS}/figures/{figure}.png",
+            svg=shown(POSES, figure),
+            png=f"{POSES}/figures/{figure}.png",
         log:
             f"{LOGS}/figure_{figure}.log",
         params:
@@ -115,7 +116,7 @@ rule study_report:
         figures=lambda wildcards: layout(wildcards.study).figure_files(),
         captions=lambda wildcards: layout(wildcards.study).captions(),
     output:
-        output=f"{RESULTS}/report.html",
+        output=f"{POSES}/report.html",
     log:
         f"{LOGS}/report.log",
     params:

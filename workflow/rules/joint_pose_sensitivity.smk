@@ -1,10 +1,11 @@
 # Study kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed.
 # Each job is a function `run` of spinepipe.jobs; see `run_job` for how its arguments are named.
+POSES = results_of("joint_pose_sensitivity")
 
 
 rule sample_landmarks:
     output:
-        output=f"{RESULTS}/landmarks.parquet",
+        output=f"{POSES}/landmarks.parquet",
     log:
         f"{LOGS}/sample_landmarks.log",
     params:
@@ -17,8 +18,8 @@ rule build_models:
     input:
         landmarks=f"{RESULTS}/landmarks.parquet",
     output:
-        output=f"{RESULTS}/poses.parquet",
-        model=f"{RESULTS}/model.yaml",
+        output=f"{POSES}/poses.parquet",
+        model=f"{POSES}/model.yaml",
     log:
         f"{LOGS}/build_models.log",
     params:
@@ -31,7 +32,7 @@ rule calibrate:
     input:
         poses=f"{RESULTS}/poses.parquet",
     output:
-        output=f"{RESULTS}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
+        output=f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
     log:
         f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
     resources:
@@ -42,39 +43,13 @@ rule calibrate:
         run_job(rule, "calibrate", wildcards, input, output, log)
 
 
-rule aggregate_block:
-    input:
-        jobs_of_block,
-    output:
-        f"{RESULTS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.parquet",
-    log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
-    params:
-        digest=digests("collect"),
-    run:
-        collect(rule, wildcards, input, output, log)
-
-
-rule aggregate_table:
-    input:
-        blocks_of_table,
-    output:
-        f"{RESULTS}/{{table}}.parquet",
-    log:
-        f"{LOGS}/{{table}}.log",
-    params:
-        digest=digests("collect"),
-    run:
-        collect(rule, wildcards, input, output, log)
-
-
 # A checkpoint, so that a ranking that comes out the same as before computes no simulation again.
 checkpoint rank_models:
     input:
         calibrations=f"{RESULTS}/calibrations.parquet",
         success=f"{RESULTS}/success.parquet",
     output:
-        output=f"{RESULTS}/best.json",
+        output=f"{POSES}/best.json",
     log:
         f"{LOGS}/rank_models.log",
     params:
@@ -88,7 +63,7 @@ rule simulate:
         unpack(stiffness_source),
         poses=f"{RESULTS}/poses.parquet",
     output:
-        output=f"{RESULTS}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
+        output=f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
     resources:

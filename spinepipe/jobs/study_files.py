@@ -1,0 +1,119 @@
+"""Which files the results of a study consist of, whatever its kind.
+
+Job files are joined block by block before they become one table: a flat fan-in of thousands of
+files costs Snakemake quadratic time.
+"""
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from spinepipe.studies import Study
+
+
+@dataclass(frozen=True)
+class StudyFiles(ABC):
+    """The result files of one study, as paths relative to the working directory.
+
+    Attributes
+    ----------
+    study
+        The study.
+    specimens
+        Names of the specimens of its cohort.
+    """
+
+    study: Study
+    specimens: tuple[str, ...]
+
+    @property
+    def folder(self) -> str:
+        """Where all results of the study are."""
+        return f"results/{self.study.study}"
+
+    @property
+    @abstractmethod
+    def tables(self) -> tuple[str, ...]:
+        """The tables that this study has."""
+
+    @property
+    @abstractmethod
+    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
+        """Figures of this kind of study and the tables each is drawn from."""
+
+    @property
+    @abstractmethod
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The tables of this study that are made of job files."""
+
+    @abstractmethod
+    def blocks(self, table: str) -> list[tuple[str, str]]:
+        """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""
+
+    @abstractmethod
+    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
+        """The job files of which a block is made."""
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Results that are neither tables nor figures nor the report."""
+        return ()
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The figures that this study has."""
+        return tuple(
+            name for name, tables in self.drawn_from.items() if set(tables) <= set(self.tables)
+        )
+
+    def table_files(self, names: tuple[str, ...]) -> list[str]:
+        """Files of tables, of those that the study has."""
+        return [f"{self.folder}/{name}.parquet" for name in names if name in self.tables]
+
+    def report_tables(self) -> list[str]:
+        """The tables that the report shows or speaks of."""
+        return self.table_files(self.tables)
+
+    def figure_files(self) -> list[str]:
+        """The figures that the report holds."""
+        return [f"{self.folder}/figures/{figure}.svg" for figure in self.figures]
+
+    def captions(self) -> list[str]:
+        """What is said below each figure."""
+        return [f"workflow/report/{figure}.rst" for figure in self.figures]
+
+    def block_files(self, table: str) -> list[str]:
+        """The files of which a table is made."""
+        return [self.block_file(table, *block) for block in self.blocks(table)]
+
+    def block_file(self, table: str, specimen: str, block: str) -> str:
+        """The file of one block of a table."""
+        return f"{self.folder}/blocks/{table}/specimen={specimen}/block={block}.parquet"
+
+    def results(self) -> list[str]:
+        """What a reader of the study wants to have: report, tables, figures and the rest."""
+        files = [*(f"{table}.parquet" for table in self.tables), *self.others]
+        files += [f"figures/{figure}.{kind}" for figure in self.figures for kind in ("svg", "png")]
+        return [f"{self.folder}/{file}" for file in [*files, "report.html"]]
+
+    def lost(self) -> list[str]:
+        """Job files that are missing although a table or block holds their rows.
+
+        Snakemake does not miss a deleted file once the table made of it exists.
+        """
+        return [file for table in self.made_of_jobs for file in self.absent(table, joined=True)]
+
+    def absent(self, table: str, joined: bool) -> list[str]:
+        """Missing job files of a table; with `joined` of those blocks only that are in a table."""
+        return [
+            file
+            for specimen, block in self.blocks(table)
+            if not joined or self._is_joined(table, specimen, block)
+            for file in self.job_files(table, specimen, block)
+            if not os.path.exists(file)
+        ]
+
+    def _is_joined(self, table: str, specimen: str, block: str) -> bool:
+        whole = f"{self.folder}/{table}.parquet"
+        return os.path.exists(whole) or os.path.exists(self.block_file(table, specimen, block))

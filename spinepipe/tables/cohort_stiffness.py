@@ -1,0 +1,289 @@
+"""Tables of studies of kind cohort_stiffness."""
+
+from spinepipe.tables.columns import JOINT, MESSAGE, SPECIMEN, status
+from spinepipe.tables.schema import Column, Table
+from spinepipe.units import COORDINATES
+
+REPRESENTATIONS = (
+    *("literature", "literature_levels"),
+    *("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
+)
+"""How stiffness is described, from what is taken as published to what is free in each joint."""
+
+SOURCES = ("literature", "own", "others_median", "others_pooled")
+STAGES = ("literature", "fitted", "left_out_case", "left_out_specimen")
+NOTHING = "nothing"
+"""What a stiffness taken from the literature was fitted to."""
+
+NO_FIT = "no stiffness was found"
+NO_POSE = "not measured, or no pose was found"
+LITERATURE = "taken from the literature, not fitted"
+
+REPRESENTATION = Column(
+    "representation",
+    "text",
+    "literature: one published value for all joints; literature_levels: published values level by "
+    "level; per_specimen: one stiffness for all joints of a specimen; level_ratio: published ratio "
+    "of levels times one factor; per_joint: each joint its own; partially_pooled: each joint its "
+    "own, drawn towards its specimen and its cohort as far as the data ask for it",
+    allowed=REPRESENTATIONS,
+)
+FITTED_TO = Column(
+    "fitted_to",
+    "text",
+    "load cases it was fitted to: a test, all, all_but_<test>, or nothing (literature)",
+)
+SOURCE = Column(
+    "source",
+    "text",
+    "whose motion it was fitted to: own, others_median (median of the other specimens' own fits), "
+    "others_pooled (what the hierarchical fit of the others expects of a new specimen), literature",
+    allowed=SOURCES,
+)
+STAGE = Column(
+    "stage",
+    "text",
+    "literature: not fitted at all; fitted: to these readings; left_out_case: to other load cases "
+    "of this specimen; left_out_specimen: to other specimens",
+    allowed=STAGES,
+)
+TEST = Column("test", "text", "load case")
+COORDINATE = Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES)
+_STIFFNESS_UNIT = Column("unit", "text", "unit of the stiffness", allowed=("N/m", "N m/rad"))
+_MOTION_UNIT = Column("unit", "text", "unit of the motion", allowed=("mm", "deg"))
+
+
+def _stiffness(name: str, meaning: str, null: str | None) -> Column:
+    return Column(name, "number", meaning, "N/m or N m/rad, see unit", null, low=0.0)
+
+
+STIFFNESS = Table(
+    "stiffness",
+    "Stiffness: one row per specimen, representation, load cases fitted to, source, joint and "
+    "fitted coordinate.",
+    ("specimen", "representation", "fitted_to", "source", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        REPRESENTATION,
+        FITTED_TO,
+        SOURCE,
+        JOINT,
+        COORDINATE,
+        _STIFFNESS_UNIT,
+        _stiffness("stiffness", "stiffness of this joint against this coordinate", NO_FIT),
+        _stiffness(
+            "standard_error",
+            "standard error of the stiffness, to first order; of a prediction for a new specimen "
+            "its standard deviation",
+            "not fitted, at a bound, or not constrained by the data",
+        ),
+        _stiffness("low", "lower end of the 95 % interval (normal in the logarithm)",
+                   "no standard error"),
+        _stiffness("high", "upper end of the 95 % interval", "no standard error"),
+        Column("identifiable", "flag",
+               "whether the data constrain this stiffness; where false do not believe it",
+               null=LITERATURE),
+        Column("at_bound", "text", "whether the fit ended at a bound",
+               allowed=("no", "lower", "upper")),
+        status("fit"),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+
+def _criterion(name: str, meaning: str) -> Column:
+    return Column(name, "number", meaning, null=f"{NO_FIT}, or too few readings")
+
+
+FITS = Table(
+    "fits",
+    "Fits: one row per specimen, representation and load cases fitted to.",
+    ("specimen", "representation", "fitted_to"),
+    (
+        SPECIMEN,
+        REPRESENTATION,
+        FITTED_TO,
+        Column("readings", "integer", "readings in the cost", low=0),
+        Column("unknowns", "integer", "unknowns of the fit", low=0),
+        Column("effective_unknowns", "number",
+               "unknowns that the data decide about: all of a plain fit, fewer of a pooled one",
+               null=NO_FIT, low=0.0),
+        Column("cost", "number",
+               "sum of squared errors in SDs of one reading, or in deg2 for the published cost",
+               null=NO_FIT, low=0.0),
+        Column("scatter", "number",
+               "root of cost over readings less unknowns: 1 where errors are as large as declared",
+               null=f"{NO_FIT}, or no more readings than unknowns", low=0.0),
+        _criterion("log_likelihood", "logarithm of the likelihood, scatter estimated"),
+        _criterion("aicc", "Akaike's criterion, corrected for few readings; less is better"),
+        _criterion("bic", "Schwarz's criterion; less is better"),
+        Column("iterations", "integer", "iterations of the best start", low=0),
+        Column("evaluations", "integer", "evaluations of all starts", low=0),
+        Column("n_optima", "integer", "distinct optima found from all starts", low=0),
+        status("fit"),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+
+def _motion(name: str, meaning: str, low: float | None = 0.0, null: str | None = NO_POSE) -> Column:
+    return Column(name, "number", meaning, "mm or deg, see unit", null, low=low)
+
+
+ERRORS = Table(
+    "errors",
+    "Errors of predicted motion, predicted less measured: one row per specimen, stiffness, test, "
+    "joint and measured coordinate. Means are over load steps and cycles.",
+    ("specimen", "representation", "fitted_to", "source", "test", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        REPRESENTATION,
+        FITTED_TO,
+        SOURCE,
+        STAGE,
+        TEST,
+        JOINT,
+        COORDINATE,
+        Column("loaded", "flag", "whether the test's main moment drives this coordinate"),
+        _MOTION_UNIT,
+        Column("readings", "integer", "readings compared", low=0),
+        _motion("bias", "mean error", low=None),
+        _motion("mae", "mean absolute error"),
+        _motion("rmse", "root mean square error"),
+        _motion("peak_error", "mean error at the largest load", low=None),
+        _motion("measured", "mean size of the measured motion", null=None),
+        _motion("measured_peak", "mean measured motion at the largest load", None, None),
+        status("solve"),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+
+def _spread(name: str, meaning: str) -> Column:
+    return Column(name, "number", meaning, null="cannot be told apart with this cohort", low=0.0)
+
+
+POOLING = Table(
+    "pooling",
+    "Partial pooling: what the hierarchical fit found out about the cohort, one row per load cases "
+    "fitted to, specimen left out and coordinate. Spreads are SDs of the logarithm of stiffness.",
+    ("fitted_to", "without", "coordinate"),
+    (
+        FITTED_TO,
+        Column("without", "text", "specimen left out, or nobody"),
+        COORDINATE,
+        _STIFFNESS_UNIT,
+        _stiffness("centre", "stiffness in the middle of the cohort", NO_FIT),
+        _spread("between_levels", "SD between levels, the same in all specimens"),
+        _spread("between_specimens", "SD between specimens, the same at all levels"),
+        _spread("between_joints", "SD of what is left: each joint for itself"),
+        Column("specimens", "integer", "specimens it was fitted to", low=0),
+        Column("scatter", "number", "scatter of readings, see fits", null=NO_FIT, low=0.0),
+        Column("effective_unknowns", "number", "unknowns that the data decide about, all "
+               "coordinates and specimens", null=NO_FIT, low=0.0),
+        Column("log_likelihood", "number", "logarithm of the marginal likelihood", null=NO_FIT),
+        Column("iterations", "integer", "iterations", low=0),
+        status("fit"),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+MAE = Table(
+    "mae",
+    "Mean absolute error in the loaded coordinate, over the joints of each specimen: median and "
+    "quartiles over specimens, and as a percentage of the largest mean motion of a specimen.",
+    ("representation", "fitted_to", "source", "test", "steps"),
+    (
+        REPRESENTATION,
+        FITTED_TO,
+        SOURCE,
+        STAGE,
+        TEST,
+        COORDINATE,
+        Column("steps", "text", "at the largest load, or the mean over all load steps",
+               allowed=("peak", "all")),
+        Column("specimens", "integer", "specimens with a result", low=0),
+        Column("mae_deg", "number", "median over specimens", "deg", null=NO_POSE, low=0.0),
+        Column("low_quartile_deg", "number", "lower quartile over specimens", "deg",
+               null=NO_POSE, low=0.0),
+        Column("high_quartile_deg", "number", "upper quartile over specimens", "deg",
+               null=NO_POSE, low=0.0),
+        Column("largest_motion_deg", "number",
+               "largest over specimens of the mean measured motion over joints", "deg",
+               null="not measured", low=0.0),
+        Column("mae_percent", "number", "median as a percentage of the largest motion", "percent",
+               null=NO_POSE, low=0.0),
+    ),
+)  # fmt: skip
+
+CRITERIA = ("fitted", "left_out_specimen", "left_out_case", "aicc", "bic")
+
+RANKING = Table(
+    "ranking",
+    "Representations in order: by error of what they were fitted to, by error of what was held "
+    "out, and by information criteria. Less is better in all of them.",
+    ("criterion", "representation", "source"),
+    (
+        Column("criterion", "text",
+               "fitted, left_out_specimen, left_out_case: root mean square error of all measured "
+               "rotations, mean over specimens; aicc, bic: sums over specimens, fits to all load "
+               "cases", allowed=CRITERIA),
+        REPRESENTATION,
+        SOURCE,
+        Column("rank", "integer", "1 is best", null="no result", low=1),
+        Column("unit", "text", "unit of the values; none for information criteria",
+               allowed=("deg", "")),
+        Column("value", "number", "the criterion", null="no result"),
+        Column("standard_error", "number", "standard error over specimens",
+               null="no result, or fewer than two specimens", low=0.0),
+        Column("worse_than_best", "number", "value less that of the best", null="no result",
+               low=0.0),
+        Column("p", "number",
+               "Wilcoxon's signed rank test of the specimens' values against the best's, "
+               "uncorrected", null="the best itself, or no result", low=0.0, high=1.0),
+        Column("specimens", "integer", "specimens with a result in every representation", low=0),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+SIGN_CHECKS = Table(
+    "sign_checks",
+    "Does each joint move with the load? One row per specimen, test and joint, in the loaded "
+    "coordinate; a sign flipped in the measurement shows here.",
+    ("specimen", "test", "joint"),
+    (
+        SPECIMEN,
+        TEST,
+        JOINT,
+        COORDINATE,
+        Column("readings", "integer", "readings compared", low=0),
+        Column("measured_over_expected", "number",
+               "slope of the measured on the expected motion (published stiffness): 1 as "
+               "expected, negative against the load", null="not measured, or no pose was found"),
+        Column("standard_error", "number", "standard error of the slope",
+               null="not measured, or too few readings", low=0.0),
+        Column("verdict", "text", "what it looks like",
+               allowed=("as_expected", "flipped", "undecided")),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+FINDINGS = Table(
+    "findings",
+    "What the study says to the findings of Gould et al. 2024b, each with its number.",
+    ("finding",),
+    (
+        Column("finding", "text", "short name"),
+        Column("statement", "text", "what is claimed"),
+        Column("quantity", "text", "what the value is"),
+        Column("value", "number", "value", null="there is no result"),
+        Column("low", "number", "lower end of its 95 % interval", null="there is none"),
+        Column("high", "number", "upper end of its 95 % interval", null="there is none"),
+        Column("unit", "text", "unit of the value"),
+        Column("p", "number", "p value of the test that decides", null="there is none", low=0.0,
+               high=1.0),
+        Column("holds", "text", "whether it holds in this study",
+               allowed=("yes", "no", "undecided")),
+        MESSAGE,
+    ),
+)  # fmt: skip
