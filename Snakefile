@@ -26,12 +26,17 @@ wildcard_constraints:
     set="[0-9]{3,4}",
     method="|".join(METHODS),
     sd_mm="[0-9.e+-]+",
-    block="[0-9]{3,5}",
+    block="[0-9]{3,5}|pooled",
+    representation="[a-z_]+",
+    fitted_to="[^/=]+",
+    without="[^/=]+",
 
 
 include: "workflow/rules/aggregation.smk"
 include: "workflow/rules/joint_pose_sensitivity.smk"
 include: "workflow/rules/identification.smk"
+include: "workflow/rules/range_of_motion.smk"
+include: "workflow/rules/cohort_stiffness.smk"
 
 
 rule all:

@@ -1,16 +1,22 @@
 """Calibration: stiffness from measured motion, with its uncertainty and its honest status."""
 
 from spinepipe.calibrate.fit import Fit, Optimum, fit
+from spinepipe.calibrate.pooled import CohortSpread, Pooled, PooledSpecimen
+from spinepipe.calibrate.pooling import pool
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty
 
 __all__ = [
+    "CohortSpread",
     "Evaluation",
     "Evaluator",
     "Fit",
     "MeasuredCase",
     "Optimum",
+    "Pooled",
+    "PooledSpecimen",
     "Problem",
     "Uncertainty",
     "fit",
+    "pool",
 ]

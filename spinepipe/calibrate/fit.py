@@ -8,17 +8,25 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from spinepipe.calibrate.points import (
+    AT_THE_BRINK,
+    OFF_THE_PATH,
+    TIPPED,
+    bounds_reached,
+    names_at_bound,
+    on_bounds,
+    on_load_path,
+    values,
+)
+from spinepipe.calibrate.points import stand_up as _stand_up
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
-from spinepipe.calibrate.uncertainty import Uncertainty, uncertainty
+from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
-from spinepipe.statics import Status, moved
+from spinepipe.statics import Status
 
 MOST_EVALUATIONS = 200
 LAST_STEP, LAST_SETTLING_STEP = 1e-7, 1e-3
 """Relative step at which a fit has arrived; settling runs cost a hundred times as much."""
-
-STIFFENING = 2.0
-"""Factor by which a start without a stable equilibrium is stiffened, again and again."""
 
 START_SPREAD = 30.0
 """Further starts are drawn within this factor of the first, inside the bounds."""
@@ -35,16 +43,7 @@ CLOSE = 10.0
 LEVEL = 1e-2
 """Slope of the cost at an optimum, as a share of it per unknown's unit (logarithm or prior SD)."""
 
-AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
-
-OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
-
-SAME_POSE = 1e-6
-"""Weighted residuals, mm and degrees, of one pose solved twice differ by less."""
-
 COST_TIE = 1e-6
-AT_BOUND = 1e-6
-ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,8 @@ class Fit:
     Attributes
     ----------
     x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
-    cost : sum of weight times squared error, mm2 and deg2.
+    cost : sum of weight times squared error, mm2 and deg2; of whitened errors for zeroed cases
+        of a problem that allows for their correlation.
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
     cases : the measured cases with the load steps that were needed. poses : (T, n) of each,
         nothing where there is no usable pose.
@@ -108,15 +108,15 @@ def fit(
     ----------
     identifiable_below : largest standard error of an unknown at which it still counts as
         identified: of its logarithm where it is logarithmic, else in prior SDs.
-    noise : (6,) m and rad, SD of one reading; None takes it from the residuals.
+    noise : (6,) m and rad, SD of one reading (before zeroing); None takes it from the residuals.
 
     Raises
     ------
     ValueError
-        For ``noise`` with a zeroed case: its errors are correlated, which is not covered.
+        For ``noise`` with a zeroed case whose correlated errors the problem does not allow for.
     """
-    if noise is not None and any(case.zeroed for case in problem.cases):
-        raise ValueError("zeroed readings have correlated errors: noise cannot be given for them")
+    if noise is not None:
+        refuse_correlated(problem)
     evaluator = Evaluator(problem)
     problem = evaluator.problem
     optima: list[Optimum] = []
@@ -126,7 +126,7 @@ def fit(
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
     return Fit(
         x=best.x,
-        values=_values(problem, best.x),
+        values=values(problem, best.x),
         at_bound=best.at_bound,
         uncertainty=found,
         cost=best.cost,
@@ -170,23 +170,9 @@ def _descend(evaluator: Evaluator, start: Array, known: Sequence[Optimum]) -> Op
     if standing is None:
         nowhere = Evaluation(None, None, (), evaluator.coordinate)
         x = problem.upper.copy()
-        message = "no stable equilibrium up to the upper bounds: the loads tip the segment over"
         at_bound = np.ones(len(x), dtype=int)
-        return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, message, 0, stiffened)
+        return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, TIPPED, 0, stiffened)
     return _least_squares(evaluator, standing, stiffened, known)
-
-
-def _stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
-    """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
-    problem, stiffened = evaluator.problem, 0
-    stiffness = np.array([parameter.logarithmic for parameter in problem.free])
-    step = np.where(stiffness, np.log(STIFFENING), 0.0)
-    while evaluator.at(start).residual is None:
-        if np.all(start[stiffness] >= problem.upper[stiffness]):
-            return None, stiffened
-        start = np.minimum(start + step, problem.upper)
-        stiffened += 1
-    return start, stiffened
 
 
 def _least_squares(
@@ -197,11 +183,11 @@ def _least_squares(
     nowhere = np.full(len(evaluator.coordinate), np.nan)
 
     def residual(x: Array) -> Array:
-        found = evaluator.at(_on_bounds(problem, x)).residual
+        found = evaluator.at(on_bounds(problem, x)).residual
         return nowhere if found is None else found
 
     def jacobian(x: Array) -> Array:
-        found = evaluator.at(_on_bounds(problem, x)).jacobian
+        found = evaluator.at(on_bounds(problem, x)).jacobian
         assert found is not None
         return found
 
@@ -226,32 +212,18 @@ def _least_squares(
     )
     if arrived:
         return replace(arrived[0], stiffened=stiffened)
-    x = _on_bounds(problem, result.x)
-    at_bound, evaluation = _bounds_reached(problem, x), evaluator.at(x)
+    x = on_bounds(problem, result.x)
+    at_bound, evaluation = bounds_reached(problem, x), evaluator.at(x)
     level = _stationary(problem, evaluation, at_bound)
     status, message = _verdict(problem, bool(result.success) or level, at_bound)
     if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
     at_rest = problem.course is None
-    if at_rest and status.usable and not _on_load_path(evaluator, x, evaluation):
+    if at_rest and status.usable and not on_load_path(evaluator, x, evaluation):
         status, message = Status.NOT_CONVERGED, OFF_THE_PATH
     return Optimum(
         x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
     )
-
-
-def _on_load_path(evaluator: Evaluator, x: Array, evaluation: Evaluation) -> bool:
-    """Whether the poses of the fit are those that the loads lead to from the neutral pose.
-
-    During a fit each pose is solved from its neighbour's; where segments snap, that may follow
-    another branch.
-    """
-    evaluator.forget()
-    cold = evaluator.at(x)
-    assert evaluation.residual is not None
-    if cold.residual is None:
-        return False
-    return bool(np.allclose(cold.residual, evaluation.residual, rtol=0.0, atol=SAME_POSE))
 
 
 def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bool:
@@ -273,36 +245,12 @@ def _last_step(problem: Problem) -> float:
     return LAST_STEP if problem.course is None else LAST_SETTLING_STEP
 
 
-def _on_bounds(problem: Problem, x: Array) -> Array:
-    """The point with unknowns that are at a bound but for rounding put exactly there."""
-    x = np.where(x - problem.lower < ROUNDING, problem.lower, x)
-    return np.where(problem.upper - x < ROUNDING, problem.upper, x)
-
-
-def _bounds_reached(problem: Problem, x: Array) -> Array:
-    """(m,) -1 at the lower, 1 at the upper bound, else 0."""
-    near = AT_BOUND * problem.scale
-    low, high = x - problem.lower < near, problem.upper - x < near
-    return high.astype(int) - low.astype(int)
-
-
 def _verdict(problem: Problem, success: bool, at_bound: Array) -> tuple[Status, str]:
     if not success:
         return Status.NOT_CONVERGED, f"no optimum within {MOST_EVALUATIONS} evaluations"
     if not at_bound.any():
         return Status.CONVERGED, ""
-    names = [
-        f"{parameter.label} at its {'upper' if side > 0 else 'lower'} bound"
-        for parameter, side in zip(problem.free, at_bound, strict=True)
-        if side
-    ]
-    return Status.CONVERGED_AT_BOUND, ", ".join(names)
-
-
-def _values(problem: Problem, x: Array) -> Array:
-    """(m,) value of each unknown's first row, SI."""
-    effects = moved(problem.model, problem.free, x).effects
-    return np.array([effects[p.effect].values[p.rows[0], p.column] for p in problem.free])
+    return Status.CONVERGED_AT_BOUND, names_at_bound(problem, at_bound)
 
 
 def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_], scale: Array) -> int:

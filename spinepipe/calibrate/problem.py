@@ -6,7 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.calibrate.bounds import within_declared
 from spinepipe.calibrate.solvers import AtRest, Settling
+from spinepipe.calibrate.zeroing import whitened
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
@@ -49,6 +51,9 @@ class Problem:
     course : how loads come on in time when the pose is read while the spine still settles; None
         for poses at rest.
     lower, upper : (m,) bounds of the unknowns, relative to the model's values (log or absolute).
+    correlated : whether the readings of a zeroed case share the error of step 0, and the cost
+        allows for it: its residuals are then whitened, each with the SD of one reading before it
+        was zeroed, and least squares is generalised least squares.
     """
 
     model: SpineModel
@@ -58,6 +63,7 @@ class Problem:
     lower: Array
     upper: Array
     course: Course | None = None
+    correlated: bool = False
 
     @cached_property
     def scale(self) -> Array:
@@ -101,9 +107,9 @@ class Evaluator:
         )
         if not problem.cases:
             raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
-        self.problem = _within_declared(problem)
-        chain = Chain(problem.model)
-        self._systems = [System(chain, problem.model, m.case) for m in problem.cases]
+        bounds = within_declared(problem.model, problem.free, problem.lower, problem.upper)
+        self.problem = problem = replace(problem, lower=bounds[0], upper=bounds[1])
+        self.reload()
         refusal = no_settling(self._systems[0]) if problem.course else None
         if refusal:
             raise RefusedModel(refusal)
@@ -117,6 +123,12 @@ class Evaluator:
         )
         self._known: dict[bytes, Evaluation] = {}
         self.evaluations = 0
+
+    def reload(self) -> None:
+        """Load the chain again, after that of another problem took its place in the engine."""
+        model = self.problem.model
+        chain = Chain(model)
+        self._systems = [System(chain, model, measured.case) for measured in self.problem.cases]
 
     def forget(self) -> None:
         """Solve the next point from the neutral pose, not from its neighbour, nor recall it."""
@@ -149,8 +161,7 @@ class Evaluator:
         measured = self.problem.cases[number]
         seen = np.stack([observe(system, q) for q in poses])
         seen = seen - seen[0] if measured.zeroed else seen
-        error: Array = (seen - measured.measured) * self._scale
-        return error[self._used[number]]
+        return self._entering(number, (seen - measured.measured) * self._scale)
 
     def _jacobian(self, number: int, system: System, poses: Array, by_x: Array) -> Array:
         """(N, m) derivative of the residuals of one case by the unknowns."""
@@ -161,22 +172,14 @@ class Evaluator:
             ]
         )
         seen = seen - seen[0] if self.problem.cases[number].zeroed else seen
-        return (seen * self._scale[:, None])[self._used[number]]
+        return self._entering(number, seen * self._scale[:, None])
 
-
-def _within_declared(problem: Problem) -> Problem:
-    """The problem with its bounds drawn in to what the effects declare for their parameters."""
-    lower, upper = problem.lower.copy(), problem.upper.copy()
-    for index, parameter in enumerate(problem.free):
-        limits = declared(problem.model, parameter)
-        values = problem.model.effects[parameter.effect].values
-        for value in values[list(parameter.rows), parameter.column]:
-            low, high = limits.low - value, limits.high - value
-            if parameter.logarithmic:
-                low = np.log(limits.low / value) if limits.low > 0.0 else -np.inf
-                high = np.log(limits.high / value)
-            lower[index], upper[index] = max(lower[index], low), min(upper[index], high)
-    return replace(problem, lower=lower, upper=upper)
+    def _entering(self, number: int, errors: Array) -> Array:
+        """(N, …) what enters the cost of errors (T, J, 6, …) of one case."""
+        used = self._used[number]
+        if self.problem.correlated and self.problem.cases[number].zeroed:
+            errors = whitened(errors, used)
+        return errors[used]
 
 
 def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:

@@ -34,6 +34,27 @@ class Uncertainty:
     degrees_of_freedom: int
 
 
+def refuse_correlated(problem: Problem) -> None:
+    """Refuse to take readings for independent that are not.
+
+    Raises
+    ------
+    ValueError
+        With a zeroed case, unless the problem allows for its correlated errors.
+    """
+    if any(case.zeroed for case in problem.cases) and not problem.correlated:
+        raise ValueError(
+            "zeroed readings have correlated errors: noise cannot be given for them"
+            " unless the problem is told so (correlated=True)"
+        )
+
+
+def declared_deviation(problem: Problem, coordinate: NDArray[np.int64], noise: Array) -> Array:
+    """SD (N,) of the weighted residuals of these coordinates (N,), from ``noise`` (6,)."""
+    scale: Array = np.sqrt(problem.weights) * BORDER_PER_SI * noise
+    return scale[coordinate]
+
+
 def uncertainty(
     problem: Problem,
     evaluation: Evaluation,
@@ -45,8 +66,8 @@ def uncertainty(
 
     Parameters
     ----------
-    noise : (6,) m and rad; with None the scatter of the weighted residuals is used, and with no
-        degree of freedom left nothing is identifiable.
+    noise : (6,) m and rad, of one reading (before zeroing); with None the scatter of the weighted
+        residuals is used, and with no degree of freedom left nothing is identifiable.
     """
     m = len(problem.free)
     infinite = np.full((m, m), np.inf)
@@ -72,8 +93,7 @@ def _deviation(
     residual = evaluation.residual
     assert residual is not None
     if noise is not None:
-        declared: Array = (np.sqrt(problem.weights) * BORDER_PER_SI * noise)[evaluation.coordinate]
-        return declared
+        return declared_deviation(problem, evaluation.coordinate, noise)
     if freedom <= 0:
         return None
     return np.full(len(residual), np.sqrt(residual @ residual / freedom))

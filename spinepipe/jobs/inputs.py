@@ -135,9 +135,20 @@ def bushing_model(
     frames: tuple[Pose, ...],
     stiffness: Array,
 ) -> SpineModel:
+    """Model of a specimen with the study's damping, see `on_bushings`."""
+    damping = np.array(study.damping.in_order(), dtype=float)
+    return on_bushings(cohort, specimen, frames, stiffness, damping)
+
+
+def on_bushings(
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+    damping: Array,
+) -> SpineModel:
     """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6)."""
     n = len(cohort.joint_names)
     values = np.broadcast_to(stiffness, (n, 6)).copy()
     bushing = ScopedEffect(create("linear_bushing"), tuple(range(n)), values)
-    damping = np.array(study.damping.in_order(), dtype=float)
     return spine_model(cohort, specimen, frames, (bushing,), damping)

@@ -28,7 +28,10 @@ from types import ModuleType
 from typing import Any
 
 _JOBS = Path(__file__).resolve().parent
-_PRELOADED = ("calibrate", "simulate", "bootstrap", "collect")
+_PRELOADED = (
+    *("calibrate", "simulate", "bootstrap", "collect", "cohort_stiffness.fit"),
+    "range_of_motion.simulate",
+)
 """Jobs that come by the hundreds: imported once in the server, others when first asked for."""
 
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")

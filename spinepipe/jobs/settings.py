@@ -13,6 +13,16 @@ _PARTS = {"methods", "landmark_precision", *_BOOTSTRAPS, *_JUDGING}
 """What was added to the sampled poses: their fits and simulations do not hang on it."""
 
 
+_HELD_OUT = {"representations", "cross_validation", "significance"}
+_FITTING = {"seed", "steps", "cost", "measurement_sd", "bound_factor", "starts"}
+
+
+_MOVING = {"virtual_tests", "tests", "rows", "damping"}
+_SETS = {"stiffness", "level_stiffness", "stiffness_sets", "stiffness_spread"}
+_FRAMES = {"poses", "pose_sd"}
+"""Settings of range of motion: what is computed, of which stiffness sets, in which frames."""
+
+
 def _whole(*names: str) -> dict[str, Any]:
     return dict.fromkeys(names, True)
 
@@ -49,8 +59,26 @@ IRRELEVANT: dict[str, dict[str, Any]] = {
     "two_factor": _whole("block", *(_PARTS - {"success"})),
     "agreement": _whole("block", *(_PARTS - {"success"})),
     "against_gould_2024a": _whole("block"),
+    "cohort_stiffness.fit": _whole(*_HELD_OUT),
+    "cohort_stiffness.literature": _whole(*_HELD_OUT, *_FITTING),
+    "cohort_stiffness.left_out": _whole(*_HELD_OUT),
+    "cohort_stiffness.pool": _whole("representations", "significance"),
+    "cohort_stiffness.mae": {},
+    "cohort_stiffness.ranking": {},
+    "cohort_stiffness.statistics": {},
+    "cohort_stiffness.findings": {},
+    "cohort_stiffness.against_gould_2024b": {},
+    "cohort_stiffness.figures": {},
+    "cohort_stiffness.report": {},
     "figures": _whole("block"),
     "report": {},  # it prints all of them
+    "range_of_motion.sample_frames": _whole(*_MOVING, *_SETS),
+    "range_of_motion.draw_stiffness": _whole(*_MOVING, *_FRAMES),
+    "range_of_motion.simulate": _whole("seed", *_SETS, *_FRAMES),
+    "range_of_motion.summary": {},
+    "range_of_motion.variance": {},
+    "range_of_motion.figures": {},
+    "range_of_motion.report": {},
 }
 """Settings that a job does not look at. All others count, so one added later is not overlooked."""
 

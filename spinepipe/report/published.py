@@ -5,10 +5,10 @@ from typing import Any
 
 from spinepipe.anatomy import published
 
-PAPER_OF_COHORT = {"palanca_l1l4": "gould_2024a"}
+PAPER_OF_COHORT = {"palanca_l1l4": "gould_2024a", "t12s1_phantom": "gould_2024b"}
 """Cohorts rebuilt from a paper, whose numbers are drawn beside ours."""
 
-SHORT_NAME = {"gould_2024a": "Gould et al. 2024"}
+SHORT_NAME = {"gould_2024a": "Gould et al. 2024", "gould_2024b": "Gould et al. 2024b"}
 
 
 def paper_of(cohort: str) -> tuple[str, Mapping[str, Any]] | None:

@@ -3,6 +3,8 @@
 from spinepipe.statistics.agreement import Agreement, bland_altman
 from spinepipe.statistics.correction import corrected, family_size
 from spinepipe.statistics.correlation import kendall, spearman
+from spinepipe.statistics.kruskal import critical_h, kruskal_wallis
+from spinepipe.statistics.nested import f_test_nested
 from spinepipe.statistics.normality import (
     chi_squared_normality,
     kolmogorov_smirnov_normality,
@@ -10,6 +12,7 @@ from spinepipe.statistics.normality import (
 )
 from spinepipe.statistics.outcome import Ended, Outcome
 from spinepipe.statistics.ranks import friedman
+from spinepipe.statistics.signed_rank import wilcoxon_signed_rank
 
 __all__ = [
     "Agreement",
@@ -18,10 +21,14 @@ __all__ = [
     "bland_altman",
     "chi_squared_normality",
     "corrected",
+    "critical_h",
+    "f_test_nested",
     "family_size",
     "friedman",
     "kendall",
     "kolmogorov_smirnov_normality",
+    "kruskal_wallis",
     "lilliefors_normality",
     "spearman",
+    "wilcoxon_signed_rank",
 ]

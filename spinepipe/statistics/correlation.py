@@ -1,10 +1,9 @@
 """Rank correlation of two sets of values."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite_pairs
+from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite_pairs, tied
 from spinepipe.statistics.spearman_null import LARGEST, exact_p
 
 FEWEST = 4
@@ -55,15 +54,9 @@ def _refused(test: Test, x: Array, y: Array) -> Outcome | None:
 
 def _ties(x: Array, y: Array) -> str:
     """How many values share their rank with another, "" for none."""
-    tied = [
+    parts = [
         f"{shared} of the {name}"
         for name, values in (("first", x), ("second", y))
-        if (shared := _shared(values))
+        if (shared := tied(values))
     ]
-    return f"ties: {' and '.join(tied)} values" if tied else ""
-
-
-def _shared(values: Array) -> int:
-    """How many values are equal to another one."""
-    counts = np.unique(values, return_counts=True)[1]
-    return int(counts[counts > 1].sum())
+    return f"ties: {' and '.join(parts)} values" if parts else ""

@@ -104,6 +104,12 @@ def constant(values: Array) -> bool:
     return bool((values == values.flat[0]).all())
 
 
+def tied(values: Array) -> int:
+    """How many values are equal to another one."""
+    counts = np.unique(values, return_counts=True)[1]
+    return int(counts[counts > 1].sum())
+
+
 def finite_pairs(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     """Both sets of values as floats; ValueError also where a value has no partner."""
     first, second = finite(x), finite(y)

@@ -11,6 +11,7 @@ from spinepipe.studies.identification import (
     Success,
 )
 from spinepipe.studies.joint_pose_sensitivity import Calibration, JointPoseSensitivity
+from spinepipe.studies.range_of_motion import PoseSd, RangeOfMotion, VirtualTests
 from spinepipe.studies.read import KINDS, read
 from spinepipe.studies.selection import Selection, names_of_kind, read_selection
 from spinepipe.studies.study import Study
@@ -26,10 +27,13 @@ __all__ = [
     "LandmarkPrecision",
     "LevelStiffness",
     "Methods",
+    "PoseSd",
+    "RangeOfMotion",
     "Selection",
     "StartBootstrap",
     "Study",
     "Success",
+    "VirtualTests",
     "check",
     "names_of_kind",
     "read",

@@ -8,7 +8,9 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.check_cohort_stiffness import check_cohort_stiffness
 from spinepipe.studies.check_joint_pose_sensitivity import check_joint_pose_sensitivity
+from spinepipe.studies.check_range_of_motion import check_range_of_motion
 from spinepipe.studies.read import STUDIES, load
 from spinepipe.studies.study import COHORTS, Study, cohort_folder
 
@@ -16,6 +18,8 @@ __all__ = ["check"]
 
 CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
     "joint_pose_sensitivity": check_joint_pose_sensitivity,
+    "range_of_motion": check_range_of_motion,
+    "cohort_stiffness": check_cohort_stiffness,
 }
 """What each kind of study demands of its cohort."""
 

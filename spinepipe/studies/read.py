@@ -5,14 +5,20 @@ from pathlib import Path
 from spinepipe.cohort.read_yaml import Document, read_yaml
 from spinepipe.cohort.validate import validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.cohort_stiffness import CohortStiffness
 from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
+from spinepipe.studies.range_of_motion import RangeOfMotion
 from spinepipe.studies.study import Study
 
 __all__ = ["KINDS", "STUDIES", "displayed", "load", "read"]
 
 STUDIES = Path("config") / "studies"
 
-KINDS: dict[str, type[Study]] = {"joint_pose_sensitivity": JointPoseSensitivity}
+KINDS: dict[str, type[Study]] = {
+    "joint_pose_sensitivity": JointPoseSensitivity,
+    "range_of_motion": RangeOfMotion,
+    "cohort_stiffness": CohortStiffness,
+}
 """The model of each kind of study."""
 
 

@@ -33,6 +33,13 @@ from spinepipe.tables.parquet import (
     to_arrow,
     write,
 )
+from spinepipe.tables.range_of_motion import (
+    FRAMES,
+    RANGE_OF_MOTION,
+    ROM_SUMMARY,
+    ROM_VARIANCE,
+    STIFFNESS_SETS,
+)
 from spinepipe.tables.schema import Column, Table
 from spinepipe.tables.statistics import AGREEMENT, IMPORTANCE, STATISTICS, VARIANCE_SHARES
 
@@ -65,6 +72,11 @@ TABLES = {
         RANKING,
         SIGN_CHECKS,
         FINDINGS,
+        FRAMES,
+        STIFFNESS_SETS,
+        RANGE_OF_MOTION,
+        ROM_SUMMARY,
+        ROM_VARIANCE,
     )
 }
 
@@ -77,6 +89,7 @@ __all__ = [
     "ERRORS",
     "FINDINGS",
     "FITS",
+    "FRAMES",
     "IMPORTANCE",
     "LANDMARKS",
     "LANDMARK_PRECISION",
@@ -85,12 +98,16 @@ __all__ = [
     "POOLING",
     "POSES",
     "PRECISION_ERRORS",
+    "RANGE_OF_MOTION",
     "RANKING",
     "REQUIRED_PRECISION",
+    "ROM_SUMMARY",
+    "ROM_VARIANCE",
     "SIGN_CHECKS",
     "SIMULATIONS",
     "STATISTICS",
     "STIFFNESS",
+    "STIFFNESS_SETS",
     "SUCCESS",
     "SUCCESS_BY_METHOD",
     "SUMMARY",

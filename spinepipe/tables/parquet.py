@@ -43,7 +43,9 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
 
 def _check_keys(table: Table, rows: pa.Table) -> None:
     keys = list(table.key)
-    if rows.num_rows < SMALL_ROWS:
+    if not keys:  # all of it is in the names of folders: one row at most
+        distinct = min(1, rows.num_rows)
+    elif rows.num_rows < SMALL_ROWS:
         distinct = len(set(zip(*(rows[key].to_pylist() for key in keys), strict=True)))
     else:
         distinct = rows.group_by(keys).aggregate([]).num_rows
@@ -101,8 +103,9 @@ def join(table: Table, parts: Sequence[pa.Table], path: str | Path) -> None:
     for part in parts[1:]:
         other = part.schema.metadata or {}
         common = {key: value for key, value in common.items() if other.get(key) == value}
-    rows = pa.concat_tables([part.replace_schema_metadata(None) for part in parts])
-    rows = rows.select([column.name for column in table.columns]).cast(table.schema)
+    names = [column.name for column in table.columns]
+    rows = pa.concat_tables([part.select(names).replace_schema_metadata(None) for part in parts])
+    rows = rows.cast(table.schema)
     _check_keys(table, rows)
     write(rows, path, {key.decode(): value.decode() for key, value in common.items()})
 

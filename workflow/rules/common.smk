@@ -121,6 +121,12 @@ def stiffness_source(wildcards):
     return {"calibration": f"{folder}/calibrations/{file}"}
 
 
+def fits_of_others(wildcards):
+    """Fits of the other specimens, of which the left-out one takes the median."""
+    place = wildcards.specimen, wildcards.representation, wildcards.fitted_to
+    return layout(wildcards.study).fits_of_others(*place)
+
+
 def shown(results, name):
     """The file of a figure, shown with its caption by `snakemake --report`."""
     path = f"{results}/figures/{name}.svg"

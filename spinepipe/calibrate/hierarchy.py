@@ -1,0 +1,197 @@
+"""Levels within specimens within a cohort: prior, marginal likelihood and posterior, no mechanics.
+
+Unknown x of specimen s at level j of degree of freedom d is mean_d + level_jd + specimen_sd +
+rest_sjd, all four normal and independent; the mean's prior is as good as flat. Readings tell of x
+linearly, with one scatter. Given mean and levels, specimens are independent, so all is done in
+matrices of one specimen's size. Lindley & Smith 1972, doi:10.1111/j.2517-6161.1972.tb00885.x;
+scatter and effective parameters: MacKay 1992, doi:10.1162/neco.1992.4.3.415.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects.contract import Array, Indices
+
+MEAN_SD = 10.0
+"""Prior SD of a mean of logarithms: as good as flat, yet a mean of which nothing tells is 0."""
+
+
+@dataclass(frozen=True)
+class LinearReadings:
+    """Readings of S specimens that are linear in their m unknowns: target = design x + errors.
+
+    Attributes
+    ----------
+    design : (S, m, m). target : (S, m). left_over : what no x explains, a sum of squares.
+    count : readings, which the rows of the design stand for.
+    """
+
+    design: Array
+    target: Array
+    left_over: float
+    count: int
+
+
+@dataclass(frozen=True)
+class Spreads:
+    """SDs of the parts of an unknown by degree of freedom, each (D,), and of one reading."""
+
+    level: Array
+    specimen: Array
+    rest: Array
+    scatter: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What prior and readings say together.
+
+    Attributes
+    ----------
+    x : (S, m). covariance : (S, m, m) of each specimen's unknowns.
+    mean, mean_sd : (D,) of each degree of freedom in the cohort.
+    common, common_covariance : (m,), (m, m) mean and level together.
+    newcomer_covariance : (m, m) of a specimen without readings; ``common`` is what to expect of it.
+    effective_parameters : (S,) how many unknowns the readings determine, the prior the others.
+    """
+
+    x: Array
+    covariance: Array
+    mean: Array
+    mean_sd: Array
+    common: Array
+    common_covariance: Array
+    newcomer_covariance: Array
+    effective_parameters: Array
+
+
+def condensed(designs: Sequence[Array], targets: Sequence[Array], m: int) -> LinearReadings:
+    """Readings (N_s, m) and (N_s,) of each specimen, turned into m rows that say the same."""
+    rows = np.zeros((len(designs), m + 1, m + 1))
+    for row, design, target in zip(rows, designs, targets, strict=True):
+        triangle = np.linalg.qr(np.column_stack([design, target]), mode="r")
+        row[: len(triangle)] = triangle
+    left_over = float(np.sum(rows[:, m, m] ** 2))
+    return LinearReadings(rows[:, :m, :m], rows[:, :m, m], left_over, sum(map(len, targets)))
+
+
+class Hierarchy:
+    """The linear model at given spreads, factorised once."""
+
+    def __init__(self, readings: LinearReadings, dof: Indices, spreads: Spreads) -> None:
+        """``dof`` (m,): degree of freedom of each unknown, 0 to D - 1; each has its own level."""
+        self._readings, self.spreads = readings, spreads
+        self._of = np.eye(dof.max() + 1)[dof]  # (m, D)
+        self.own = own_covariance(dof, spreads)
+        self._root = np.linalg.cholesky(self.own)
+        self._unroot = np.linalg.inv(self._root)
+        self._see(readings.design / spreads.scatter, readings.target / spreads.scatter)
+        self._factor = np.hstack([MEAN_SD * self._of, np.diag(spreads.level[dof])])
+        self._share(self._factor)
+
+    def _see(self, design: Array, target: Array) -> None:
+        """Each specimen in directions of its own in which its readings are independent.
+
+        Singular values keep both what is known to rounding and what is not seen at all.
+        """
+        left, size, right = np.linalg.svd(design @ self._root)
+        self._size = size  # (S, m) of what is seen, in SDs of what to expect
+        self._towards = right @ self._unroot  # (S, m, m) directions by unknowns
+        self._aim = np.einsum("skm,sk->sm", left, target)
+        self._unseen = 1.0 / (1.0 + size**2)  # (S, m) 1 where only the prior tells
+        self._seen = size**2 * self._unseen
+        self.information = self._by_direction(self._seen)
+
+    def _by_direction(self, weights: Array) -> Array:
+        """(S, m, m) sum over directions of a weight (S, m) times their square."""
+        towards = self._towards
+        result: Array = towards.transpose(0, 2, 1) @ (weights[:, :, None] * towards)
+        return result
+
+    def _share(self, factor: Array) -> None:
+        """Mean and levels: the specimens' own parts count as errors of their readings."""
+        told = self.information.sum(axis=0)
+        gain = self._size * self._unseen
+        pull = np.einsum("skm,sk->m", self._towards, gain * self._aim)
+        precision = np.eye(factor.shape[1]) + factor.T @ told @ factor
+        self._effects_covariance = np.linalg.inv(precision)
+        self._effects = self._effects_covariance @ factor.T @ pull
+        self.common = factor @ self._effects
+        self.common_covariance = factor @ self._effects_covariance @ factor.T
+        surprise = self._aim - self._size * (self._towards @ self.common)
+        self._score = np.einsum("skm,sk->sm", self._towards, gain * surprise)
+        self._misfit = float(np.sum(surprise**2 * self._unseen) + self._effects @ self._effects)
+        logarithms = np.log1p(self._size**2).sum()
+        self._log_determinant = float(logarithms + np.linalg.slogdet(precision)[1])
+        self._squares = float(np.sum((surprise * self._unseen) ** 2))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the readings at these spreads, all unknowns integrated out."""
+        scatter, count = self.spreads.scatter, self._readings.count
+        constant = count * np.log(2.0 * np.pi * scatter**2) + self._readings.left_over / scatter**2
+        return -0.5 * float(constant + self._log_determinant + self._misfit)
+
+    def slopes(self) -> Spreads:
+        """Derivative of the log likelihood by the logarithm of each spread."""
+        told, score, of = self.information, self._score, self._of
+        each = told - told @ self.common_covariance @ told  # of each specimen with itself
+        total = told.sum(axis=0)
+        between = total - total @ self.common_covariance @ total
+        by_level = (score.sum(axis=0) ** 2 - np.diagonal(between)) @ of
+        by_specimen = np.sum((score @ of) ** 2, axis=0) - np.einsum(
+            "ad,sab,bd->d", of, each, of, optimize=True
+        )
+        by_rest = (np.sum(score**2, axis=0) - np.einsum("saa->a", each)) @ of
+        spreads = self.spreads
+        return Spreads(
+            spreads.level**2 * by_level,
+            spreads.specimen**2 * by_specimen,
+            spreads.rest**2 * by_rest,
+            self._scatter_slope(),
+        )
+
+    def _scatter_slope(self) -> float:
+        """Zero where scatter squared is the sum of squares over readings less parameters."""
+        squares = self._squares + self._readings.left_over / self.spreads.scatter**2
+        return float(squares + self.effective_parameters.sum() - self._readings.count)
+
+    @property
+    def effective_parameters(self) -> Array:
+        """(S,) trace of information times posterior covariance."""
+        by_mean = self._by_direction(self._seen * self._unseen)
+        shared: Array = np.einsum("sab,ba->s", by_mean, self.common_covariance)
+        return self._seen.sum(axis=1) + shared
+
+    def distance(self, x: Array) -> float:
+        """How far specimens (S', m) are from what the prior expects: twice its -log density."""
+        away, by_mean = x @ self._unroot.T, self._unroot @ self._factor
+        pull = by_mean.T @ away.sum(axis=0)
+        precision = np.eye(len(pull)) + len(x) * by_mean.T @ by_mean
+        return float(np.sum(away**2) - pull @ np.linalg.solve(precision, pull))
+
+    def posterior(self) -> Posterior:
+        """Unknowns of every specimen, of the cohort and of a newcomer."""
+        d = self._of.shape[1]
+        unseen = self._by_direction(self._unseen)
+        kept = self.own @ unseen
+        covariance = kept @ self.own + kept @ self.common_covariance @ kept.transpose(0, 2, 1)
+        return Posterior(
+            x=self.common + self._score @ self.own,
+            covariance=0.5 * (covariance + covariance.transpose(0, 2, 1)),
+            mean=MEAN_SD * self._effects[:d],
+            mean_sd=MEAN_SD * np.sqrt(np.diagonal(self._effects_covariance)[:d]),
+            common=self.common,
+            common_covariance=self.common_covariance,
+            newcomer_covariance=self.common_covariance + self.own,
+            effective_parameters=self.effective_parameters,
+        )
+
+
+def own_covariance(dof: Indices, spreads: Spreads) -> Array:
+    """(m, m) prior covariance of a specimen's unknowns about mean and levels of the cohort."""
+    same = dof[:, None] == dof
+    own: Array = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
+    return own

@@ -1,0 +1,194 @@
+"""Partial pooling: levels lean on their specimen's mean, specimens on the cohort.
+
+How strongly is told by the data themselves (empirical Bayes): the motion of every specimen is
+linearised where it stands, the spreads are those of largest marginal likelihood there, and all go
+to the posterior mean; so on until nobody moves (Gauss-Newton with Laplace's approximation;
+Lindstrom & Bates 1990, doi:10.2307/2532087).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spinepipe.calibrate.hierarchy import Hierarchy, condensed
+from spinepipe.calibrate.member import COST_TIE, SMALLEST_SHARE, Member
+from spinepipe.calibrate.points import values
+from spinepipe.calibrate.pooled import CohortSpread, Pooled, PooledSpecimen
+from spinepipe.calibrate.problem import Evaluation, Problem
+from spinepipe.calibrate.spreads import between, change, estimated
+from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.statics import Status
+
+MOST_ROUNDS = 40
+FREE_ROUNDS = 10
+"""After so many rounds spreads move by ever smaller shares of what is asked, so that all ends."""
+
+SETTLED = 0.05
+"""Change of the logarithm of a spread that does not matter."""
+
+UNSETTLED = "the spreads do not settle: some specimen does not go with the others"
+
+
+def pool(
+    problems: Sequence[Problem],
+    noise: Array | None = None,
+    starts: Sequence[Array] | None = None,
+) -> Pooled:
+    """Fit a cohort, one problem per specimen, with what its specimens and levels share.
+
+    A specimen without a reading or a stable pose, and unknowns that nothing tells of, get what is
+    to be expected of a newcomer. Bounds are kept by each specimen by itself; the cohort and
+    covariances are not told of them. One specimen alone cannot tell how specimens differ: its
+    newcomer is sure of too much.
+
+    Parameters
+    ----------
+    problems : with the same logarithmic unknowns and the same stiffness to start from.
+    noise : (6,) m and rad, SD of one reading (before zeroing): likelihood is then by these SDs and
+        weights only choose the readings. None estimates one scatter of all weighted residuals.
+    starts : (m,) x of each specimen to start from; zeros by default.
+
+    Raises
+    ------
+    ValueError
+        For unknowns or starting values that differ, unknowns that are no logarithms, and ``noise``
+        that is not positive or given for correlated readings that a problem takes for independent.
+    """
+    _check(problems, noise)
+    dof = _degrees_of_freedom(problems[0])
+    starts = starts or [np.zeros(len(dof))] * len(problems)
+    members = [Member(p, x, noise) for p, x in zip(problems, starts, strict=True)]
+    hierarchy, iterations, settled = _travel(members, dof, None if noise is None else 1.0)
+    found = hierarchy.posterior()
+    told = zip(found.x, found.covariance, found.effective_parameters.tolist(), strict=True)
+    specimens = tuple(m.result(*all_of) for m, all_of in zip(members, told, strict=True))
+    status, message = _verdict(specimens, settled)
+    return Pooled(
+        specimens=specimens,
+        spreads=_cohort_spreads(problems[0], dof, hierarchy),
+        newcomer=found.common,
+        newcomer_covariance=found.newcomer_covariance,
+        scatter=hierarchy.spreads.scatter,
+        effective_parameters=float(found.effective_parameters.sum()),
+        log_likelihood=hierarchy.log_likelihood,
+        iterations=iterations,
+        evaluations=sum(specimen.evaluations for specimen in specimens),
+        status=status,
+        message=message,
+    )
+
+
+def _check(problems: Sequence[Problem], noise: Array | None) -> None:
+    if not problems:
+        raise ValueError("no specimen to pool")
+    first = problems[0]
+    nowhere = np.zeros(len(first.free))
+    if not all(parameter.logarithmic for parameter in first.free):
+        raise ValueError("only logarithmic unknowns can be pooled")
+    for problem in problems:
+        name = problem.model.specimen
+        if problem.free != first.free:
+            raise ValueError(f"{name}: unknowns differ from those of {first.model.specimen}")
+        if not np.allclose(values(problem, nowhere), values(first, nowhere), rtol=1e-9, atol=0.0):
+            raise ValueError(f"{name}: starts from another stiffness than {first.model.specimen}")
+        if noise is not None:
+            _check_noise(problem, noise)
+
+
+def _check_noise(problem: Problem, noise: Array) -> None:
+    refuse_correlated(problem)
+    used = np.nonzero(problem.weights > 0.0)[0]
+    if not np.all(declared_deviation(problem, used, noise) > 0.0):
+        raise ValueError("noise must be positive for every coordinate with a weight")
+
+
+def _degrees_of_freedom(problem: Problem) -> Indices:
+    """(m,) which degree of freedom, column of an effect, each unknown belongs to."""
+    columns = [(parameter.effect, parameter.column) for parameter in problem.free]
+    order = list(dict.fromkeys(columns))
+    return np.array([order.index(column) for column in columns])
+
+
+def _travel(
+    members: Sequence[Member], dof: Indices, scatter: float | None
+) -> tuple[Hierarchy, int, bool]:
+    """The hierarchy where no specimen moves any more, after how many rounds, and if it settled."""
+    hierarchy, rounds, settled = None, 0, False
+    while hierarchy is None or rounds < MOST_ROUNDS:
+        designs, targets = zip(*[member.linearised() for member in members], strict=True)
+        readings = condensed(designs, targets, len(dof))
+        before = hierarchy.spreads if hierarchy else None
+        asked = estimated(readings, dof, scatter, before)
+        spreads = asked
+        if before is not None:
+            settled = change(before, asked) < SETTLED
+            spreads = between(before, asked, 1.0 / max(1, rounds - FREE_ROUNDS))
+        hierarchy = Hierarchy(readings, dof, spreads)
+        _move(members, hierarchy)
+        rounds += 1
+        if all(member.at_rest for member in members):
+            break
+    return hierarchy, rounds, settled or rounds == 1
+
+
+def _move(members: Sequence[Member], hierarchy: Hierarchy) -> None:
+    """One step of all together that lowers their cost, or else of each by itself."""
+    found = hierarchy.posterior()
+    deviations = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    for member, x, deviation in zip(members, found.x, deviations, strict=True):
+        member.aim(x, deviation, hierarchy)
+    standing, share = [member for member in members if member.evaluation is not None], 1.0
+    here = _cost([(m, m.x, m.evaluation) for m in standing], hierarchy)
+    while share > SMALLEST_SHARE:
+        for member in standing:
+            member.try_share(share)
+        if _cost([(m, *m.trial) for m in standing], hierarchy) <= here * (1.0 + COST_TIE):
+            for member in standing:
+                member.accept()
+            return
+        share *= 0.5
+    for member in standing:
+        member.move_alone(hierarchy)
+
+
+def _cost(places: Sequence[tuple[Member, Array, Evaluation | None]], hierarchy: Hierarchy) -> float:
+    """Squared residuals of all specimens at their points, and distance from the prior."""
+    if not places:
+        return 0.0
+    scatter = hierarchy.spreads.scatter
+    squares = [member.squares(seen, scatter) for member, _, seen in places if seen is not None]
+    return sum(squares) + hierarchy.distance(np.stack([x for _, x, _ in places]))
+
+
+def _verdict(specimens: Sequence[PooledSpecimen], settled: bool) -> tuple[Status, str]:
+    """The worst of the specimens that have poses; in words how many have no usable fit."""
+    if not settled:
+        return Status.NOT_CONVERGED, UNSETTLED
+    lost = sum(not specimen.status.usable for specimen in specimens)
+    message = f"{lost} of {len(specimens)} specimens without a usable fit" if lost else ""
+    standing = [specimen.status for specimen in specimens if specimen.poses]
+    for status in (Status.NOT_CONVERGED, Status.CONVERGED_AT_BOUND, Status.CONVERGED):
+        if status in standing:
+            return status, message
+    return specimens[0].status, message
+
+
+def _cohort_spreads(
+    problem: Problem, dof: Indices, hierarchy: Hierarchy
+) -> tuple[CohortSpread, ...]:
+    found, spreads = hierarchy.posterior(), hierarchy.spreads
+    first = [problem.free[int(np.argmax(dof == d))] for d in range(dof.max() + 1)]
+    return tuple(
+        CohortSpread(
+            name=parameter.label.partition("@")[0],
+            effect=parameter.effect,
+            column=parameter.column,
+            mean=float(found.mean[d]),
+            mean_se=float(found.mean_sd[d]),
+            level=float(spreads.level[d]),
+            specimen=float(spreads.specimen[d]),
+            rest=float(spreads.rest[d]),
+        )
+        for d, parameter in enumerate(first)
+    )

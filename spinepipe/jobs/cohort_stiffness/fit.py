@@ -1,0 +1,139 @@
+"""Job: stiffness of one specimen in one representation, fitted to some of its load cases."""
+
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.cohort import Cohort
+from spinepipe.designs import specimen_seed
+from spinepipe.jobs.cohort_stiffness.criteria import criteria
+from spinepipe.jobs.cohort_stiffness.predict import error_rows
+from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
+from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
+from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, Tested, specimen_tests
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.statics import Status, moved
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import ERRORS, FITS, STIFFNESS, from_rows, write
+
+Row = dict[str, Any]
+IN_FOLDERS = ("specimen", "representation", "fitted_to")
+"""Columns that the folders of a job file carry."""
+
+
+def run(
+    root: str,
+    study: str,
+    specimen: str,
+    representation: str,
+    fitted_to: str,
+    stiffness: str,
+    fits: str,
+    errors: str,
+) -> None:
+    """Write stiffness, the record of the fit, and the errors under all tests of the specimen."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    tests = specimen_tests(settings, cohort, specimen)
+    problem, found, refusal = _fit(settings, cohort, specimen, representation, fitted_to, tests)
+    if problem is None or found is None:
+        k, rows = None, _no_stiffness(settings, cohort, refusal)
+        record = _no_fit(refusal)
+    else:
+        k, rows = _stiffness(settings, cohort, problem, found)
+        record = _record(problem, found)
+    seen = [] if k is None else error_rows(cohort, specimen, tests, k)
+    within = {one.case.test for one in tests.fitted_to(fitted_to)}
+    labelled = [
+        {**row, "source": "own", "stage": "fitted" if row["test"] in within else "left_out_case"}
+        for row in seen
+    ]
+    origin = provenance("cohort_stiffness.fit", settings, cohort)
+    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, origin)
+    write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, origin)
+    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, origin)
+
+
+def _fit(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    specimen: str,
+    representation: str,
+    fitted_to: str,
+    tests: SpecimenTests,
+) -> tuple[Problem | None, Fit | None, str]:
+    """The problem and its fit, or why there is none."""
+    chosen: tuple[Tested, ...] = tests.fitted_to(fitted_to)
+    if not chosen:
+        return None, None, f"{specimen} has no motion to fit for {fitted_to}"
+    try:
+        problem = calibration_problem(
+            settings, cohort, specimen, representation, tests.frames, chosen
+        )
+        seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
+        return problem, fit(problem, settings.starts, seed, settings.identifiable_below), ""
+    except RefusedModel as error:
+        return None, None, str(error)
+
+
+def _stiffness(
+    settings: CohortStiffness, cohort: Cohort, problem: Problem, found: Fit
+) -> tuple[Any, list[Row]]:
+    """Fitted stiffness (J, 6), None where the fit has none, and its rows."""
+    usable = found.status.usable
+    model = moved(problem.model, problem.free, found.x)
+    k = model.effects[0].values
+    error = np.full(k.shape, np.inf)
+    known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
+    for index, unknown in enumerate(problem.free):
+        at = (list(unknown.rows), unknown.column)
+        error[at] = found.uncertainty.standard_error[index]
+        known[at] = found.uncertainty.identifiable[index] and usable
+        bound[at] = found.at_bound[index]
+    values = k if usable else np.full(k.shape, np.nan)
+    freedom = found.uncertainty.degrees_of_freedom
+    rows = stiffness_rows(cohort.joint_names, settings.free, values, error, freedom, known, bound)
+    ended = {"source": "own", "status": found.status.value, "message": found.message}
+    return (k if usable else None), [{**row, **ended} for row in rows]
+
+
+def _record(problem: Problem, found: Fit) -> Row:
+    """The row of the table ``fits``."""
+    unknowns = len(problem.free)
+    readings = found.uncertainty.degrees_of_freedom + int((found.at_bound == 0).sum())
+    cost = found.cost if found.status.usable else None
+    effective = None if cost is None else float(unknowns)
+    several = f"{found.n_optima} optima: the answer depends on the start"
+    notes = [found.message, several if found.n_optima > 1 else ""]
+    return {
+        "readings": readings,
+        "unknowns": unknowns,
+        "effective_unknowns": effective,
+        "cost": cost,
+        **criteria(cost, readings, effective),
+        "iterations": found.iterations,
+        "evaluations": found.evaluations,
+        "n_optima": found.n_optima,
+        "status": found.status.value,
+        "message": "; ".join(note for note in notes if note),
+    }
+
+
+def _no_fit(refusal: str) -> Row:
+    counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
+    empty = dict.fromkeys(("effective_unknowns", "cost"))
+    row: Row = {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None)}
+    return row | {"status": Status.REFUSED.value, "message": refusal}
+
+
+def _no_stiffness(settings: CohortStiffness, cohort: Cohort, refusal: str) -> list[Row]:
+    k = start_stiffness(settings, cohort, "literature")
+    nothing = np.full(k.shape, np.nan)
+    none = np.zeros(k.shape, dtype=int)
+    rows = stiffness_rows(
+        cohort.joint_names, settings.free, nothing, nothing, 0.0, none.astype(bool), none
+    )
+    ended = {"source": "own", "status": Status.REFUSED.value, "message": refusal}
+    return [{**row, **ended} for row in rows]

@@ -1,0 +1,79 @@
+"""Job: predict a specimen with the median stiffness of the others, in one representation."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.cohort_stiffness.fit import IN_FOLDERS
+from spinepipe.jobs.cohort_stiffness.predict import error_rows
+from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
+from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
+from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statics import Status
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import ERRORS, STIFFNESS, from_rows, read_frame, write
+from spinepipe.units import COORDINATES
+
+SOURCE = "others_median"
+
+
+def run(
+    root: str,
+    study: str,
+    others: list[str],
+    specimen: str,
+    representation: str,
+    fitted_to: str,
+    stiffness: str,
+    errors: str,
+) -> None:
+    """Write the median of the other specimens' stiffness and the errors it leaves."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    tests = specimen_tests(settings, cohort, specimen)
+    k, used = _median(settings, cohort, representation, [read_frame(path) for path in others])
+    rows = _stiffness(settings, cohort, k, used)
+    within = {one.case.test for one in tests.fitted_to(fitted_to)}
+    seen = [] if not used else error_rows(cohort, specimen, tests, k)
+    labelled = [
+        {**row, "source": SOURCE, "stage": "left_out_specimen"}
+        for row in seen
+        if row["test"] in within
+    ]
+    origin = provenance("cohort_stiffness.left_out", settings, cohort)
+    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, origin)
+    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, origin)
+
+
+def _median(
+    settings: CohortStiffness, cohort: Cohort, representation: str, others: list[pd.DataFrame]
+) -> tuple[Array, int]:
+    """(J, 6) median over the others that have a stiffness, and how many these are."""
+    k = start_stiffness(settings, cohort, representation)
+    fitted = [frame for frame in others if frame["stiffness"].notna().all()]
+    if not fitted:
+        return k, 0
+    keys = ["joint", "coordinate"]
+    median = pd.concat(fitted).groupby(keys, as_index=False)["stiffness"].median()
+    joints = [cohort.joint_names.index(joint) for joint in median["joint"]]
+    k[joints, [COORDINATES.index(name) for name in median["coordinate"]]] = median["stiffness"]
+    return k, len(fitted)
+
+
+def _stiffness(
+    settings: CohortStiffness, cohort: Cohort, k: Array, used: int
+) -> list[dict[str, Any]]:
+    status, message = Status.CONVERGED, f"median of {used} specimens"
+    if not used:
+        status, message = Status.REFUSED, "no other specimen has a stiffness"
+    values = k if used else np.full(k.shape, np.nan)
+    none = np.zeros(k.shape, dtype=int)
+    rows = stiffness_rows(
+        cohort.joint_names, settings.free, values, np.full(k.shape, np.inf), 0.0, None, none
+    )
+    ended = {"source": SOURCE, "status": status.value, "message": message}
+    return [{**row, **ended} for row in rows]

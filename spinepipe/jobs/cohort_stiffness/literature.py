@@ -1,0 +1,53 @@
+"""Job: what the published stiffness predicts of one specimen, and whether it moves that way."""
+
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.cohort_stiffness.predict import error_rows
+from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
+from spinepipe.jobs.cohort_stiffness.signs import sign_rows
+from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
+from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statics import Status
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import ERRORS, SIGN_CHECKS, STIFFNESS, from_rows, write
+from spinepipe.tables.cohort_stiffness import NOTHING
+
+LITERATURE = ("literature", "literature_levels")
+
+
+def run(
+    root: str, study: str, specimen: str, stiffness: str, errors: str, sign_checks: str
+) -> None:
+    """Write published stiffness, its errors, and the sign checks of the specimen."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    tests = specimen_tests(settings, cohort, specimen)
+    values: list[dict[str, Any]] = []
+    seen: list[dict[str, Any]] = []
+    for name in published_sets(settings, cohort):
+        k = start_stiffness(settings, cohort, name)
+        common = {"representation": name, "fitted_to": NOTHING, "source": "literature"}
+        none = np.zeros(k.shape, dtype=int)
+        rows = stiffness_rows(
+            cohort.joint_names, settings.free, k, np.full(k.shape, np.inf), 0.0, None, none
+        )
+        ended = {"status": Status.CONVERGED.value, "message": ""}
+        values += [{**row, **common, **ended} for row in rows]
+        found = error_rows(cohort, specimen, tests, k)
+        seen += [{**row, **common, "stage": "literature"} for row in found]
+    k = start_stiffness(settings, cohort, "literature")
+    signs = sign_rows(cohort, specimen, tests, k)
+    origin = provenance("cohort_stiffness.literature", settings, cohort)
+    write(from_rows(STIFFNESS.without("specimen"), values), stiffness, origin)
+    write(from_rows(ERRORS.without("specimen"), seen), errors, origin)
+    write(from_rows(SIGN_CHECKS.without("specimen"), signs), sign_checks, origin)
+
+
+def published_sets(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
+    """The published sets that this cohort has values for."""
+    every_level = set(cohort.joint_names) <= set(study.level_stiffness)
+    return LITERATURE if every_level else LITERATURE[:1]

@@ -1,0 +1,65 @@
+"""Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one."""
+
+from spinepipe.calibrate import Problem, pool
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.cohort_stiffness.pooled_rows import PooledRows
+from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
+from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import ERRORS, FITS, POOLING, STIFFNESS, from_rows, write
+
+REPRESENTATION = "partially_pooled"
+NOBODY = "nobody"
+"""Who is left out when all specimens are fitted."""
+
+
+def run(
+    root: str,
+    study: str,
+    fitted_to: str,
+    without: str,
+    stiffness: str,
+    fits: str,
+    errors: str,
+    pooling: str,
+) -> None:
+    """Write what the pooled fit says of its specimens, or of the one that was left out."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    fitted = [name for name in cohort.specimen_names if name != without]
+    problems = _problems(settings, cohort, fitted, fitted_to)
+    found = pool(list(problems.values())) if problems else None
+    rows = PooledRows(settings, cohort, fitted_to, problems, found)
+    everyone = without == NOBODY
+    told = fitted if everyone else [without]
+    values = [row for name in told for row in rows.stiffness(name)]
+    seen = [row for name in told for row in rows.errors(name)]
+    records = [rows.record(name) for name in told] if everyone else []
+    source = "own" if everyone else "others_pooled"
+    by = {"representation": REPRESENTATION, "source": source}
+    origin = provenance("cohort_stiffness.pool", settings, cohort)
+    shape = STIFFNESS.without("fitted_to")
+    write(from_rows(shape, [{**row, **by} for row in values]), stiffness, origin)
+    write(from_rows(ERRORS.without("fitted_to"), [{**row, **by} for row in seen]), errors, origin)
+    write(from_rows(FITS.without("fitted_to"), [{**row, **by} for row in records]), fits, origin)
+    write(from_rows(POOLING.without("fitted_to", "without"), rows.pooling()), pooling, origin)
+
+
+def _problems(
+    settings: CohortStiffness, cohort: Cohort, names: list[str], fitted_to: str
+) -> dict[str, Problem]:
+    """The problem of each specimen that has motion to fit."""
+    found = {}
+    for name in names:
+        tests = specimen_tests(settings, cohort, name)
+        chosen = tests.fitted_to(fitted_to)
+        if chosen:
+            try:
+                found[name] = calibration_problem(
+                    settings, cohort, name, REPRESENTATION, tests.frames, chosen
+                )
+            except RefusedModel:
+                continue  # its fits tell why
+    return found

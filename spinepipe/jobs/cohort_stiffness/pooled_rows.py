@@ -1,0 +1,169 @@
+"""Rows of the tables of a pooled fit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.jobs.cohort_stiffness.criteria import criteria
+from spinepipe.jobs.cohort_stiffness.predict import error_rows
+from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
+from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
+from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.statics import Status
+from spinepipe.studies import CohortStiffness
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
+
+Row = dict[str, Any]
+NOBODY_FITTED = "no specimen has motion to fit"
+
+
+@dataclass(frozen=True)
+class PooledRows:
+    """What a pooled fit says, specimen by specimen.
+
+    Attributes
+    ----------
+    problems : of the specimens that were fitted; another one is a newcomer to them.
+    found : None where there was nothing to fit.
+    """
+
+    study: CohortStiffness
+    cohort: Cohort
+    fitted_to: str
+    problems: Mapping[str, Problem]
+    found: Pooled | None
+
+    def stiffness(self, specimen: str) -> list[Row]:
+        """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
+        values = self._values(specimen)
+        none = np.zeros((len(self.cohort.joint_names), 6), dtype=int)
+        if values is None:
+            return self._rows(np.full(none.shape, np.nan), none + np.nan, none, specimen)
+        k, error, bound = values
+        return self._rows(k, error, bound, specimen)
+
+    def errors(self, specimen: str) -> list[Row]:
+        """Rows of table ``errors``: all tests of a fitted specimen, those fitted of a newcomer."""
+        values = self._values(specimen)
+        if values is None:
+            return []
+        tests = specimen_tests(self.study, self.cohort, specimen)
+        within = {one.case.test for one in tests.fitted_to(self.fitted_to)}
+        found = error_rows(self.cohort, specimen, tests, values[0])
+        rows = [{**row, "specimen": specimen} for row in found]
+        if specimen not in self.problems:
+            return [{**r, "stage": "left_out_specimen"} for r in rows if r["test"] in within]
+        return [{**r, "stage": "fitted" if r["test"] in within else "left_out_case"} for r in rows]
+
+    def record(self, specimen: str) -> Row:
+        """The row of table ``fits`` of a fitted specimen."""
+        own = self._own(specimen)
+        status, message = self._ended(specimen)
+        if own is None or self.found is None or not own.poses:
+            return {
+                **dict.fromkeys(
+                    ("readings", "unknowns", "iterations", "evaluations", "n_optima"), 0
+                ),
+                **dict.fromkeys(("effective_unknowns", "cost")),
+                **criteria(None, 0, None),
+                "specimen": specimen,
+                "status": Status.REFUSED.value if own is None else status.value,
+                "message": message,
+            }
+        return {
+            "specimen": specimen,
+            "readings": own.n_readings,
+            "unknowns": len(own.x),
+            "effective_unknowns": own.effective_parameters,
+            "cost": own.cost,
+            **criteria(own.cost, own.n_readings, own.effective_parameters),
+            "iterations": self.found.iterations,
+            "evaluations": own.evaluations,
+            "n_optima": 1,
+            "status": status.value,
+            "message": message,
+        }
+
+    def pooling(self) -> list[Row]:
+        """Rows of table ``pooling``, one per free coordinate."""
+        spreads = {s.name: s for s in self.found.spreads} if self.found else {}
+        return [self._spread(name, spreads) for name in self.study.free]
+
+    def _spread(self, name: str, spreads: Mapping[str, CohortSpread]) -> Row:
+        place = COORDINATES.index(name)
+        spread = spreads.get(STIFFNESS_COLUMNS[place])
+        found = self.found
+        empty: Row = dict.fromkeys(
+            ("centre", "between_levels", "between_specimens", "between_joints", "scatter",
+             "effective_unknowns", "log_likelihood")
+        )  # fmt: skip
+        row: Row = {
+            "coordinate": name,
+            "unit": STIFFNESS_UNITS[name],
+            "specimens": len(self.problems),
+            "iterations": 0,
+            "status": Status.REFUSED.value,
+            "message": NOBODY_FITTED,
+            **empty,
+        }
+        if found is None or spread is None:
+            return row
+        start = float(start_stiffness(self.study, self.cohort, "partially_pooled")[0, place])
+        one = len(self.problems) == 1
+        return row | {
+            "centre": start * float(np.exp(spread.mean)),
+            "between_levels": None if one else spread.level,
+            "between_specimens": None if one else spread.specimen,
+            "between_joints": spread.rest,
+            "scatter": found.scatter,
+            "effective_unknowns": found.effective_parameters,
+            "log_likelihood": found.log_likelihood,
+            "iterations": found.iterations,
+            "status": found.status.value,
+            "message": found.message,
+        }
+
+    def _own(self, specimen: str) -> PooledSpecimen | None:
+        if self.found is None or specimen not in self.problems:
+            return None
+        return self.found.specimens[list(self.problems).index(specimen)]
+
+    def _ended(self, specimen: str) -> tuple[Status, str]:
+        own = self._own(specimen)
+        if self.found is None:
+            return Status.REFUSED, NOBODY_FITTED
+        if own is None:
+            return self.found.status, "what the others lead one to expect"
+        return own.status, own.message
+
+    def _values(self, specimen: str) -> tuple[Array, Array, Indices] | None:
+        """Stiffness, error of its logarithm and bounds reached (J, 6); None without a fit."""
+        if self.found is None:
+            return None
+        own = self._own(specimen)
+        x = self.found.newcomer if own is None else own.x
+        covariance = self.found.newcomer_covariance if own is None else own.covariance
+        free = next(iter(self.problems.values())).free
+        k = start_stiffness(self.study, self.cohort, "partially_pooled")
+        error = np.full(k.shape, np.inf)
+        bound = np.zeros(k.shape, dtype=int)
+        for index, unknown in enumerate(free):
+            at = unknown.rows[0], unknown.column
+            k[at] *= np.exp(x[index])
+            error[at] = np.sqrt(covariance[index, index])
+            bound[at] = 0 if own is None else own.at_bound[index]
+        return k, error, bound
+
+    def _rows(self, k: Array, error: Array, bound: Indices, specimen: str) -> list[Row]:
+        status, message = self._ended(specimen)
+        known = error < self.study.identifiable_below
+        rows = stiffness_rows(
+            self.cohort.joint_names, self.study.free, k, error, np.inf, known, bound
+        )
+        ended = {"specimen": specimen, "status": status.value, "message": message}
+        return [{**row, **ended} for row in rows]

@@ -1,0 +1,117 @@
+"""The tests of one specimen that a cohort study uses: chosen cycles, loads and readings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.main_moment import coupled_range, loaded_coordinate, peak_step
+from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.model import LoadCase
+from spinepipe.studies import CohortStiffness
+
+ALL = "all"
+ALL_BUT = "all_but_"
+
+
+@dataclass(frozen=True)
+class Tested:
+    """One cycle of one test.
+
+    Attributes
+    ----------
+    measured : (T, J, 6) m and rad, NaN where not measured; zeros that zeroing makes are no reading.
+    peak : place of the load step with the largest moment.
+    loaded : coordinate that the main moment drives, None without a moment.
+    """
+
+    case: LoadCase
+    measured: Array
+    peak: int
+    loaded: str | None
+
+
+@dataclass(frozen=True)
+class SpecimenTests:
+    """Joint frames of a specimen in the neutral pose, and its tests."""
+
+    frames: tuple[Pose, ...]
+    tested: tuple[Tested, ...]
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """Names of the tests with readings."""
+        return tuple(dict.fromkeys(one.case.test for one in self.tested))
+
+    def fitted_to(self, label: str) -> tuple[Tested, ...]:
+        """The tests that a label of ``fitted_to`` means, as far as the specimen has them."""
+        if label == ALL:
+            return self.tested
+        if not label.startswith(ALL_BUT):
+            return tuple(one for one in self.tested if one.case.test == label)
+        left_out = label.removeprefix(ALL_BUT)
+        if left_out not in self.tests:
+            return ()  # nothing would be held out
+        return tuple(one for one in self.tested if one.case.test != left_out)
+
+
+def load_sets(study: CohortStiffness, tests: Sequence[str]) -> tuple[str, ...]:
+    """Labels of what stiffness is fitted to: each test, all, and all but one."""
+    several = len(tests) > 1
+    held_out = several and study.cross_validation.load_cases
+    return (
+        *tests,
+        *((ALL,) if several else ()),
+        *((f"{ALL_BUT}{test}" for test in tests) if held_out and len(tests) > 2 else ()),
+    )
+
+
+def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
+    """The study's tests: those chosen, else all that have motion."""
+    if study.tests:
+        return study.tests
+    assert cohort.motion is not None
+    moved = set(cohort.motion["test"])
+    return tuple(test for test in cohort.tests if test in moved)
+
+
+def specimen_tests(study: CohortStiffness, cohort: Cohort, specimen: str) -> SpecimenTests:
+    """The chosen tests of a specimen; cycles without any reading are none."""
+    return _specimen_tests(cohort, specimen, tests_of(study, cohort), study.cycles)
+
+
+@lru_cache(maxsize=64)
+def _specimen_tests(
+    cohort: Cohort, specimen: str, tests: tuple[str, ...], cycles: str
+) -> SpecimenTests:
+    cases = load_cases(cohort, specimen, tests, np.zeros(3))
+    motions = measured_motion(cohort, specimen, cases)
+    found = [
+        Tested(case, _readings(motion.q, cohort), peak_step(case), loaded_coordinate(case))
+        for case, motion in zip(cases, motions, strict=True)
+    ]
+    read = [one for one in found if np.isfinite(one.measured).any()]
+    return SpecimenTests(joint_frames(cohort, specimen), tuple(_chosen(cycles, read)))
+
+
+def _readings(q: Array, cohort: Cohort) -> Array:
+    readings = q.copy()
+    if cohort.zeroed_at_step_0:
+        readings[0] = np.nan
+    return readings
+
+
+def _chosen(cycles: str, found: Sequence[Tested]) -> list[Tested]:
+    """Cycles that are used, test by test; ``cycles`` as in the study."""
+    chosen: list[Tested] = []
+    for test in dict.fromkeys(one.case.test for one in found):
+        of_test = [one for one in found if one.case.test == test]
+        later = of_test if cycles == "all" else of_test[1:] or of_test
+        if cycles == "quietest":
+            later = [min(later, key=lambda one: coupled_range(one.case))]
+        chosen += later
+    return chosen

@@ -1,0 +1,88 @@
+"""The grid of a study: motion at the largest load by specimen, pose, stiffness set, test, joint."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.virtual_tests import VIRTUAL_TESTS
+from spinepipe.effects.contract import Array
+from spinepipe.studies import RangeOfMotion
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Motion of a whole study.
+
+    Attributes
+    ----------
+    loaded : the coordinate that each test turns.
+    motion : (S, P, K, T, J, 6) mm and deg, NaN without equilibrium.
+    asked : (S, P, K, T) whether the specimen has the test at all.
+    """
+
+    specimens: tuple[str, ...]
+    tests: tuple[str, ...]
+    joints: tuple[str, ...]
+    loaded: tuple[str, ...]
+    motion: Array
+    asked: NDArray[np.bool_]
+
+    def loaded_motion(self, test: int) -> Array:
+        """(S, P, K, J) motion in the coordinate that a test turns, deg."""
+        chosen: Array = self.motion[:, :, :, test, :, COORDINATES.index(self.loaded[test])]
+        return chosen
+
+
+def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
+    """Rows of the largest loads of ``range_of_motion.parquet``.
+
+    Only what is needed is read, names as numbers: a table of a million rows fits many times over.
+    """
+    numbers = ("pose", "stiffness")
+    columns = [f"predicted_{name}" for name in COORDINATE_COLUMNS]
+    rows = pq.read_table(
+        path,
+        columns=["specimen", *numbers, "test", "joint", *columns],
+        filters=[("largest_load", "==", True)],
+        partitioning=None,
+    )
+    tests = _tests(study, cohort)
+    names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
+    at = {name: _positions(rows[name], values) for name, values in names.items()}
+    at |= {name: rows[name].to_numpy() for name in numbers}
+    place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
+    sizes = (len(cohort.specimen_names), study.n_poses, study.stiffness_sets, len(tests))
+    motion = np.full((*sizes, len(cohort.joint_names), 6), np.nan)
+    motion[place] = np.column_stack([rows[name].to_numpy() for name in columns])
+    asked = np.zeros(sizes, dtype=bool)
+    asked[place[:4]] = True
+    loaded = tuple(_loaded(study, test, motion[:, :, :, i]) for i, test in enumerate(tests))
+    return Grid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
+
+
+def _positions(values: pa.ChunkedArray, names: Sequence[str]) -> NDArray[np.int32]:
+    """Place of each value among the names."""
+    found: NDArray[np.int32] = pc.index_in(values, value_set=pa.array(names)).to_numpy()
+    return found
+
+
+def _tests(study: RangeOfMotion, cohort: Cohort) -> tuple[str, ...]:
+    if study.virtual_tests is not None:
+        return study.virtual_tests.tests
+    return study.tests or cohort.tests
+
+
+def _loaded(study: RangeOfMotion, test: str, motion: Array) -> str:
+    """The coordinate that a test turns; of tests of loads.csv the rotation that moves most."""
+    if study.virtual_tests is not None:
+        return VIRTUAL_TESTS[test].coordinate
+    flat = np.abs(motion[..., 3:]).reshape(-1, 3)
+    solved = flat[np.isfinite(flat).all(axis=1)]
+    return ROTATIONS[int(np.median(solved, axis=0).argmax())] if len(solved) else ROTATIONS[0]

@@ -1,0 +1,69 @@
+"""Which files the results of a range-of-motion study consist of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.study_files import StudyFiles
+from spinepipe.studies import RangeOfMotion
+
+MOTION = "range_of_motion"
+"""The table that is made of job files, one for each specimen, pose and stiffness set."""
+
+TABLES = ("frames", "stiffness_sets", MOTION, "rom_summary", "rom_variance")
+
+ROM_FIGURES: dict[str, tuple[str, ...]] = {
+    "range_of_motion": ("rom_summary",),
+    "rom_variance": ("rom_variance",),
+}
+"""Figures and the tables each is drawn from."""
+
+_MOST_FILES_PER_BLOCK = 300
+
+
+@dataclass(frozen=True)
+class RangeOfMotionFiles(StudyFiles):
+    """The result files of one range-of-motion study."""
+
+    study: RangeOfMotion
+
+    @classmethod
+    def of(cls, study: RangeOfMotion, cohort: Cohort) -> "RangeOfMotionFiles":
+        """The files of a study of a cohort."""
+        return cls(study, cohort.specimen_names)
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """The tables that every study has."""
+        return TABLES
+
+    @property
+    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
+        """Figures and the tables each is drawn from."""
+        return ROM_FIGURES
+
+    @property
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The table that is made of job files."""
+        return (MOTION,)
+
+    def blocks(self, table: str) -> list[tuple[str, str]]:
+        """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""
+        count = -(-self._per_specimen // _MOST_FILES_PER_BLOCK)
+        return [(name, f"{block:03d}") for name in self.specimens for block in range(count)]
+
+    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
+        """The job files of which a block is made."""
+        first = int(block) * _MOST_FILES_PER_BLOCK
+        last = min(first + _MOST_FILES_PER_BLOCK, self._per_specimen)
+        return [self._job_file(specimen, number) for number in range(first, last)]
+
+    @property
+    def _per_specimen(self) -> int:
+        """Number of job files of a specimen."""
+        return self.study.n_poses * self.study.stiffness_sets
+
+    def _job_file(self, specimen: str, number: int) -> str:
+        pose, stiffness = divmod(number, self.study.stiffness_sets)
+        place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
+        return f"{self.folder}/jobs/{place}.parquet"

@@ -1,0 +1,61 @@
+"""Job: joint frames of all specimens, the cohort's own and those sampled around them."""
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames
+from spinepipe.designs import sample_joint_frames
+from spinepipe.frames import Pose, zxy_angles
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statics.status import Status
+from spinepipe.studies import RangeOfMotion
+from spinepipe.tables import FRAMES, to_arrow, write
+from spinepipe.units import MM_PER_M, ROTATIONS
+
+
+def run(root: str, study: str, output: str) -> None:
+    """Write ``frames.parquet``."""
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    parts = [_specimen(settings, cohort, specimen) for specimen in cohort.specimen_names]
+    frame = pd.concat(parts, ignore_index=True)
+    columns = {column.name: frame[column.name].to_list() for column in FRAMES.columns}
+    made_by = provenance("range_of_motion.sample_frames", settings, cohort)
+    write(to_arrow(FRAMES, columns), output, made_by)
+
+
+def _specimen(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> pd.DataFrame:
+    own = joint_frames(cohort, specimen)
+    translation_m, rotation_rad = _sds(settings, cohort)
+    poses = sample_joint_frames(
+        own, translation_m, rotation_rad, settings.n_poses, settings.seed, specimen
+    )
+    return _rows(cohort, specimen, poses)
+
+
+def _sds(settings: RangeOfMotion, cohort: Cohort) -> tuple[float, float]:
+    """SDs of a frame per axis, m and rad; nothing is drawn with them when there is one pose."""
+    sd = settings.pose_sd or cohort.measurement_sd
+    if sd is None:
+        return 0.0, 0.0
+    return sd.translation_mm / MM_PER_M, float(np.deg2rad(sd.rotation_deg))
+
+
+def _rows(cohort: Cohort, specimen: str, poses: list[tuple[Pose, ...]]) -> pd.DataFrame:
+    """Rows pose by pose, joint by joint."""
+    frames = [frame for pose in poses for frame in pose]
+    origins = MM_PER_M * np.array([frame.origin for frame in frames])
+    angles = np.rad2deg(zxy_angles(np.array([frame.rotation for frame in frames])))
+    n = len(cohort.joint_names)
+    return pd.DataFrame(
+        {
+            "specimen": specimen,
+            "pose": np.repeat(np.arange(len(poses)), n),
+            "joint": np.tile(cohort.joint_names, len(poses)),
+            **dict(zip(("x_mm", "y_mm", "z_mm"), origins.T, strict=True)),
+            **dict(zip([f"{name}_deg" for name in ROTATIONS], angles.T, strict=True)),
+            "status": Status.CONVERGED.value,
+            "message": "",
+        }
+    )

@@ -1,0 +1,109 @@
+"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import spine_model
+from spinepipe.effects import create
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.jobs.range_of_motion.drawn import drawn_frames, drawn_stiffness
+from spinepipe.jobs.range_of_motion.load_steps import AskedTest, asked_tests
+from spinepipe.model import RefusedModel, ScopedEffect, SpineModel
+from spinepipe.statics import Chain, Status, System, follow
+from spinepipe.studies import RangeOfMotion
+from spinepipe.tables import RANGE_OF_MOTION, to_arrow, write
+from spinepipe.units import COORDINATE_COLUMNS, from_si
+
+TABLE = RANGE_OF_MOTION.without("specimen", "pose")
+"""A job file: specimen and pose are in its folders' names."""
+
+Ends = list[tuple[Array, Status, str]]
+"""End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
+
+
+def run(
+    root: str,
+    study: str,
+    frames: str,
+    stiffness_sets: str,
+    specimen: str,
+    pose: str,
+    stiffness: str,
+    output: str,
+) -> None:
+    """Write the rows of one specimen, pose and stiffness set."""
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    tests = asked_tests(root, study, specimen, cohort.digest)
+    placed = drawn_frames(frames).of(specimen, int(pose))
+    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
+    try:
+        chain = Chain(_model(settings, cohort, specimen, placed, values))
+        ends = [_motion(chain, test) for test in tests]
+    except RefusedModel as error:
+        nowhere = np.full(values.shape, np.nan)
+        ends = [
+            [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
+            for test in tests
+        ]
+    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
+    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
+    made_by = provenance("range_of_motion.simulate", settings, cohort)
+    write(to_arrow(TABLE, columns), output, made_by)
+
+
+def _model(
+    settings: RangeOfMotion,
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+) -> SpineModel:
+    """The specimen on linear bushings; stiffness (J, 6)."""
+    joints = tuple(range(len(frames)))
+    bushing = ScopedEffect(create("linear_bushing"), joints, stiffness)
+    damping = np.array(settings.damping.in_order())
+    return spine_model(cohort, specimen, frames, (bushing,), damping)
+
+
+def _motion(chain: Chain, test: AskedTest) -> Ends:
+    """Ends of the steps of a test that are stored.
+
+    Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
+    """
+    solved = follow(System(chain, chain.model, test.case))
+    start = np.zeros(chain.n) if test.from_neutral else solved[0].equilibrium.q
+    ends = []
+    for step in solved[test.stored]:
+        moved = step.equilibrium.q - start if step.usable else np.full(chain.n, np.nan)
+        ended = step.equilibrium
+        ends.append((from_si(moved.reshape(-1, 6)), ended.status, ended.message))
+    return ends
+
+
+def _columns(
+    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
+) -> dict[str, list[Any]]:
+    """Columns of a job file; rows step by step, joint by joint."""
+    names = ("test", "step", "largest_load", "joint", "status", "message")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    motions = []
+    for test, ends in tests:
+        for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
+            same = (test.case.test, step.step, step.step == test.largest)
+            for name, value in zip(names[:3], same, strict=True):
+                columns[name] += [value] * len(joints)
+            columns["joint"] += joints
+            columns["status"] += [status.value] * len(joints)
+            columns["message"] += [message] * len(joints)
+            motions.append(motion)
+    predicted = np.concatenate(motions).T
+    return {
+        **columns,
+        **dict(zip([f"predicted_{c}" for c in COORDINATE_COLUMNS], predicted, strict=True)),
+    }

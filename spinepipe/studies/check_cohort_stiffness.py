@@ -1,0 +1,97 @@
+"""What a cohort study demands of its cohort."""
+
+from collections.abc import Iterator
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.read_yaml import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.studies.cohort_stiffness import CohortStiffness
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
+
+__all__ = ["check_cohort_stiffness"]
+
+RESERVED = "all"
+"""What ``fitted_to`` calls all load cases together."""
+
+
+def check_cohort_stiffness(
+    document: Document, study: CohortStiffness, cohort: Cohort
+) -> Iterator[Problem]:
+    """Every way in which a sound study and a sound cohort do not fit.
+
+    Parameters
+    ----------
+    document : the study file, for the lines of its keys.
+    """
+    yield from _tests(document, study, cohort)
+    yield from _levels(document, study, cohort)
+    yield from _cost(document, study, cohort)
+
+
+def _at(document: Document, key: str) -> tuple[str, int | None, str]:
+    return document.file, document.line_of(key), key
+
+
+def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+    """Tests must exist, have names that can name files, and someone must have been measured."""
+    if cohort.motion is None:
+        found = f"cohort '{cohort.name}', which has no motion.csv"
+        allowed = "a cohort with loads.csv and motion.csv: stiffness is fitted to motion"
+        remedy = "choose another cohort, or a study of kind range_of_motion"
+        yield Problem(*_at(document, "cohort"), found, allowed, remedy)
+        return
+    for index, name in enumerate(study.tests or ()):
+        if name not in cohort.tests:
+            remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
+            place = _at(document, f"tests.{index}")
+            yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
+    for name in cohort.tests:
+        if name == RESERVED or "/" in name or "=" in name:
+            allowed = f"names without / and =, and other than '{RESERVED}'"
+            place = ("loads.csv", None, "test")
+            yield Problem(*place, f"test '{name}'", allowed, "rename it in loads and motion")
+    yield from _measured(document, study, cohort)
+
+
+def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+    """Every specimen has a reading of a free coordinate in some test, or is named."""
+    assert cohort.motion is not None
+    columns = [
+        column
+        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
+        if name in study.free
+    ]
+    chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
+    measured = chosen[chosen[columns].notna().any(axis=1)]
+    for specimen in cohort.specimen_names:
+        if specimen not in set(measured["specimen"]):
+            found = f"no motion of specimen '{specimen}' in any chosen test"
+            allowed = f"readings of {one_of(study.free)} of every specimen in one test at least"
+            remedy = "choose more tests, or leave the specimen out of the cohort"
+            yield Problem(*_at(document, "tests"), found, allowed, remedy)
+
+
+def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+    """Ratios of levels need a value for each level."""
+    if "level_ratio" not in study.representations:
+        return
+    missing = [joint for joint in cohort.joint_names if joint not in study.level_stiffness]
+    if missing:
+        found = f"no value for {', '.join(missing)}"
+        allowed = "a value for every joint of the cohort, as level_ratio is among representations"
+        remedy = "add them, or leave level_ratio out of representations"
+        yield Problem(*_at(document, "level_stiffness"), found, allowed, remedy)
+
+
+def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+    """Weights need SDs; the published cost knows rotations only."""
+    if study.cost == "measurement_sd" and (study.measurement_sd or cohort.measurement_sd) is None:
+        found = "null, and the cohort has none"
+        allowed = "SDs of one reading, here or in cohort.yaml, for cost: measurement_sd"
+        remedy = "fill them in, or choose cost: published"
+        yield Problem(*_at(document, "measurement_sd"), found, allowed, remedy)
+    others = [name for name in study.free if name not in ROTATIONS]
+    if study.cost == "published" and others:
+        allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
+        remedy = "free rotations only, or choose cost: measurement_sd"
+        yield Problem(*_at(document, "free"), ", ".join(others), allowed, remedy)
