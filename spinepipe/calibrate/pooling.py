@@ -20,14 +20,14 @@ from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlate
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics import Status
 
-MOST_ROUNDS = 40
-FREE_ROUNDS = 10
-"""After so many rounds spreads move by ever smaller shares of what is asked, so that all ends."""
+MOST_ROUNDS = 30
+FREE_ROUNDS, DAMPED_SHARE = 12, 0.3
+"""After so many rounds spreads go only a share of the way to what is asked, lest they swing."""
 
 SETTLED = 0.05
 """Change of the logarithm of a spread that does not matter."""
 
-UNSETTLED = "the spreads do not settle: some specimen does not go with the others"
+UNSETTLED = "the spreads do not settle, as where a specimen does not go with the others: see"
 
 
 def pool(
@@ -38,7 +38,7 @@ def pool(
     """Fit a cohort, one problem per specimen, with what its specimens and levels share.
 
     A specimen without a reading or a stable pose, and unknowns that nothing tells of, get what is
-    to be expected of a newcomer. Bounds are kept by each specimen by itself; the cohort and
+    to be expected of a newcomer. Each specimen keeps to its bounds by itself; the cohort and the
     covariances are not told of them. One specimen alone cannot tell how specimens differ: its
     newcomer is sure of too much.
 
@@ -63,7 +63,9 @@ def pool(
     found = hierarchy.posterior()
     told = zip(found.x, found.covariance, found.effective_parameters.tolist(), strict=True)
     specimens = tuple(m.result(*all_of) for m, all_of in zip(members, told, strict=True))
-    status, message = _verdict(specimens, settled)
+    status, message = _verdict(specimens)
+    if not settled:
+        status, message = Status.NOT_CONVERGED, f"{UNSETTLED} {_worst(problems, specimens)}"
     return Pooled(
         specimens=specimens,
         spreads=_cohort_spreads(problems[0], dof, hierarchy),
@@ -123,13 +125,13 @@ def _travel(
         spreads = asked
         if before is not None:
             settled = change(before, asked) < SETTLED
-            spreads = between(before, asked, 1.0 / max(1, rounds - FREE_ROUNDS))
+            spreads = between(before, asked, 1.0 if rounds < FREE_ROUNDS else DAMPED_SHARE)
         hierarchy = Hierarchy(readings, dof, spreads)
         _move(members, hierarchy)
         rounds += 1
-        if all(member.at_rest for member in members):
+        if settled and all(member.at_rest for member in members):
             break
-    return hierarchy, rounds, settled or rounds == 1
+    return hierarchy, rounds, settled
 
 
 def _move(members: Sequence[Member], hierarchy: Hierarchy) -> None:
@@ -161,10 +163,8 @@ def _cost(places: Sequence[tuple[Member, Array, Evaluation | None]], hierarchy: 
     return sum(squares) + hierarchy.distance(np.stack([x for _, x, _ in places]))
 
 
-def _verdict(specimens: Sequence[PooledSpecimen], settled: bool) -> tuple[Status, str]:
+def _verdict(specimens: Sequence[PooledSpecimen]) -> tuple[Status, str]:
     """The worst of the specimens that have poses; in words how many have no usable fit."""
-    if not settled:
-        return Status.NOT_CONVERGED, UNSETTLED
     lost = sum(not specimen.status.usable for specimen in specimens)
     message = f"{lost} of {len(specimens)} specimens without a usable fit" if lost else ""
     standing = [specimen.status for specimen in specimens if specimen.poses]
@@ -172,6 +172,12 @@ def _verdict(specimens: Sequence[PooledSpecimen], settled: bool) -> tuple[Status
         if status in standing:
             return status, message
     return specimens[0].status, message
+
+
+def _worst(problems: Sequence[Problem], specimens: Sequence[PooledSpecimen]) -> str:
+    """Name of the specimen with the largest cost per reading."""
+    costs = [s.cost / s.n_readings if s.poses else 0.0 for s in specimens]
+    return problems[int(np.argmax(costs))].model.specimen
 
 
 def _cohort_spreads(

@@ -126,9 +126,8 @@ class Evaluator:
 
     def reload(self) -> None:
         """Load the chain again, after that of another problem took its place in the engine."""
-        model = self.problem.model
-        chain = Chain(model)
-        self._systems = [System(chain, model, measured.case) for measured in self.problem.cases]
+        chain = Chain(self.problem.model)
+        self._systems = [System(chain, chain.model, case.case) for case in self.problem.cases]
 
     def forget(self) -> None:
         """Solve the next point from the neutral pose, not from its neighbour, nor recall it."""

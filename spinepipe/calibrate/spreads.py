@@ -50,7 +50,8 @@ def estimated(
     bounds = [(np.log(SMALLEST), np.log(LARGEST))] * int(told.sum())
     if scatter is None:
         bounds += [(np.log(SMALLEST_SCATTER), np.log(LARGEST_SCATTER))]
-    at = np.clip(np.log(_packed(first, told, scatter)), *np.transpose(bounds))
+    sizes = _packed(first, told, scatter)  # zero for what could not be told apart before
+    at = np.clip(np.log(np.where(sizes > 0.0, sizes, START)), *np.transpose(bounds))
     found = minimize(objective, at, jac=True, method="L-BFGS-B", bounds=bounds,
                      options={"ftol": 1e-12, "gtol": 1e-5, "maxiter": 500})  # fmt: skip
     return _unpacked(found.x, told, scatter)
