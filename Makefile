@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: all full test lint bench report env dev-env lock clean
+.PHONY: all full test lint bench validate report env dev-env lock clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/snakemake -j$(CORES) all
@@ -24,6 +24,9 @@ lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 
 bench: dev-env  ## measure speed side by side with OpenSim
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
+validate: dev-env  ## measure what is too slow for a test; goes on where it was cut off
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.validation
 
 report: env  ## one HTML file with all figures and their captions
 	$(BIN)/snakemake --report results/report.html

@@ -1,6 +1,9 @@
 """What a load case mainly does: its largest moment, and which joint coordinate that drives."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
@@ -14,14 +17,28 @@ _DRIVEN = ("right_bending", "left_rotation", "extension")
 
 def moments(case: LoadCase) -> Array:
     """(T, 3) N m, ground: sum of the moments of each load step."""
-    return np.array(
-        [np.sum([np.zeros(3), *(w.moment for w in step.wrenches)], axis=0) for step in case.steps]
-    )
+    return _sums([[wrench.moment for wrench in step.wrenches] for step in case.steps])
 
 
-def peak_step(case: LoadCase) -> int:
-    """Place of the load step with the largest moment; the first of equal ones."""
-    return int(np.argmax(np.linalg.norm(moments(case), axis=1)))
+def _sums(vectors: Sequence[Sequence[Array]]) -> Array:
+    """(T, 3) sum of the vectors of each load step; zero where there are none."""
+    return np.array([np.sum([np.zeros(3), *of_step], axis=0) for of_step in vectors])
+
+
+def peak_step(case: LoadCase, among: NDArray[np.bool_] | None = None) -> int:
+    """Place of the load step with the largest moment; the first of equal ones.
+
+    Where no moment is applied, the step with the largest force.
+
+    Parameters
+    ----------
+    among : (T,) the steps to choose from; None for all.
+    """
+    applied = moments(case)
+    if not applied.any():
+        applied = _sums([[wrench.force for wrench in step.wrenches] for step in case.steps])
+    sizes = np.linalg.norm(applied, axis=1)
+    return int(np.argmax(sizes if among is None else np.where(among, sizes, -1.0)))
 
 
 def loaded_coordinate(case: LoadCase) -> str | None:

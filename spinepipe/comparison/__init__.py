@@ -2,11 +2,13 @@
 
 from spinepipe.comparison.claim import Claim, Ours, Verdict, judge, judged
 from spinepipe.comparison.gould_2024a import CLAIMS as GOULD_2024A
+from spinepipe.comparison.gould_2024b import CLAIMS as GOULD_2024B
 from spinepipe.comparison.ranges import Range
 from spinepipe.comparison.run import NotComputed, Run
 
 __all__ = [
     "GOULD_2024A",
+    "GOULD_2024B",
     "Claim",
     "NotComputed",
     "Ours",

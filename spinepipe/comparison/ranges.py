@@ -66,7 +66,8 @@ def exactly(value: float) -> Range:
 def wilson_percent(count: int, of: int) -> tuple[float, float]:
     """Ends of the 95 % Wilson interval of a share, percent."""
     low, high = proportion_confint(count, of, alpha=1.0 - LEVEL, method="wilson")
-    return 100.0 * float(low), 100.0 * float(high)
+    ends = (0.0 if count == 0 else float(low)), (1.0 if count == of else float(high))
+    return 100.0 * ends[0], 100.0 * ends[1]  # rounding would exclude a share of none or all
 
 
 def binomial(count: int, of: int) -> Range:

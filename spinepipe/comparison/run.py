@@ -14,7 +14,10 @@ class NotComputed(Exception):
 
 @dataclass(frozen=True)
 class Run:
-    """Tables of one specimen by name, and the rule of the study by which a fit has failed."""
+    """Tables by name, and the rule of the study by which a fit has failed, where it has one.
+
+    Of a paper of one specimen these are the rows of that specimen.
+    """
 
     tables: Mapping[str, pd.DataFrame]
     failed_when: Literal["all", "any"] = "all"

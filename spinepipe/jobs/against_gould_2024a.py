@@ -5,7 +5,7 @@ import pandas as pd
 from spinepipe.comparison import GOULD_2024A, Run, judged
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.jobs.provenance import provenance
-from spinepipe.tables import AGAINST, from_rows, read_frames, write
+from spinepipe.tables import AGAINST_GOULD_2024A, from_rows, read_frames, write
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
@@ -14,7 +14,11 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     specimen = cohort.specimen_names[0]  # the paper has one
     frames = {name: _of(frame, specimen) for name, frame in read_frames(tables).items()}
     rows = judged(GOULD_2024A, Run(frames, settings.success.failed_when))
-    write(from_rows(AGAINST, rows), output, provenance("against_gould_2024a", settings, cohort))
+    write(
+        from_rows(AGAINST_GOULD_2024A, rows),
+        output,
+        provenance("against_gould_2024a", settings, cohort),
+    )
 
 
 def _of(frame: pd.DataFrame, specimen: str) -> pd.DataFrame:

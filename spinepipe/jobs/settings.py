@@ -62,7 +62,7 @@ IRRELEVANT: dict[str, dict[str, Any]] = {
     "cohort_stiffness.fit": _whole(*_HELD_OUT),
     "cohort_stiffness.literature": _whole(*_HELD_OUT, *_FITTING),
     "cohort_stiffness.left_out": _whole(*_HELD_OUT),
-    "cohort_stiffness.pool": _whole("representations", "significance"),
+    "cohort_stiffness.pool": _whole(*_HELD_OUT, "seed", "starts", "level_stiffness"),
     "cohort_stiffness.mae": {},
     "cohort_stiffness.ranking": {},
     "cohort_stiffness.statistics": {},

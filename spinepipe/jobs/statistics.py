@@ -15,11 +15,9 @@ from spinepipe.jobs.grid import complete_grid
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.jobs.pose_factors import pose_factors, pose_parameters
 from spinepipe.jobs.provenance import provenance
+from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import (
-    Outcome,
     chi_squared_normality,
-    corrected,
-    family_size,
     friedman,
     kendall,
     kolmogorov_smirnov_normality,
@@ -50,45 +48,8 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
         fits = frames["calibrations"]
         fits = fits[(fits["specimen"] == specimen) & fits["pose"].isin(kept)]
         data = Specimen(settings, kept, own["poses"], fits, own["errors"], ranking[specimen])
-        rows += [{"specimen": specimen, **row} for row in _corrected(list(data.tests()))]
+        rows += [{**row, "specimen": specimen} for row in corrected_rows(data.tests())]
     write(from_rows(STATISTICS, rows), output, provenance("statistics", settings, cohort))
-
-
-@dataclass(frozen=True)
-class Tested:
-    """One test and what it is of."""
-
-    family: str
-    joint: str
-    response: str
-    factor: str
-    stratum: str
-    outcome: Outcome
-
-
-def _corrected(tests: Sequence[Tested]) -> Iterator[dict[str, Any]]:
-    """Rows with p-values corrected within each family and kind of test."""
-    families: dict[tuple[str, str], list[Tested]] = {}
-    for test in tests:
-        families.setdefault((test.family, test.outcome.test), []).append(test)
-    for family in families.values():
-        ps = [test.outcome.p for test in family]
-        both = zip(family, corrected(ps, "bonferroni"), corrected(ps, "holm"), strict=True)
-        for test, bonferroni, holm in both:
-            yield _row(test, bonferroni, holm, family_size(ps))
-
-
-def _row(test: Tested, bonferroni: float | None, holm: float | None, size: int) -> dict[str, Any]:
-    outcome = test.outcome
-    return {
-        **{key: getattr(test, key) for key in ("family", "joint", "response", "factor", "stratum")},
-        **{key: getattr(outcome, key) for key in ("test", "statistic_name", "statistic", "p", "n")},
-        **{key: getattr(outcome, key) for key in ("effect_name", "effect", "message")},
-        "status": outcome.status.value,
-        "p_bonferroni": bonferroni,
-        "p_holm": holm,
-        "family_size": size,
-    }
 
 
 @dataclass(frozen=True)

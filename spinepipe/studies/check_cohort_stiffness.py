@@ -1,5 +1,6 @@
 """What a cohort study demands of its cohort."""
 
+import re
 from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
@@ -10,8 +11,14 @@ from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 __all__ = ["check_cohort_stiffness"]
 
-RESERVED = "all"
-"""What ``fitted_to`` calls all load cases together."""
+ALL, ALL_BUT, NOTHING = "all", "all_but_", "nothing"
+"""What ``fitted_to`` calls load cases together, so that no test can be called like this."""
+
+NOBODY = "nobody"
+"""Who is left out of a pooled fit of all specimens."""
+
+_UNFIT = re.compile(r"[/={}\\\x00-\x1f]|^\.|^\s|\s$")
+"""What names of files, or of rules' wildcards, do not bear."""
 
 
 def check_cohort_stiffness(
@@ -24,6 +31,7 @@ def check_cohort_stiffness(
     document : the study file, for the lines of its keys.
     """
     yield from _tests(document, study, cohort)
+    yield from _specimens(cohort)
     yield from _levels(document, study, cohort)
     yield from _cost(document, study, cohort)
 
@@ -45,16 +53,26 @@ def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterat
             remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
             place = _at(document, f"tests.{index}")
             yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
-    for name in cohort.tests:
-        if name == RESERVED or "/" in name or "=" in name:
-            allowed = f"names without / and =, and other than '{RESERVED}'"
-            place = ("loads.csv", None, "test")
+    for name in study.tests or cohort.tests:
+        reserved = name in (ALL, NOTHING) or name.startswith(ALL_BUT)
+        if name in cohort.tests and (reserved or _UNFIT.search(name)):
+            allowed = "names without / \\ = { }, not beginning with a dot or a space, "
+            allowed += f"and other than '{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
+            place = (f"{cohort.folder.name}/loads.csv", None, "test")
             yield Problem(*place, f"test '{name}'", allowed, "rename it in loads and motion")
     yield from _measured(document, study, cohort)
 
 
+def _specimens(cohort: Cohort) -> Iterator[Problem]:
+    """A name that folders of results use for something else."""
+    if NOBODY in cohort.specimen_names:
+        place = (f"{cohort.folder.name}/specimens.csv", None, "specimen")
+        allowed = f"any other name: '{NOBODY}' stands for fits that leave no specimen out"
+        yield Problem(*place, f"'{NOBODY}'", allowed, "rename the specimen in every file")
+
+
 def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
-    """Every specimen has a reading of a free coordinate in some test, or is named."""
+    """Readings of a free coordinate in each test that is asked for, and of every specimen."""
     assert cohort.motion is not None
     columns = [
         column
@@ -62,7 +80,14 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
         if name in study.free
     ]
     chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
-    measured = chosen[chosen[columns].notna().any(axis=1)]
+    zeros = cohort.zeroed_at_step_0 & (chosen["step"] == 0)  # made by zeroing, no readings
+    measured = chosen[chosen[columns].notna().any(axis=1) & ~zeros]
+    for index, name in enumerate(study.tests or ()):
+        if name in cohort.tests and name not in set(measured["test"]):
+            found = f"test '{name}', which has no motion"
+            allowed = f"tests with readings of {one_of(study.free)} of a specimen at least"
+            place = _at(document, f"tests.{index}")
+            yield Problem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
@@ -72,7 +97,13 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
 
 
 def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
-    """Ratios of levels need a value for each level."""
+    """Ratios of levels need a value for each level, and a value needs its level."""
+    given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
+    for joint in given:
+        if joint not in cohort.joint_names:
+            place = _at(document, f"level_stiffness.{joint}")
+            remedy = did_you_mean(joint, cohort.joint_names, "delete it or correct its name")
+            yield Problem(*place, f"unknown joint '{joint}'", one_of(cohort.joint_names), remedy)
     if "level_ratio" not in study.representations:
         return
     missing = [joint for joint in cohort.joint_names if joint not in study.level_stiffness]

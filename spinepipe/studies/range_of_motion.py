@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
 from spinepipe.studies.cohort_stiffness import LevelStiffness
-from spinepipe.studies.coordinates import FORM, Damping, Stiffness
+from spinepipe.studies.coordinates import FORM, Damping
 from spinepipe.studies.identification import distinct
-from spinepipe.studies.published_stiffness import published_stiffness
+from spinepipe.studies.published_stiffness import PublishedStiffness
 from spinepipe.studies.study import Study
 
 __all__ = ["PoseSd", "RangeOfMotion", "VirtualTests"]
@@ -80,8 +80,8 @@ class RangeOfMotion(Study):
         default=None,
         description="with virtual_tests: null, the tests of loads.csv that are used; null: all",
     )
-    stiffness: Stiffness = Field(
-        default_factory=published_stiffness, description="stiffness of all joints"
+    stiffness: PublishedStiffness = Field(
+        default_factory=PublishedStiffness, description="stiffness of all joints"
     )
     level_stiffness: Mapping[str, LevelStiffness] = Field(
         default_factory=dict,

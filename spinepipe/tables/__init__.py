@@ -11,7 +11,8 @@ from spinepipe.tables.cohort_stiffness import (
     STIFFNESS,
 )
 from spinepipe.tables.identification import (
-    AGAINST,
+    AGAINST_GOULD_2024A,
+    AGAINST_GOULD_2024B,
     BOOTSTRAP,
     COUNTS,
     LANDMARK_PRECISION,
@@ -63,7 +64,8 @@ TABLES = {
         AGREEMENT,
         VARIANCE_SHARES,
         IMPORTANCE,
-        AGAINST,
+        AGAINST_GOULD_2024A,
+        AGAINST_GOULD_2024B,
         STIFFNESS,
         FITS,
         ERRORS,
@@ -81,7 +83,8 @@ TABLES = {
 }
 
 __all__ = [
-    "AGAINST",
+    "AGAINST_GOULD_2024A",
+    "AGAINST_GOULD_2024B",
     "AGREEMENT",
     "BOOTSTRAP",
     "CALIBRATIONS",

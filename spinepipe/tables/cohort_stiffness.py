@@ -17,7 +17,7 @@ NOTHING = "nothing"
 
 NO_FIT = "no stiffness was found"
 NO_POSE = "not measured, or no pose was found"
-LITERATURE = "taken from the literature, not fitted"
+LITERATURE = "taken from the literature or from other specimens, not fitted"
 
 REPRESENTATION = Column(
     "representation",
@@ -152,7 +152,8 @@ ERRORS = Table(
         _motion("rmse", "root mean square error"),
         _motion("peak_error", "mean error at the largest load", low=None),
         _motion("measured", "mean size of the measured motion", null=None),
-        _motion("measured_peak", "mean measured motion at the largest load", None, None),
+        _motion("measured_peak", "mean measured motion at the largest load", None,
+                "not measured there"),
         status("solve"),
         MESSAGE,
     ),
@@ -221,13 +222,15 @@ CRITERIA = ("fitted", "left_out_specimen", "left_out_case", "aicc", "bic")
 RANKING = Table(
     "ranking",
     "Representations in order: by error of what they were fitted to, by error of what was held "
-    "out, and by information criteria. Less is better in all of them.",
+    "out, and by information criteria. Less is better in all of them. Stiffness from the "
+    "literature, which is never fitted, stands beside in every error.",
     ("criterion", "representation", "source"),
     (
         Column("criterion", "text",
                "fitted, left_out_specimen, left_out_case: root mean square error of all measured "
-               "rotations, mean over specimens; aicc, bic: sums over specimens, fits to all load "
-               "cases", allowed=CRITERIA),
+               "rotations of a specimen, mean over specimens; left_out_case: each load case by the "
+               "fit to all others, else fits to all load cases; aicc, bic: sums over specimens, "
+               "fits to all load cases", allowed=CRITERIA),
         REPRESENTATION,
         SOURCE,
         Column("rank", "integer", "1 is best", null="no result", low=1),
@@ -238,10 +241,15 @@ RANKING = Table(
                null="no result, or fewer than two specimens", low=0.0),
         Column("worse_than_best", "number", "value less that of the best", null="no result",
                low=0.0),
+        Column("worse_standard_error", "number",
+               "standard error of worse_than_best, over the differences of the specimens",
+               null="the best itself, no result, or fewer than two specimens", low=0.0),
         Column("p", "number",
                "Wilcoxon's signed rank test of the specimens' values against the best's, "
-               "uncorrected", null="the best itself, or no result", low=0.0, high=1.0),
-        Column("specimens", "integer", "specimens with a result in every representation", low=0),
+               "uncorrected", null="the best itself, no result, or too few specimens", low=0.0,
+               high=1.0),
+        Column("specimens", "integer", "specimens with a result in every representation, which "
+               "alone are compared", low=0),
         MESSAGE,
     ),
 )  # fmt: skip
@@ -270,19 +278,22 @@ SIGN_CHECKS = Table(
 
 FINDINGS = Table(
     "findings",
-    "What the study says to the findings of Gould et al. 2024b, each with its number.",
+    "What the study says to the findings of Gould et al. 2024b, and to those hoped for here, each "
+    "with its number. Decided test by test: p values are not corrected for their number.",
     ("finding",),
     (
         Column("finding", "text", "short name"),
-        Column("statement", "text", "what is claimed"),
-        Column("quantity", "text", "what the value is"),
+        Column("statement", "text", "what is claimed, as a sentence"),
+        Column("quantity", "text", "what the value is, and what kind its interval is of"),
         Column("value", "number", "value", null="there is no result"),
         Column("low", "number", "lower end of its 95 % interval", null="there is none"),
         Column("high", "number", "upper end of its 95 % interval", null="there is none"),
-        Column("unit", "text", "unit of the value"),
+        Column("unit", "text", "unit of the value; none for shares and ratios"),
         Column("p", "number", "p value of the test that decides", null="there is none", low=0.0,
                high=1.0),
-        Column("holds", "text", "whether it holds in this study",
+        Column("holds", "text",
+               "yes: p below the study's significance, on the claimed side; no: as sure, on the "
+               "other side, or surely too little to matter; undecided: this cohort cannot tell",
                allowed=("yes", "no", "undecided")),
         MESSAGE,
     ),

@@ -1,5 +1,7 @@
 """Tables of the bootstraps, filters, methods and landmark precision of a joint-pose study."""
 
+from dataclasses import replace
+
 from spinepipe.tables.columns import (
     JOINT,
     MESSAGE,
@@ -286,7 +288,7 @@ REQUIRED_PRECISION = Table(
     ),
 )  # fmt: skip
 
-AGAINST = Table(
+AGAINST_GOULD_2024A = Table(
     "against_gould_2024a",
     "The paper's numbers beside ours: one row per published quantity.",
     ("id",),
@@ -316,3 +318,5 @@ AGAINST = Table(
         Column("reason", "text", "what the range is, and why ours is outside it"),
     ),
 )  # fmt: skip
+
+AGAINST_GOULD_2024B = replace(AGAINST_GOULD_2024A, name="against_gould_2024b")

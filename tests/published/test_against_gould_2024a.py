@@ -25,7 +25,7 @@ from spinepipe.comparison.ranges import (
 )
 from spinepipe.jobs import against_gould_2024a
 from spinepipe.sensitivity.precision import required_precision
-from spinepipe.tables import AGAINST, TABLES, from_rows, read, read_frame
+from spinepipe.tables import AGAINST_GOULD_2024A, TABLES, from_rows, read, read_frame
 
 ROOT = Path(__file__).parents[2]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
@@ -478,7 +478,7 @@ def test_a_missing_or_empty_table_is_told(name: str) -> None:
         assert changed
         assert {row["verdict"] for row in changed} <= {"not_computed", "contradicted"}
         assert all(f"table {name}" in row["reason"] for row in changed)
-        from_rows(AGAINST, after)
+        from_rows(AGAINST_GOULD_2024A, after)
 
 
 def test_stiffness_per_joint_is_not_compared_with_one_of_all_joints() -> None:

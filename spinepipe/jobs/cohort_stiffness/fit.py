@@ -67,7 +67,7 @@ def _fit(
     """The problem and its fit, or why there is none."""
     chosen: tuple[Tested, ...] = tests.fitted_to(fitted_to)
     if not chosen:
-        return None, None, f"{specimen} has no motion to fit for {fitted_to}"
+        return None, None, f"{specimen}: {tests.why_none(fitted_to)}"
     try:
         problem = calibration_problem(
             settings, cohort, specimen, representation, tests.frames, chosen
@@ -102,7 +102,9 @@ def _stiffness(
 def _record(problem: Problem, found: Fit) -> Row:
     """The row of the table ``fits``."""
     unknowns = len(problem.free)
-    readings = found.uncertainty.degrees_of_freedom + int((found.at_bound == 0).sum())
+    readings = sum(
+        int(np.isfinite(case.measured[:, :, problem.weights > 0.0]).sum()) for case in problem.cases
+    )
     cost = found.cost if found.status.usable else None
     effective = None if cost is None else float(unknowns)
     several = f"{found.n_optima} optima: the answer depends on the start"

@@ -25,9 +25,9 @@ ANALYSES: dict[str, tuple[str, ...]] = {
 
 FIGURES: dict[str, tuple[str, ...]] = {
     "stiffness_by_level": ("stiffness",),
-    "error_map": ("errors",),
-    "held_out_error": ("ranking", "errors"),
-    "load_case_stiffness": ("stiffness",),
+    "error_map": ("errors", "sign_checks"),
+    "held_out_error": ("errors",),
+    "load_case_stiffness": ("stiffness", "errors", "statistics"),
 }
 """Figures and the tables each is drawn from."""
 
@@ -80,7 +80,8 @@ class CohortLayout(StudyFiles):
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per specimen, and one of the pooled fits."""
-        own = [] if table == "pooling" else [(name, _SINGLE_BLOCK) for name in self.specimens]
+        nobody = table == "pooling" or (table == "fits" and not self._single)
+        own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
         whole = table != "sign_checks" and REPRESENTATION in self.study.representations
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 

@@ -36,7 +36,7 @@ def run(
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
     k, used = _median(settings, cohort, representation, [read_frame(path) for path in others])
-    rows = _stiffness(settings, cohort, k, used)
+    rows = _stiffness(settings, cohort, k, used, len(others))
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
     seen = [] if not used else error_rows(cohort, specimen, tests, k)
     labelled = [
@@ -65,9 +65,11 @@ def _median(
 
 
 def _stiffness(
-    settings: CohortStiffness, cohort: Cohort, k: Array, used: int
+    settings: CohortStiffness, cohort: Cohort, k: Array, used: int, others: int
 ) -> list[dict[str, Any]]:
-    status, message = Status.CONVERGED, f"median of {used} specimens"
+    whole = f"median of {used} specimen{'s' if used != 1 else ''}"
+    part = f"; {others - used} of {others} have no stiffness" if used < others else ""
+    status, message = Status.CONVERGED, whole + part
     if not used:
         status, message = Status.REFUSED, "no other specimen has a stiffness"
     values = k if used else np.full(k.shape, np.nan)

@@ -29,9 +29,9 @@ def run(
     """Write what the pooled fit says of its specimens, or of the one that was left out."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     fitted = [name for name in cohort.specimen_names if name != without]
-    problems = _problems(settings, cohort, fitted, fitted_to)
+    problems, refusals = _problems(settings, cohort, fitted, fitted_to)
     found = pool(list(problems.values())) if problems else None
-    rows = PooledRows(settings, cohort, fitted_to, problems, found)
+    rows = PooledRows(settings, cohort, fitted_to, problems, refusals, found)
     everyone = without == NOBODY
     told = fitted if everyone else [without]
     values = [row for name in told for row in rows.stiffness(name)]
@@ -49,17 +49,19 @@ def run(
 
 def _problems(
     settings: CohortStiffness, cohort: Cohort, names: list[str], fitted_to: str
-) -> dict[str, Problem]:
-    """The problem of each specimen that has motion to fit."""
-    found = {}
+) -> tuple[dict[str, Problem], dict[str, str]]:
+    """The problem of each specimen that has motion to fit, and why the others have none."""
+    found, refusals = {}, {}
     for name in names:
         tests = specimen_tests(settings, cohort, name)
         chosen = tests.fitted_to(fitted_to)
-        if chosen:
-            try:
-                found[name] = calibration_problem(
-                    settings, cohort, name, REPRESENTATION, tests.frames, chosen
-                )
-            except RefusedModel:
-                continue  # its fits tell why
-    return found
+        if not chosen:
+            refusals[name] = f"{name}: {tests.why_none(fitted_to)}"
+            continue
+        try:
+            found[name] = calibration_problem(
+                settings, cohort, name, REPRESENTATION, tests.frames, chosen
+            )
+        except RefusedModel as error:
+            refusals[name] = str(error)
+    return found, refusals

@@ -28,7 +28,8 @@ class PooledRows:
 
     Attributes
     ----------
-    problems : of the specimens that were fitted; another one is a newcomer to them.
+    problems : of the specimens that were fitted. refusals : why some have no problem. A specimen
+        in neither is a newcomer to them.
     found : None where there was nothing to fit.
     """
 
@@ -36,6 +37,7 @@ class PooledRows:
     cohort: Cohort
     fitted_to: str
     problems: Mapping[str, Problem]
+    refusals: Mapping[str, str]
     found: Pooled | None
 
     def stiffness(self, specimen: str) -> list[Row]:
@@ -64,29 +66,23 @@ class PooledRows:
         """The row of table ``fits`` of a fitted specimen."""
         own = self._own(specimen)
         status, message = self._ended(specimen)
-        if own is None or self.found is None or not own.poses:
-            return {
-                **dict.fromkeys(
-                    ("readings", "unknowns", "iterations", "evaluations", "n_optima"), 0
-                ),
-                **dict.fromkeys(("effective_unknowns", "cost")),
-                **criteria(None, 0, None),
-                "specimen": specimen,
-                "status": Status.REFUSED.value if own is None else status.value,
-                "message": message,
-            }
+        ended = {"specimen": specimen, "status": status.value, "message": message}
+        if own is None or self.found is None:
+            counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
+            empty = dict.fromkeys(("effective_unknowns", "cost"))
+            return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
+        usable = own.status.usable
+        cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
         return {
-            "specimen": specimen,
             "readings": own.n_readings,
             "unknowns": len(own.x),
-            "effective_unknowns": own.effective_parameters,
-            "cost": own.cost,
-            **criteria(own.cost, own.n_readings, own.effective_parameters),
+            "effective_unknowns": effective,
+            "cost": cost,
+            **criteria(cost, own.n_readings, effective),
             "iterations": self.found.iterations,
             "evaluations": own.evaluations,
-            "n_optima": 1,
-            "status": status.value,
-            "message": message,
+            "n_optima": int(usable),
+            **ended,
         }
 
     def pooling(self) -> list[Row]:
@@ -105,7 +101,7 @@ class PooledRows:
         row: Row = {
             "coordinate": name,
             "unit": STIFFNESS_UNITS[name],
-            "specimens": len(self.problems),
+            "specimens": sum(bool(one.poses) for one in found.specimens) if found else 0,
             "iterations": 0,
             "status": Status.REFUSED.value,
             "message": NOBODY_FITTED,
@@ -114,11 +110,10 @@ class PooledRows:
         if found is None or spread is None:
             return row
         start = float(start_stiffness(self.study, self.cohort, "partially_pooled")[0, place])
-        one = len(self.problems) == 1
         return row | {
             "centre": start * float(np.exp(spread.mean)),
-            "between_levels": None if one else spread.level,
-            "between_specimens": None if one else spread.specimen,
+            "between_levels": spread.level or None,  # zero: not told from the rest
+            "between_specimens": spread.specimen or None,
             "between_joints": spread.rest,
             "scatter": found.scatter,
             "effective_unknowns": found.effective_parameters,
@@ -135,17 +130,26 @@ class PooledRows:
 
     def _ended(self, specimen: str) -> tuple[Status, str]:
         own = self._own(specimen)
+        if specimen in self.refusals:
+            return Status.REFUSED, self.refusals[specimen]
         if self.found is None:
             return Status.REFUSED, NOBODY_FITTED
         if own is None:
-            return self.found.status, "what the others lead one to expect"
+            notes = ["what the others lead one to expect", self.found.message]
+            return self.found.status, "; ".join(note for note in notes if note)
         return own.status, own.message
 
     def _values(self, specimen: str) -> tuple[Array, Array, Indices] | None:
-        """Stiffness, error of its logarithm and bounds reached (J, 6); None without a fit."""
-        if self.found is None:
+        """Stiffness, error of its logarithm and bounds reached (J, 6); None without a fit.
+
+        A newcomer has one as soon as somebody stands that it can be expected to be like.
+        """
+        if self.found is None or specimen in self.refusals:
             return None
         own = self._own(specimen)
+        standing = any(one.poses for one in self.found.specimens)
+        if not (standing if own is None else own.status.usable):
+            return None
         x = self.found.newcomer if own is None else own.x
         covariance = self.found.newcomer_covariance if own is None else own.covariance
         free = next(iter(self.problems.values())).free

@@ -82,16 +82,14 @@ def _numbers(
     read = [np.isfinite(values) for values in measured]
     if not any(known.any() for known in read):
         return None
-    at_peak = [values[one.peak] for values, (one, _) in zip(measured, here, strict=True)]
-    known_peak = np.isfinite(at_peak)
+    known_peak = np.array([known[one.peak] for known, (one, _) in zip(read, here, strict=True)])
     sizes = np.concatenate([np.abs(values[known]) for values, known in zip(measured, read,
                             strict=True)])  # fmt: skip
+    at_peak = np.array([values[one.peak] for values, (one, _) in zip(measured, here, strict=True)])
     row: Row = {
         "readings": len(sizes),
         "measured": float(sizes.mean()),
-        "measured_peak": float(np.mean(np.array(at_peak)[known_peak]))
-        if known_peak.any()
-        else None,
+        "measured_peak": float(at_peak[known_peak].mean()) if known_peak.any() else None,
     }
     if lost:
         return row | dict.fromkeys(("bias", "mae", "rmse", "peak_error"))

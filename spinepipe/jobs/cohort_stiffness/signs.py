@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from spinepipe.calibrate.zeroing import whitened
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.cohort_stiffness.predict import predicted
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests
+from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, Tested
 from spinepipe.units import COORDINATES
 
 CERTAIN = 3.0
@@ -18,6 +19,7 @@ FLIPPED = (
     "flipped in motion.csv (or the vertebrae are exchanged)"
 )
 UNDECIDED = "moves too little to tell with or against the load"
+ONE_READING = "one reading does not tell how sure it is"
 
 
 def sign_rows(
@@ -43,12 +45,12 @@ def sign_rows(
         if not here or here[0][0].loaded is None:
             continue
         place = COORDINATES.index(here[0][0].loaded)
+        read = [_independent(one, motion, cohort.zeroed_at_step_0) for one, motion in here]
         for joint, name in enumerate(cohort.joint_names):
-            measured = np.concatenate([one.measured[:, joint, place] for one, _ in here])
-            expected = np.concatenate([
-                np.full(len(one.measured), np.nan) if motion is None else motion[:, joint, place]
-                for one, motion in here
-            ])  # fmt: skip
+            measured, expected = (
+                np.concatenate([side[:, joint, place] for side in sides])
+                for sides in zip(*read, strict=True)
+            )
             known = np.isfinite(measured)
             if known.any():
                 found = _judged(measured[known], expected[known])
@@ -58,10 +60,23 @@ def sign_rows(
     return rows
 
 
+def _independent(one: Tested, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
+    """Measured and expected motion (T, J, 6), NaN where there is none.
+
+    Zeroed readings share the error of step 0, which would pass for motion: both are whitened.
+    """
+    read = np.isfinite(one.measured)
+    expected = np.full(read.shape, np.nan) if motion is None else motion
+    if not zeroed:
+        return one.measured, expected
+    measured = np.where(read, whitened(one.measured, read), np.nan)
+    return measured, expected if motion is None else whitened(motion, read)
+
+
 def _judged(measured: Array, expected: Array) -> dict[str, Any]:
     """Slope of measured on expected motion through zero, and what it tells."""
     n = len(measured)
-    slope, error, told = None, None, UNDECIDED
+    slope, error, told = None, None, UNDECIDED if n > 1 else ONE_READING
     if not np.isfinite(expected).all():
         told = "no pose was found with the published stiffness: nothing to compare with"
     elif expected @ expected > 0.0:

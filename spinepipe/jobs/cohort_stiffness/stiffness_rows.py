@@ -55,7 +55,8 @@ def interval(value: float, log_error: float, reach: float) -> Row:
     empty: Row = {"standard_error": None, "low": None, "high": None}
     if not np.isfinite(value):
         return {"stiffness": None, **empty}
-    low, high = value * np.exp(-reach * log_error), value * np.exp(reach * log_error)
+    with np.errstate(over="ignore"):  # an end beyond all numbers is none
+        low, high = value * np.exp([-reach * log_error, reach * log_error])
     if not np.isfinite(log_error) or not np.isfinite(high):
         return {"stiffness": float(value), **empty}
     return {

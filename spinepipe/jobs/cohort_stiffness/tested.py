@@ -13,9 +13,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
 from spinepipe.studies import CohortStiffness
+from spinepipe.units import COORDINATE_COLUMNS
 
 ALL = "all"
 ALL_BUT = "all_but_"
+FIRST_CYCLE = 1
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,13 @@ class SpecimenTests:
             return ()  # nothing would be held out
         return tuple(one for one in self.tested if one.case.test != left_out)
 
+    def why_none(self, label: str) -> str:
+        """Why a label of ``fitted_to`` means no test of this specimen, in words."""
+        left_out = label.removeprefix(ALL_BUT)
+        if label.startswith(ALL_BUT) and left_out not in self.tests:
+            return f"not measured in {left_out}: nothing would be held out"
+        return f"no motion to fit for {label}"
+
 
 def load_sets(study: CohortStiffness, tests: Sequence[str]) -> tuple[str, ...]:
     """Labels of what stiffness is fitted to: each test, all, and all but one."""
@@ -71,11 +80,12 @@ def load_sets(study: CohortStiffness, tests: Sequence[str]) -> tuple[str, ...]:
 
 
 def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
-    """The study's tests: those chosen, else all that have motion."""
+    """The study's tests: those chosen, else all that have a reading."""
     if study.tests:
         return study.tests
     assert cohort.motion is not None
-    moved = set(cohort.motion["test"])
+    read = cohort.motion[list(COORDINATE_COLUMNS)].notna().any(axis=1)
+    moved = set(cohort.motion.loc[read, "test"])
     return tuple(test for test in cohort.tests if test in moved)
 
 
@@ -110,7 +120,9 @@ def _chosen(cycles: str, found: Sequence[Tested]) -> list[Tested]:
     chosen: list[Tested] = []
     for test in dict.fromkeys(one.case.test for one in found):
         of_test = [one for one in found if one.case.test == test]
-        later = of_test if cycles == "all" else of_test[1:] or of_test
+        later = [one for one in of_test if one.case.cycle != FIRST_CYCLE] or of_test
+        if cycles == "all":
+            later = of_test
         if cycles == "quietest":
             later = [min(later, key=lambda one: coupled_range(one.case))]
         chosen += later

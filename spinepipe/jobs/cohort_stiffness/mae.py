@@ -1,0 +1,62 @@
+"""Job: mean absolute errors in the loaded coordinate, as in Table 4 of Gould et al. 2024b."""
+
+from typing import Any
+
+import pandas as pd
+
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import MAE, from_rows, read_frames, write
+
+STEPS = {"peak": ("peak_error", "measured_peak"), "all": ("mae", "measured")}
+"""Columns of the error and of the motion, at the largest load and over all load steps."""
+
+GROUP = ["representation", "fitted_to", "source", "stage", "test"]
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``mae.parquet``."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    rows = mae_rows(read_frames(tables)["errors"])
+    write(from_rows(MAE, rows), output, provenance("cohort_stiffness.mae", settings, cohort))
+
+
+def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows of the table ``mae`` from those of ``errors``."""
+    loaded = errors[errors["loaded"].astype(bool)]
+    largest = {steps: largest_motion(loaded, columns[1]) for steps, columns in STEPS.items()}
+    rows = []
+    for key, part in loaded.groupby(GROUP, sort=False):
+        named = dict(zip(GROUP, map(str, key), strict=True))
+        named["coordinate"] = part["coordinate"].iloc[0]
+        for steps, (error, motion) in STEPS.items():
+            found = specimen_mae(part, error, motion)
+            motions = largest[steps].get(named["test"])
+            rows.append({**named, "steps": steps, **_spread(found, motions)})
+    return rows
+
+
+def largest_motion(loaded: pd.DataFrame, motion: str) -> dict[str, float]:
+    """Largest over specimens of the mean size of the measured motion over joints, by test."""
+    once = loaded.drop_duplicates(["specimen", "test", "joint"])
+    mean = once[motion].abs().groupby([once["test"], once["specimen"]]).mean()
+    return dict(mean.dropna().groupby(level="test").max())
+
+
+def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:
+    """Mean absolute error over the joints with a motion, by specimen; all of them must be known."""
+    measured = part[part[motion].notna()]
+    by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
+    known: pd.Series = by_joint.mean()[by_joint.count() == by_joint.size()]
+    return known
+
+
+def _spread(values: pd.Series, largest: float | None) -> dict[str, Any]:
+    empty = dict.fromkeys(("mae_deg", "low_quartile_deg", "high_quartile_deg", "mae_percent"))
+    row: dict[str, Any] = {"specimens": len(values), "largest_motion_deg": largest, **empty}
+    if values.empty:
+        return row
+    low, median, high = values.quantile([0.25, 0.5, 0.75])
+    row |= {"mae_deg": median, "low_quartile_deg": low, "high_quartile_deg": high}
+    return row | {"mae_percent": 100.0 * median / largest if largest else None}

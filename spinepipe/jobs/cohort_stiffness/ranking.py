@@ -1,0 +1,151 @@
+"""Job: which representation is best, by errors and by information criteria."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.cohort_stiffness.specimen_errors import specimen_rms
+from spinepipe.jobs.cohort_stiffness.stages import (
+    LEFT_OUT_SPECIMEN,
+    LITERATURE,
+    joint_label,
+    of_joint_fits,
+)
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statistics import wilcoxon_signed_rank
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables import RANKING, from_rows, read_frames, write
+from spinepipe.tables.cohort_stiffness import CRITERIA, REPRESENTATIONS
+
+INFORMATION = ("aicc", "bic")
+NOT_FITTED = ("literature", "literature_levels")
+NO_RESULT = "no specimen has a result"
+NONE_COMPLETE = "no specimen has a result in every representation"
+
+Row = dict[str, Any]
+Candidate = tuple[str, str]
+"""Representation and source."""
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``ranking.parquet``."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    frames = read_frames(tables)
+    rows = ranking_rows(frames["errors"], frames["fits"])
+    origin = provenance("cohort_stiffness.ranking", settings, cohort)
+    write(from_rows(RANKING, rows), output, origin)
+
+
+def ranking_rows(errors: pd.DataFrame, fits: pd.DataFrame) -> list[Row]:
+    """Rows of the table ``ranking`` from those of ``errors`` and ``fits``."""
+    present = {*errors["representation"], *fits["representation"]}
+    names = [name for name in REPRESENTATIONS if name in present]
+    specimens = {*errors["specimen"], *fits["specimen"]}
+    rows = []
+    for criterion in CRITERIA:
+        if criterion in INFORMATION:
+            found = _information(fits, criterion, [n for n in names if n not in NOT_FITTED])
+        else:
+            found = _errors(errors, criterion, names)
+        order = ranked(found, criterion in INFORMATION, specimens)
+        rows += [{"criterion": criterion, **row} for row in order]
+    return rows
+
+
+def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Candidate, pd.Series]:
+    """Error by specimen of each representation; the literature's is the same everywhere."""
+    found = {}
+    for name in names:
+        stage = LITERATURE if name in NOT_FITTED else criterion
+        chosen = of_joint_fits(errors, stage)
+        chosen = chosen[chosen["representation"] == name]
+        found[name, _source(name, criterion)] = specimen_rms(chosen, errors)
+    return found
+
+
+def _source(name: str, criterion: str) -> str:
+    if name in NOT_FITTED:
+        return "literature"
+    if criterion != LEFT_OUT_SPECIMEN:
+        return "own"
+    return "others_pooled" if name == "partially_pooled" else "others_median"
+
+
+def _information(
+    fits: pd.DataFrame, criterion: str, names: list[str]
+) -> dict[Candidate, pd.Series]:
+    """Criterion by specimen of each representation fitted to all load cases."""
+    joint = fits[fits["fitted_to"] == joint_label(fits)].dropna(subset=criterion)
+    found = {}
+    for name in names:
+        of_name = joint[joint["representation"] == name]
+        found[name, "own"] = of_name.set_index("specimen")[criterion].astype(float)
+    return found
+
+
+def ranked(
+    found: dict[Candidate, pd.Series], summed: bool, specimens: Iterable[str] = ()
+) -> list[Row]:
+    """Candidates in order, over the specimens that have a value of all of them.
+
+    Parameters
+    ----------
+    found : value by specimen of each candidate; one without any value takes no part.
+    summed : whether the criterion is the sum over specimens, else their mean.
+    specimens : all there are; those without any value are told of too.
+    """
+    compared = [candidate for candidate, values in found.items() if len(values)]
+    table = pd.DataFrame({candidate: found[candidate] for candidate in compared})
+    complete = table.dropna()
+    none = [_row(one, summed, NO_RESULT) for one in found if one not in compared]
+    if complete.empty:
+        return [_row(one, summed, NONE_COMPLETE) for one in compared] + none
+    missing = sorted({*table.index, *specimens} - set(complete.index))
+    told = f"left out, without a result in every representation: {', '.join(missing)}"
+    values = {one: complete[one].to_numpy(float) for one in compared}
+    best = min(compared, key=lambda one: values[one].mean())
+    rows = []
+    for one in sorted(compared, key=lambda one: values[one].mean()):
+        ahead = sum(bool(other.mean() < values[one].mean()) for other in values.values())
+        row = _row(one, summed, told if missing else "")
+        row |= {"rank": 1 + ahead, "specimens": len(complete)}
+        row |= dict(zip(("value", "standard_error"), _total(values[one], summed), strict=True))
+        rows.append(row if one == best else row | _against(values[one], values[best], summed, row))
+    rows[0]["worse_than_best"] = 0.0
+    return rows + none
+
+
+def _row(candidate: Candidate, summed: bool, message: str) -> Row:
+    """One row, without its numbers yet."""
+    empty = ("rank", "value", "standard_error", "worse_than_best", "worse_standard_error", "p")
+    return {
+        "representation": candidate[0],
+        "source": candidate[1],
+        "unit": "" if summed else "deg",
+        "specimens": 0,
+        "message": message,
+        **dict.fromkeys(empty),
+    }
+
+
+def _against(values: Array, best: Array, summed: bool, row: Row) -> Row:
+    """How much worse than the best, paired specimen by specimen; values, best: (specimens,)."""
+    worse, error = _total(values - best, summed)
+    tested = wilcoxon_signed_rank(values, best)
+    without = "" if tested.p is not None else f"no p: {tested.message}"
+    message = "; ".join(part for part in (row["message"], without) if part)
+    # A mean of equal values may round to -1e-17.
+    told = {"worse_than_best": max(worse, 0.0), "worse_standard_error": error, "p": tested.p}
+    return {**told, "message": message}
+
+
+def _total(values: Array, summed: bool) -> tuple[float, float | None]:
+    """Mean or sum of values (specimens,) and its standard error."""
+    n = len(values)
+    scale = float(n) if summed else 1.0
+    error = float(scale * values.std(ddof=1) / np.sqrt(n)) if n > 1 else None
+    return float(scale * values.mean()), error

@@ -1,0 +1,179 @@
+"""Settings of cohort studies: every fault located and explained, and what the cohort must have."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chain_cases import DEGREES, MOMENT_OF, STUDY, Chains
+
+from spinepipe import studies
+from spinepipe.problems import InputError, Problem
+from spinepipe.studies import CohortStiffness
+
+A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
+FILE = f"config/studies/{STUDY}.yaml"
+LEVEL = "{extension_nm_per_rad: 50, right_bending_nm_per_rad: 50, left_rotation_nm_per_rad: 50}"
+
+
+def chains(study: str = "", **choices: object) -> Chains:
+    return Chains({"a": A, "b": A}, study=study, **choices)  # type: ignore[arg-type]
+
+
+def complaints(made: Chains, root: Path) -> tuple[Problem, ...]:
+    made.write(root)
+    with pytest.raises(InputError) as caught:
+        studies.check(root, STUDY)
+    return caught.value.problems
+
+
+@dataclass(frozen=True)
+class Case:
+    """Lines of a study file from line 4 on; line and key of the fault, what is said and advised."""
+
+    about: str
+    study: str
+    row: int
+    key: str
+    says: str
+    remedy: str = ""
+
+
+# One fault a line, however long: this is a table to look things up in.
+# fmt: off
+# ruff: noqa: E501
+CASES = [
+    Case("unknown key", "cycle: all", 4, "cycle", "did you mean 'cycles'"),
+    Case("negative seed", "seed: -1", 4, "seed", "greater than or equal to 0"),
+    Case("broken seed", "seed: 1.5", 4, "seed", "valid integer"),
+    Case("no tests", "tests: []", 4, "tests", "at least 1 item"),
+    Case("test twice", "tests: [flexion, flexion]", 4, "tests", "'flexion' stands there twice"),
+    Case("test without a name", "tests: ['']", 4, "tests.0", "at least 1 character"),
+    Case("unknown test", "tests: [flexion, flexon]", 4, "tests.1", "unknown test 'flexon'", "did you mean 'flexion'"),
+    Case("unknown cycles", "cycles: quiet", 4, "cycles", "did you mean 'quietest'"),
+    Case("unknown steps", "steps: last", 4, "steps", "'all' or 'peak'"),
+    Case("no representation", "representations: []", 4, "representations", "at least 1 item"),
+    Case("unknown representation", "representations: [per_level]", 4, "representations.0", "'per_joint'"),
+    Case("literature is no fit", "representations: [literature]", 4, "representations.0", "'per_joint'"),
+    Case("representation twice", "representations: [per_joint, per_joint]", 4, "representations", "'per_joint' stands there twice"),
+    Case("nothing free", "free: []", 4, "free", "at least 1 item"),
+    Case("unknown coordinate", "free: [flexion]", 4, "free.0", "'extension'"),
+    Case("coordinate twice", "free: [extension, extension]", 4, "free", "'extension' stands there twice"),
+    Case("unknown cost", "cost: unweighted", 4, "cost", "'measurement_sd' or 'published'"),
+    Case("translation at the published cost", "cost: published\nfree: [extension, superior]", 5, "free", "found superior", "choose cost: measurement_sd"),
+    Case("SD of zero", "measurement_sd: {rotation_deg: 0, translation_mm: 1}", 4, "measurement_sd.rotation_deg", "greater than 0"),
+    Case("half an SD", "measurement_sd: {rotation_deg: 1}", 4, "measurement_sd.translation_mm", "the key is missing"),
+    Case("no stiffness", "stiffness: {right_n_per_m: 0}", 4, "stiffness.right_n_per_m", "greater than or equal to 1"),
+    Case("stiffness without unit", "stiffness: {anterior: 5}", 4, "stiffness.anterior", "did you mean 'anterior_n_per_m'"),
+    Case("unknown joint", f"level_stiffness:\n  L5S1: {LEVEL}\n  L4L6: {LEVEL}\nrepresentations: [per_joint]", 6, "level_stiffness.L4L6", "unknown joint 'L4L6'", "did you mean 'L4L5'"),
+    Case("missing joints", f"level_stiffness:\n  L5S1: {LEVEL}", 4, "level_stiffness", "no value for L4L5, L3L4", "leave level_ratio out"),
+    Case("half a level", "level_stiffness: {L5S1: {extension_nm_per_rad: 5}}", 4, "level_stiffness.L5S1.right_bending_nm_per_rad", "the key is missing"),
+    Case("bounds of one", "bound_factor: 1", 4, "bound_factor", "greater than 1"),
+    Case("no start", "starts: 0", 4, "starts", "greater than or equal to 1"),
+    Case("too many starts", "starts: 51", 4, "starts", "less than or equal to 50"),
+    Case("everything identifiable", "identifiable_below: 0", 4, "identifiable_below", "greater than 0"),
+    Case("NaN", "identifiable_below: .nan", 4, "identifiable_below", "finite"),
+    Case("unknown hold-out", "cross_validation: {levels: true}", 4, "cross_validation.levels", "unknown key"),
+    Case("number for yes", "cross_validation: {specimens: 1}", 4, "cross_validation.specimens", "valid boolean"),
+    Case("surely significant", "significance: 1", 4, "significance", "less than 1"),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.about.replace(" ", "-"))
+def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path) -> None:
+    problems = complaints(chains(case.study + "\n"), tmp_path)
+    listing = "\n".join(map(str, problems))
+    here = [p for p in problems if (p.file, p.row, p.column) == (FILE, case.row, case.key)]
+    assert any(case.says in str(p) and case.remedy in p.remedy for p in here), listing
+    assert all(p.found and p.allowed and p.remedy for p in problems), listing
+
+
+def test_weights_need_an_sd(tmp_path: Path) -> None:
+    (problem,) = complaints(chains(sd=False), tmp_path)
+    assert problem.column == "measurement_sd"
+    assert "choose cost: published" in problem.remedy
+
+
+def test_stiffness_is_fitted_to_motion(tmp_path: Path) -> None:
+    made = chains()
+    made.write(tmp_path)
+    (tmp_path / "config" / "cohorts" / "chains" / "motion.csv").unlink()
+    with pytest.raises(InputError, match=r"line 3, cohort: .*no motion.csv"):
+        studies.check(tmp_path, STUDY)
+
+
+def test_a_specimen_without_any_reading_is_named(tmp_path: Path) -> None:
+    made = chains()
+    made.motion = made.motion[made.motion["specimen"] == "a"]
+    (problem,) = complaints(made, tmp_path)
+    assert problem.found == "no motion of specimen 'b' in any chosen test"
+
+
+def test_a_specimen_read_in_what_is_not_free_only_is_named(tmp_path: Path) -> None:
+    made = chains("free: [extension]\n")
+    made.motion.loc[made.motion["specimen"] == "b", "extension_deg"] = np.nan
+    (problem,) = complaints(made, tmp_path)
+    assert "specimen 'b'" in problem.found
+
+
+def test_zeros_of_zeroing_are_no_motion(tmp_path: Path) -> None:
+    made = chains(zeroed=True)
+    later = (made.motion["specimen"] == "b") & (made.motion["step"] > 0)
+    made.motion.loc[later, list(DEGREES)] = np.nan
+    (problem,) = complaints(made, tmp_path)
+    assert "specimen 'b'" in problem.found
+
+
+def test_a_test_that_is_asked_for_must_have_been_measured(tmp_path: Path) -> None:
+    made = chains("tests: [left_axial_rotation, flexion]\n")
+    made.motion.loc[made.motion["test"] == "flexion", list(DEGREES)] = np.nan
+    (problem,) = complaints(made, tmp_path)
+    assert (problem.row, problem.column) == (4, "tests.1")
+    assert problem.found == "test 'flexion', which has no motion"
+
+
+@pytest.mark.parametrize("name", ["all", "nothing", "all_but_flexion", "a/b", "a=b", "{a}", ".a"])
+def test_names_of_tests_that_results_could_not_bear(name: str, tmp_path: Path) -> None:
+    made = chains()
+    for table in (made.loads, made.motion):
+        table["test"] = table["test"].replace("left_lateral_bending", name)
+    (problem,) = complaints(made, tmp_path)
+    assert (problem.file, problem.column) == ("chains/loads.csv", "test")
+    assert problem.found == f"test '{name}'"
+    assert "rename" in problem.remedy
+
+
+def test_a_test_that_is_not_chosen_may_be_called_anything(tmp_path: Path) -> None:
+    made = chains("tests: [flexion]\n")
+    for table in (made.loads, made.motion):
+        table["test"] = table["test"].replace("left_lateral_bending", "all")
+    made.write(tmp_path)
+    assert studies.check(tmp_path, STUDY)
+
+
+def test_nobody_is_no_specimen(tmp_path: Path) -> None:
+    (problem,) = complaints(Chains({"a": A, "nobody": A}), tmp_path)
+    assert (problem.file, problem.found) == ("chains/specimens.csv", "'nobody'")
+
+
+def test_faults_of_study_and_cohort_come_together(tmp_path: Path) -> None:
+    made = chains(f"tests: [flexon]\nlevel_stiffness: {{L4L6: {LEVEL}}}\n", sd=False)
+    keys = [problem.column for problem in complaints(made, tmp_path)]
+    assert set(keys) >= {"tests.0", "level_stiffness.L4L6", "level_stiffness", "measurement_sd"}
+
+
+def test_published_levels_that_the_cohort_lacks_are_no_fault(tmp_path: Path) -> None:
+    """The paper's six joints stand in every study, whatever spine it is of."""
+    chains().write(tmp_path)
+    study, cohort = studies.check(tmp_path, STUDY)
+    assert isinstance(study, CohortStiffness)
+    assert not set(study.level_stiffness) <= set(cohort.joint_names)
+    assert set(MOMENT_OF) == set(cohort.tests)
+
+
+def test_every_field_is_described() -> None:
+    schema = CohortStiffness.model_json_schema()
+    for part in (schema, *schema["$defs"].values()):
+        for name, field in part["properties"].items():
+            assert field.get("description"), name

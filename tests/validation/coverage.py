@@ -1,0 +1,120 @@
+"""How often 95 % intervals hold the true stiffness, over regenerated phantoms."""
+
+import os
+from collections.abc import Iterable, Sequence
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+from spinepipe import cohort as cohorts
+from spinepipe.calibrate import fit, pool
+from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
+from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.jobs.digest import code_digest
+from spinepipe.statics import moved
+from spinepipe.studies import CohortStiffness
+from spinepipe.units import COORDINATES
+from tests.generators.phantom import phantom, write
+
+ROOT = Path(__file__).resolve().parents[2]
+CENTRE_ERRORS_MM = (0.0, 3.0)
+PHANTOMS = 50
+Z = 1.959963984540054
+STUDY = CohortStiffness(study="coverage", kind="cohort_stiffness", cohort="phantom")
+
+
+def table(seeds: Sequence[int] = range(PHANTOMS)) -> pd.DataFrame:
+    """Coverage by joint-centre error, representation and coordinate, with Clopper-Pearson ends."""
+    rows = _every_row(seeds)
+    groups = [rows, rows.assign(coordinate="all")]
+    keys = ["centre_error_mm", "representation", "coordinate"]
+    found = []
+    for key, part in pd.concat(groups).groupby(keys, sort=False):
+        known = part[part["identifiable"]]
+        hits, n = int(known["inside"].sum()), len(known)
+        ends = binomtest(hits, n).proportion_ci(method="exact")
+        found.append({
+            **dict(zip(keys, key, strict=True)),
+            "parameters": len(part),
+            "identifiable": n,
+            "coverage_percent": 100.0 * hits / n,
+            "low_percent": 100.0 * ends.low,
+            "high_percent": 100.0 * ends.high,
+            "median_error_percent": 100.0 * float(known["log_error"].abs().median()),
+        })  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def _every_row(seeds: Sequence[int]) -> pd.DataFrame:
+    """Rows of all phantoms; those computed by this very code before are read again."""
+    digest = code_digest("spinepipe.jobs.cohort_stiffness.pool")[:12]
+    folder = ROOT / "results" / "validation" / "coverage" / digest
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = [(seed, error, folder) for error in CENTRE_ERRORS_MM for seed in seeds]
+    with get_context("spawn").Pool(min(2, os.cpu_count() or 1)) as workers:
+        files = _told(workers.imap(_one, wanted), len(wanted))
+    return pd.concat([pd.read_parquet(file) for file in files], ignore_index=True)
+
+
+def _told(files: Iterable[Path], n: int) -> list[Path]:
+    done = []
+    for file in files:
+        done.append(file)
+        if len(done) % 10 == 0:
+            print(f"coverage: {len(done)} of {n} phantoms", flush=True)
+    return done
+
+
+def _one(task: tuple[int, float, Path]) -> Path:
+    """The rows of one phantom, as a file that appears whole."""
+    seed, error, folder = task
+    path = folder / f"seed={seed:04d}-centre_error_mm={error:g}.parquet"
+    if not path.exists():
+        rows = _rows(seed, error, folder / f"cohort_{seed}_{error:g}")
+        partial = path.with_suffix(".part")
+        rows.to_parquet(partial)
+        partial.rename(path)
+    return path
+
+
+def _rows(seed: int, error: float, folder: Path) -> pd.DataFrame:
+    made = phantom(seed, frame_error_mm=error)
+    write(made, folder)
+    cohort = cohorts.read(folder)
+    truth = np.log(made.stiffness[:, :, 3:])
+    frames = []
+    problems = []
+    for number, name in enumerate(cohort.specimen_names):
+        tests = specimen_tests(STUDY, cohort, name)
+        problem = calibration_problem(STUDY, cohort, name, "per_joint", tests.frames, tests.tested)
+        problems.append(problem)
+        found = fit(problem, STUDY.starts, seed, STUDY.identifiable_below)
+        k = moved(problem.model, problem.free, found.x).effects[0].values
+        at = [(p.rows[0], p.column) for p in problem.free]
+        off = [np.log(k[j, c]) - truth[number, j, c - 3] for j, c in at]
+        frames.append(_frame("per_joint", at, off, found.uncertainty.standard_error))
+    pooled = pool(problems)
+    for number, (problem, own) in enumerate(zip(problems, pooled.specimens, strict=True)):
+        k = moved(problem.model, problem.free, own.x).effects[0].values
+        at = [(p.rows[0], p.column) for p in problem.free]
+        off = [np.log(k[j, c]) - truth[number, j, c - 3] for j, c in at]
+        frames.append(_frame("partially_pooled", at, off, np.sqrt(np.diag(own.covariance))))
+    for file in folder.iterdir():
+        file.unlink()
+    folder.rmdir()
+    return pd.concat(frames, ignore_index=True).assign(seed=seed, centre_error_mm=error)
+
+
+def _frame(
+    representation: str, at: Sequence[tuple[int, int]], off: Sequence[float], error: np.ndarray
+) -> pd.DataFrame:
+    return pd.DataFrame({
+        "representation": representation,
+        "coordinate": [COORDINATES[column] for _, column in at],
+        "log_error": off,
+        "inside": np.abs(off) <= Z * error,
+        "identifiable": error < STUDY.identifiable_below,
+    })  # fmt: skip

@@ -1,0 +1,166 @@
+"""A small cohort study run by Snakemake: all of its joined tables, and what is computed again."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from small_project import SKIPPED, Project, copy_project, written
+
+from spinepipe.tables import TABLES
+
+pytestmark = pytest.mark.slow
+
+JOINED = ("stiffness", "fits", "errors", "sign_checks", "pooling")
+TARGETS = [f"results/small/{table}.parquet" for table in JOINED]
+SPECIMENS = {"a": 50.0, "b": 40.0, "c": 70.0}
+JOINTS = ("L4L5", "L3L4")
+ODD = "bending (left) 2 N·m, 50 %"
+"""A name that labs may give a test, and that becomes the name of a folder."""
+
+TESTS = {"flexion": ("mz_nm", -1.0, "extension_deg"), ODD: ("mx_nm", -1.0, "right_bending_deg")}
+STUDY = """\
+study: small
+kind: cohort_stiffness
+cohort: chains
+significance: 0.05
+representations: [per_joint, partially_pooled]
+"""
+FIT = "small/fits/specimen=b/representation=per_joint/fitted_to=flexion"
+
+
+def write_cohort(folder: Path) -> None:
+    """Straight chains in pure moments: each joint turns by moment over stiffness."""
+    folder.mkdir(parents=True)
+    (folder / "cohort.yaml").write_text(
+        "cohort: chains\ntitle: straight chains\nsource: written for the tests\n"
+        "vertebrae: [L5, L4, L3]\ngravity: false\n"
+        "measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1}\n"
+    )
+    (folder / "specimens.csv").write_text("\n".join(["specimen", *SPECIMENS]) + "\n")
+    names = ("extension_deg", "right_bending_deg", "left_rotation_deg")
+    loads, motion, joints = [], [], []
+    for specimen, k in SPECIMENS.items():
+        for level, joint in enumerate(JOINTS):
+            place = {"x_mm": 0, "y_mm": 36 * level, "z_mm": 0, **dict.fromkeys(names, 0)}
+            joints.append({"specimen": specimen, "joint": joint, **place})
+        for test, (column, sign, driven) in TESTS.items():
+            for step in range(3):
+                key = {"specimen": specimen, "test": test, "step": step}
+                moment = {**dict.fromkeys(("mx_nm", "my_nm", "mz_nm"), 0.0), column: sign * step}
+                force = dict.fromkeys(("fx_n", "fy_n", "fz_n"), 0.0)
+                loads.append({**key, "vertebra": "L3", **force, **moment})
+                for joint in JOINTS:
+                    turned = {**dict.fromkeys(names, 0.01), driven: np.rad2deg(sign * step / k)}
+                    motion.append({**key, "joint": joint, **turned})
+    for name, rows in (("loads", loads), ("motion", motion), ("joints", joints)):
+        pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
+
+
+def build(project: Project) -> set[str]:
+    """Build the joined tables; returns the files that were computed."""
+    before = project.files() if project.path("results").exists() else {}
+    done = project.snakemake("-j2", *TARGETS)
+    assert done.returncode == 0, done.stdout
+    return written(before, project.files())
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    project = copy_project(tmp_path_factory.mktemp("cohort") / "project")
+    write_cohort(project.path("config/cohorts/chains"))
+    project.path("config/studies/small.yaml").write_text(STUDY)
+    build(project)
+    return project
+
+
+@pytest.fixture
+def cohort_project(built: Project, tmp_path: Path) -> Project:
+    """A project whose joined tables have been computed; each test has its own."""
+    shutil.copytree(built.folder, tmp_path / "project", ignore=SKIPPED)
+    return Project(tmp_path / "project")
+
+
+def table(project: Project, name: str) -> pd.DataFrame:
+    return pd.read_parquet(project.path(f"results/small/{name}.parquet"))
+
+
+def test_every_table_is_made_and_keeps_its_schema(built: Project) -> None:
+    for name in JOINED:
+        found = pq.read_table(built.path(f"results/small/{name}.parquet"))
+        assert found.schema.remove_metadata() == TABLES[name].schema, name
+        assert {b"seed", b"cohort_digest"} <= set(found.schema.metadata), name
+        for column in found.columns:
+            if pd.api.types.is_float_dtype(column.type.to_pandas_dtype()):
+                assert np.isfinite(column.drop_null().to_numpy()).all(), name
+    assert not list(built.path("results").rglob("*.log"))
+
+
+def test_rows_are_those_that_were_asked_for(built: Project) -> None:
+    """Two tests: fits to each and to both; three specimens, one of two representations pooled."""
+    fits = table(built, "fits")
+    assert set(fits["fitted_to"]) == {*TESTS, "all"}
+    assert len(fits) == 3 * 2 * 3
+    stiffness = table(built, "stiffness")
+    of_one = len(JOINTS) * 3
+    assert stiffness["source"].value_counts().to_dict() == {
+        "literature": 3 * 2 * of_one,
+        "own": 3 * 2 * 3 * of_one,
+        "others_median": 3 * 3 * of_one,
+        "others_pooled": 3 * 3 * of_one,
+    }
+    assert len(table(built, "sign_checks")) == 3 * 2 * len(JOINTS)
+    assert set(table(built, "pooling")["without"]) == {"nobody", *SPECIMENS}
+
+
+def test_specimens_keep_their_stiffness_through_the_joins(built: Project) -> None:
+    rows = table(built, "stiffness").query(
+        "representation == 'per_joint' and fitted_to == 'flexion' and coordinate == 'extension'"
+    )
+    own = rows[rows["source"] == "own"].groupby("specimen")["stiffness"].mean()
+    assert own.to_dict() == pytest.approx(SPECIMENS, rel=1e-3)
+    others = rows[rows["source"] == "others_median"].groupby("specimen")["stiffness"].mean()
+    assert others.to_dict() == pytest.approx({"a": 55.0, "b": 60.0, "c": 45.0}, rel=1e-3)
+
+
+def test_a_deleted_fit_reruns_what_hangs_on_it(cohort_project: Project) -> None:
+    content = cohort_project.contents()
+    joined = [f"results/small/{name}.parquet" for name in ("stiffness", "fits", "errors")]
+    lost = cohort_project.path(f"results/{FIT}/stiffness.parquet")
+    lost.unlink()
+    before = cohort_project.files()
+    done = cohort_project.snakemake("-j2", f"results/{FIT}/stiffness.parquet", *joined)
+    assert done.returncode == 0, done.stdout
+    again = written(before, cohort_project.files())
+    jobs = {name for name in again if "specimen=" in name and "blocks" not in name}
+    fitted = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors")}
+    medians = {
+        FIT.replace("fits/specimen=b", f"left_out/specimen={name}") + f"/{file}.parquet"
+        for name in ("a", "c")
+        for file in ("stiffness", "errors")
+    }
+    assert jobs == fitted | medians
+    assert cohort_project.contents() == content
+
+
+def test_a_second_run_computes_nothing_even_with_another_significance(
+    cohort_project: Project,
+) -> None:
+    cohort_project.edit("config/studies/small.yaml", "significance: 0.05", "significance: 0.01")
+    assert build(cohort_project) == set()
+
+
+def test_a_changed_reading_reruns_a_fit(cohort_project: Project) -> None:
+    path = cohort_project.path("config/cohorts/chains/motion.csv")
+    motion = pd.read_csv(path)
+    here = (motion["specimen"] == "b") & (motion["test"] == "flexion") & (motion["step"] == 2)
+    motion.loc[here, "extension_deg"] *= 0.5
+    motion.to_csv(path, index=False)
+    done = cohort_project.snakemake("-j1", f"results/{FIT}/stiffness.parquet")
+    assert done.returncode == 0, done.stdout
+    rows = pd.read_parquet(cohort_project.path(f"results/{FIT}/stiffness.parquet"))
+    found = rows.loc[rows["coordinate"] == "extension", "stiffness"]
+    # least squares of 1 / k on 1 and 2 N m: (1 * 1 + 2 * 1) / (1 + 4) of what it was
+    np.testing.assert_allclose(found, SPECIMENS["b"] * 5 / 3, rtol=1e-3)
