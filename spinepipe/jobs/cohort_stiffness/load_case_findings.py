@@ -57,7 +57,7 @@ def load_case_findings(
 
 
 def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
-    """Yes where the F tests together are significant; no where they are not and explain little."""
+    """Yes where the F tests together are significant; no where none is and they explain little."""
     known = tests.dropna(subset="p")
     if known.empty:
         return claim.unknown(joined(*tests["message"].unique()) or "no such fits in this study")
@@ -67,7 +67,8 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
     p = float(stats.combine_pvalues(known["p"].clip(lower=tiny).to_list()).pvalue)  # Fisher's
     ends = stats.binomtest(below, n).proportion_ci(0.95)
     explained = float(known["effect"].mean())
-    holds = "yes" if p < significance else "no" if explained < LITTLE else "undecided"
+    absent = below == 0 and explained < LITTLE
+    holds = "yes" if p < significance else "no" if absent else "undecided"
     told = f"{below} of {n} specimens; separate fits explain {100 * explained:.2g} % of the squares"
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
     interval = float(ends.low), float(ends.high)
