@@ -54,6 +54,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    lift_rate_limit()
     logger.addFilter(to_the_point)
 
 

@@ -1,6 +1,8 @@
-"""`python -m benchmarks [PART ...]`: measure, print, write benchmarks/results/PART.{md,json}."""
+"""`python -m benchmarks [PART ...] [--cohort PATH]`: measure, print, write results/PART.*."""
 
+import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
@@ -8,7 +10,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from benchmarks import engine, identification, lost_fits, study
+from benchmarks import engine, identification, lost_fits, real_geometry, study
 from benchmarks.timing import machine
 
 RESULTS = Path(__file__).parent / "results"
@@ -21,8 +23,14 @@ def main() -> None:
         "identification": identification_parts,
         "lost_fits": lost_fits_parts,
         "whole_study": whole_study,
+        "real_geometry": lambda: real_geometry_part(options.cohort),
     }
-    for name in sys.argv[1:] or parts:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("part", nargs="*", help=", ".join(parts))
+    given = os.environ.get(real_geometry.COHORT_VARIABLE)
+    parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
+    options = parser.parse_args()
+    for name in options.part or parts:
         if name not in parts:
             sys.exit(f"no benchmark {name!r}: {', '.join(parts)}")
         parts[name]()
@@ -94,11 +102,35 @@ def whole_study() -> None:
     _write("whole_study", lines, {"machine": about, "study": rows})
 
 
-def _study_rows(lines: list[str], runs: Iterable[study.Run]) -> list[dict[str, Any]]:
+def real_geometry_part(given: str | None) -> None:
+    """Range of motion of the spines of a cohort that is not part of the project."""
+    if given is None or not Path(given, "cohort.yaml").is_file():
+        where = f"no cohort at {given}" if given else "no cohort given"
+        variable = real_geometry.COHORT_VARIABLE
+        print(f"real_geometry is left out: {where}; pass --cohort PATH or set {variable}")
+        return
+    about = _about()
+    lines = _head("Range of motion of real spines", about)
+    grid, runs = real_geometry.measure(Path(given))
+    lines += [
+        "",
+        f"{grid.specimens} spines of {grid.joints} joints x {real_geometry.POSES} poses x "
+        f"{real_geometry.SETS} stiffness sets: {grid.targets:,} job files of "
+        f"{len(real_geometry.TESTS)} tests, {grid.rows:,} rows, {grid.without_equilibrium:,} of "
+        "them without an equilibrium.",
+        f"Cold run: {grid.targets / runs[0].wall_s:.0f} job files/s.",
+    ]
+    rows = _study_rows(lines, runs, "real_geometry")
+    _write("real_geometry", lines, {"machine": about, "grid": asdict(grid), "study": rows})
+
+
+def _study_rows(
+    lines: list[str], runs: Iterable[study.Run], name: str = study.STUDY
+) -> list[dict[str, Any]]:
     """Append the table of workflow runs to the lines; the same as data."""
     lines += [
         "",
-        "| study l1l4_joint_pose, 2 cores | wall s | memory MiB | Snakemake's own CPU s | goal |",
+        f"| study {name}, 2 cores | wall s | memory MiB | Snakemake's own CPU s | goal |",
         "|---|---|---|---|---|",
     ]
     rows = []

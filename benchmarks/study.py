@@ -47,26 +47,28 @@ FOUNDATION = (
 
 def runs() -> Iterator[Run]:
     """Compute poses, fits and simulations of the study in a copy of the project, on two cores."""
-    with _copy() as folder:
+    with copy_of_project() as folder:
         wanted = [f"results/{STUDY}/{name}" for name in FOUNDATION]
         results = Path(folder) / "results" / STUDY
-        yield _run("poses, fits and simulations, cold", folder, wanted, "90 s, 1 GB")
-        yield _run("nothing to do", folder, wanted, "8 s")
+        yield run_workflow("poses, fits and simulations, cold", folder, wanted, "90 s, 1 GB")
+        yield run_workflow("nothing to do", folder, wanted, "8 s")
         (results / "jobs/specimen=s01/pose=0007/stiffness=best03.parquet").unlink()
-        yield _run("one simulation lost", folder, [*wanted, _file("jobs", "best03")], "10 s")
+        yield run_workflow(
+            "one simulation lost", folder, [*wanted, _file("jobs", "best03")], "10 s"
+        )
         (results / "calibrations/specimen=s01/pose=0007.parquet").unlink()
-        yield _run("one calibration lost", folder, [*wanted, _file("calibrations")], "12 s")
+        yield run_workflow("one calibration lost", folder, [*wanted, _file("calibrations")], "12 s")
 
 
 def whole_runs() -> Iterator[Run]:
     """Run the whole study, bootstraps, methods, tests and report included."""
-    with _copy() as folder:
-        yield _run("whole study, cold", folder, ["all"], "300 s")
-        yield _run("nothing to do", folder, ["all"], "")
+    with copy_of_project() as folder:
+        yield run_workflow("whole study, cold", folder, ["all"], "300 s")
+        yield run_workflow("nothing to do", folder, ["all"], "")
 
 
 @contextlib.contextmanager
-def _copy() -> Iterator[str]:
+def copy_of_project() -> Iterator[str]:
     """A copy of the project without results."""
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
         for part in PARTS:
@@ -88,7 +90,8 @@ def targets() -> int:
     return len(cohort.specimen_names) * study.poses * (2 + study.best_models)
 
 
-def _run(what: str, folder: str, wanted: Sequence[str], goal: str) -> Run:
+def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Run:
+    """Make these targets on two cores and watch it; raises RuntimeError when that fails."""
     start = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", "-j2", *wanted],

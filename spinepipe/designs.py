@@ -6,6 +6,7 @@ import numpy as np
 from SALib.sample import latin
 
 from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose, transform_of
 
 
 def latin_hypercube_normal(means: Array, sds: Array, n: int, seed: int) -> Array:
@@ -70,3 +71,45 @@ def sample_log_uniform(lowest: Array, highest: Array, n: int, seed: int) -> Arra
     share = latin.sample(problem, n, seed=seed)
     points: Array = lowest * (highest / lowest) ** share
     return points
+
+
+def sample_joint_frames(
+    frames: Sequence[Pose],
+    translation_sd_m: float,
+    rotation_sd_rad: float,
+    n: int,
+    seed: int,
+    specimen: str,
+) -> list[tuple[Pose, ...]]:
+    """Sets of joint frames around given ones; the first set is the given one, the others drawn.
+
+    Each frame is moved along its own axes and then turned by Z, X', Y'' angles, all six of them
+    independent normals.
+
+    Parameters
+    ----------
+    translation_sd_m, rotation_sd_rad : SDs per axis.
+    n : number of sets, at least 1.
+    """
+    size = 6 * len(frames)
+    sds = np.tile(np.repeat([translation_sd_m, rotation_sd_rad], 3), len(frames))
+    own = specimen_seed(seed, specimen)
+    drawn = latin_hypercube_normal(np.zeros(size), sds, max(2, n - 1), own)[: n - 1]
+    moved = (
+        tuple(frame @ transform_of(by) for frame, by in zip(frames, point, strict=True))
+        for point in drawn.reshape(n - 1, len(frames), 6)
+    )
+    return [tuple(frames), *moved]
+
+
+def sample_factors(spread: float, dimensions: int, n: int, seed: int) -> Array:
+    """(n, dimensions) factors: the first row is 1, the others log-uniform within the spread.
+
+    Parameters
+    ----------
+    spread : factors are drawn from 1 / spread to spread.
+    n : number of rows, at least 1.
+    """
+    highest = np.full(dimensions, spread)
+    drawn = sample_log_uniform(1.0 / highest, highest, max(2, n - 1), seed)[: n - 1]
+    return np.vstack([np.ones(dimensions), drawn])

@@ -18,7 +18,7 @@ PROFILE = Path("profiles") / "default" / "config.yaml"
 TUNED = {"force-use-threads": "true", "scheduler": "greedy"}
 """Options without which a run takes many times longer."""
 
-PRESENT = ("max-jobs-per-timespan", "scheduler-subsample")
+PRESENT = ("scheduler-subsample",)
 LARGEST_ERROR = 1e-9
 """Relative; Newton ends below 1e-9 rad of the closed form."""
 

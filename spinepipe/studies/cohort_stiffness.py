@@ -7,8 +7,9 @@ from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
 from spinepipe.anatomy import published
 from spinepipe.cohort.header import MeasurementSd
-from spinepipe.studies.coordinates import FORM, Coordinate, Rotational, Stiffness
+from spinepipe.studies.coordinates import FORM, Coordinate, Rotational
 from spinepipe.studies.identification import distinct
+from spinepipe.studies.published_stiffness import PublishedStiffness
 from spinepipe.studies.study import Study
 
 __all__ = ["CohortStiffness", "CrossValidation", "LevelStiffness"]
@@ -26,13 +27,6 @@ Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_
 _Representations = Annotated[
     tuple[Representation, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
-
-
-def _published_stiffness() -> Stiffness:
-    """Gould 2024b, Table 2, the same at all joints."""
-    values = {name: float(value) for name, value in _PAPER["uniform_stiffness"].items()
-              if name != "where"}  # fmt: skip
-    return Stiffness(**values)
 
 
 class LevelStiffness(BaseModel):
@@ -104,8 +98,8 @@ class CohortStiffness(Study):
     measurement_sd: MeasurementSd | None = Field(
         default=None, description="SDs of one reading; null: the cohort's"
     )
-    stiffness: Stiffness = Field(
-        default_factory=_published_stiffness,
+    stiffness: PublishedStiffness = Field(
+        default_factory=PublishedStiffness,
         description="published stiffness of all joints, where fits start",
     )
     level_stiffness: Mapping[str, LevelStiffness] = Field(

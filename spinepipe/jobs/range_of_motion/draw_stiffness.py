@@ -1,5 +1,7 @@
 """Job: the stiffness sets that all specimens are moved with."""
 
+from typing import Any
+
 import numpy as np
 
 from spinepipe.cohort import Cohort
@@ -18,7 +20,7 @@ def run(root: str, study: str, output: str) -> None:
     joints = cohort.joint_names
     factors = sample_factors(settings.stiffness_spread, 6, settings.stiffness_sets, settings.seed)
     values = (factors[:, None, :] * own_stiffness(settings, cohort)).reshape(-1, 6)
-    columns = {
+    columns: dict[str, list[Any]] = {
         "stiffness": np.repeat(np.arange(len(factors)), len(joints)).tolist(),
         "joint": list(joints) * len(factors),
         **dict(zip(STIFFNESS_COLUMNS, values.T.tolist(), strict=True)),

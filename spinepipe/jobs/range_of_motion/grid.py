@@ -15,6 +15,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.studies import RangeOfMotion
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
+ROWS_AT_A_TIME = 50_000
+_KEYS = ("specimen", "pose", "stiffness", "test", "joint", "largest_load")
+_MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -41,35 +45,29 @@ class Grid:
 
 
 def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
-    """Rows of the largest loads of ``range_of_motion.parquet``.
-
-    Only what is needed is read, names as numbers: a table of a million rows fits many times over.
-    """
-    numbers = ("pose", "stiffness")
-    columns = [f"predicted_{name}" for name in COORDINATE_COLUMNS]
-    rows = pq.read_table(
-        path,
-        columns=["specimen", *numbers, "test", "joint", *columns],
-        filters=[("largest_load", "==", True)],
-        partitioning=None,
-    )
+    """Rows of the largest loads of ``range_of_motion.parquet``, read some at a time."""
     tests = _tests(study, cohort)
-    names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
-    at = {name: _positions(rows[name], values) for name, values in names.items()}
-    at |= {name: rows[name].to_numpy() for name in numbers}
-    place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
     sizes = (len(cohort.specimen_names), study.n_poses, study.stiffness_sets, len(tests))
     motion = np.full((*sizes, len(cohort.joint_names), 6), np.nan)
-    motion[place] = np.column_stack([rows[name].to_numpy() for name in columns])
     asked = np.zeros(sizes, dtype=bool)
-    asked[place[:4]] = True
+    names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
+    for rows in pq.ParquetFile(path).iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
+        rows = rows.filter(rows["largest_load"])
+        at = {name: _positions(rows[name], values) for name, values in names.items()}
+        at |= {name: rows[name].to_numpy() for name in ("pose", "stiffness")}
+        place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
+        values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
+        motion[place] = np.column_stack(values)
+        asked[place[:4]] = True
     loaded = tuple(_loaded(study, test, motion[:, :, :, i]) for i, test in enumerate(tests))
     return Grid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
 
 
-def _positions(values: pa.ChunkedArray, names: Sequence[str]) -> NDArray[np.int32]:
+def _positions(values: pa.Array, names: Sequence[str]) -> NDArray[np.int32]:
     """Place of each value among the names."""
-    found: NDArray[np.int32] = pc.index_in(values, value_set=pa.array(names)).to_numpy()
+    found: NDArray[np.int32] = pc.index_in(values, value_set=pa.array(names)).to_numpy(
+        zero_copy_only=False
+    )
     return found
 
 

@@ -1,5 +1,6 @@
 """Job: what the motion of joints hangs on: specimen, joint frames or stiffness."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,6 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.jobs.range_of_motion.grid import Grid, read_grid
+from spinepipe.report.words import count
 from spinepipe.sensitivity import Share, variance_shares
 from spinepipe.sensitivity.nested_shares import nested_shares
 from spinepipe.statistics import Ended
@@ -19,6 +21,12 @@ from spinepipe.tables.range_of_motion import FACTORS
 EVERY = "*"
 FEWEST_COMPLETE = 0.5
 """A specimen whose share of complete poses is smaller takes no part in the cohort's analysis."""
+
+
+_OURS = {"row": "pose", "column": "stiffness", "draw": "pose", "treatment": "stiffness"}
+"""What the analyses call in general terms, and what it is here."""
+
+_GENERAL = re.compile(rf"\b({'|'.join(_OURS)})\b")
 
 
 def run(root: str, study: str, range_of_motion: str, output: str) -> None:
@@ -34,13 +42,12 @@ def variance_rows(grid: Grid) -> Iterator[dict[str, Any]]:
     for number, test in enumerate(grid.tests):
         drawn = grid.loaded_motion(number)[:, 1:, 1:]  # the first pose and set are no draws
         same = {"test": test, "coordinate": grid.loaded[number]}
-        complete = [_complete(motion) for motion in drawn]
-        for at, specimen in enumerate(grid.specimens):
-            if grid.asked[at, :, :, number].any():
-                yield from (
-                    {**same, "specimen": specimen, **row} for row in _own(grid, complete[at])
-                )
-        if len(grid.specimens) > 1:
+        tested = np.flatnonzero(grid.asked[:, :, :, number].any(axis=(1, 2)))
+        complete = [_complete(drawn[at]) for at in tested]
+        names = [grid.specimens[at] for at in tested]
+        for specimen, motion in zip(names, complete, strict=True):
+            yield from ({**same, "specimen": specimen, **row} for row in _own(grid, motion))
+        if len(names) > 1:
             yield from ({**same, "specimen": EVERY, **row} for row in _all(grid, complete))
 
 
@@ -83,8 +90,8 @@ def _all(grid: Grid, motions: list[Array]) -> Iterator[dict[str, Any]]:
 
 def _left_out(specimens: int, poses: int) -> str:
     """What is missing for lack of equilibria."""
-    parts = [f"{specimens} specimens"] * (specimens > 0)
-    parts += [f"up to {poses} poses of a specimen"] * (poses > 0)
+    parts = [count(specimens, "specimen")] * (specimens > 0)
+    parts += [f"up to {count(poses, 'pose')} of a specimen"] * (poses > 0)
     return f"left out for lack of equilibria: {', '.join(parts)}" if parts else ""
 
 
@@ -104,5 +111,5 @@ def _row(values: Array, ended: tuple[Ended, str], parts: dict[str, Share | None]
         "sd": float(values.std(ddof=1)) if done else None,
         **shares,
         "status": ended[0].value,
-        "message": ended[1],
+        "message": _GENERAL.sub(lambda word: _OURS[word[0]], ended[1]),
     }

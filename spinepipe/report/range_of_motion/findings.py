@@ -66,11 +66,15 @@ def _dominant(rows: pd.DataFrame) -> Iterator[str]:
         shares = {name: joints[f"{name}_share"].dropna() for name in _FACTORS}
         medians = {name: share.median() for name, share in shares.items() if len(share)}
         first = max(medians, key=lambda name: medians[name])
-        low, high = (100.0 * end for end in (shares[first].min(), shares[first].max()))
+        low, high = (_percent(end) for end in (shares[first].min(), shares[first].max()))
         yield (
             f"{str(test).replace('_', ' ').capitalize()}: most of the variance is due to "
-            f"{_FACTORS[first]} ({low:.0f} to {high:.0f} % over the joints)."
+            f"{_FACTORS[first]} ({low if low == high else f'{low} to {high}'} over the joints)."
         )
+
+
+def _percent(share: float) -> str:
+    return percent(round(1e6 * share), 1_000_000)
 
 
 def _where(study: RangeOfMotion, cohort: Cohort) -> str:

@@ -40,7 +40,7 @@ def range_of_motion_page(study: RangeOfMotion, cohort: Cohort, results: Results)
         findings=findings(study, cohort, results),
         pictures=[_picture(name, results) for name in results.pictures],
         tables=[table for table in _tables(cohort, results) if table.rows],
-        origin=origin(study, results.metadata),  # type: ignore[arg-type]  # of any kind, in truth
+        origin=origin(study, results.metadata),
         style=Markup(_part("spinepipe.report.page", "page.css")),
         script=Markup(_part("spinepipe.report.page", "page.js.html")),
     )

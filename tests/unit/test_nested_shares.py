@@ -1,0 +1,104 @@
+"""Shares of specimens, draws within them and common treatments: mean squares, truth, coverage."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from statsmodels.formula.api import ols
+from statsmodels.stats.anova import anova_lm
+
+from spinepipe.sensitivity.nested_shares import components, nested_shares
+from spinepipe.statistics import Ended
+
+PARTS = ("specimen", "draw", "treatment", "rest")
+
+
+def normal_grid(rng, shape: tuple[int, int, int], variances) -> np.ndarray:
+    """Values (S, P, K) with variances of specimen, draw, treatment, both together, scatter."""
+    s, p, k = shape
+    sds = np.sqrt(variances)
+    return (
+        sds[0] * rng.standard_normal((s, 1, 1))
+        + sds[1] * rng.standard_normal((s, p, 1))
+        + sds[2] * rng.standard_normal((1, 1, k))
+        + sds[3] * rng.standard_normal((s, 1, k))
+        + sds[4] * rng.standard_normal((s, p, k))
+    )
+
+
+def test_components_follow_from_statsmodels_mean_squares() -> None:
+    """Expected mean squares of the mixed classification, from any textbook."""
+    shape = s, p, k = 4, 5, 3
+    grid = normal_grid(np.random.default_rng(1), shape, (1.0, 0.5, 2.0, 0.3, 0.2))
+    at = np.indices(shape).reshape(3, -1)
+    long = pd.DataFrame({"y": grid.ravel(), "s": at[0], "p": at[1], "k": at[2]})
+    table = anova_lm(ols("y ~ C(s) + C(s):C(p) + C(k) + C(s):C(k)", long).fit())
+    ms = table["sum_sq"] / table["df"]
+    error, both = ms["Residual"], ms["C(s):C(k)"]
+    pose, treatment, specimen = ms["C(s):C(p)"], ms["C(k)"], ms["C(s)"]
+    assert table.loc["C(s):C(p)", "df"] == s * (p - 1)
+    expected = [
+        (specimen - pose - both + error) / (p * k),
+        (pose - error) / k,
+        (treatment - both) / (s * p),
+        (both - error) / p + error,
+    ]
+    np.testing.assert_allclose(components(grid), expected, rtol=1e-9)
+
+
+def test_the_truth_is_found_in_a_large_grid() -> None:
+    grid = normal_grid(np.random.default_rng(2), (300, 4, 300), (4.0, 2.0, 3.0, 0.5, 0.5))
+    np.testing.assert_allclose(components(grid), [4.0, 2.0, 3.0, 1.0], rtol=0.25)
+
+
+def test_shares_do_not_hang_on_unit_or_origin() -> None:
+    grid = normal_grid(np.random.default_rng(3), (5, 4, 4), (1.0, 1.0, 1.0, 0.1, 0.1))
+    one, other = nested_shares(grid), nested_shares(1e-6 * grid - 0.3)
+    for part in PARTS:
+        a, b = getattr(one, part), getattr(other, part)
+        np.testing.assert_allclose(
+            [a.estimate, a.low, a.high], [b.estimate, b.low, b.high], rtol=1e-6
+        )
+        assert a.low <= a.estimate <= a.high
+
+
+def test_intervals_cover_the_shares_under_the_same_treatments() -> None:
+    """Treatments are fixed; specimens and draws are new in every grid. Binomial limits of 95 %."""
+    rng = np.random.default_rng(4)
+    treatments = np.array([-1.2, 0.1, 1.0])
+    truth = np.array([1.0, 0.5, treatments.var(ddof=1), 0.3])
+    truth /= truth.sum()
+    covered = np.zeros(4)
+    n = 200
+    for _ in range(n):
+        grid = normal_grid(rng, (40, 12, 3), (1.0, 0.5, 0.0, 0.0, 0.3)) + treatments
+        found = nested_shares(grid)
+        ends = np.array([[getattr(found, part).low, getattr(found, part).high] for part in PARTS])
+        covered += (ends[:, 0] <= truth) & (truth <= ends[:, 1])
+    assert (covered / n > 0.90).all()
+    assert (covered / n < 0.995).all()
+
+
+def test_what_has_no_shares_says_why() -> None:
+    few = nested_shares(np.random.default_rng(5).normal(size=(3, 2, 3)))
+    assert (few.status, few.specimen) == (Ended.TOO_FEW, None)
+    assert "3 x 2 x 3" in few.message
+    assert nested_shares(np.full((3, 3, 3), 0.1)).status is Ended.CONSTANT
+    rounded = np.full((3, 3, 3), 0.1)
+    rounded[0, 0, 0] += 1e-16
+    assert nested_shares(rounded).status is Ended.CONSTANT
+    single = np.zeros((3, 3, 3))
+    single[1] = np.random.default_rng(6).normal(size=(3, 3))
+    assert nested_shares(single).status is Ended.CONSTANT
+    with pytest.raises(ValueError, match="full grid"):
+        nested_shares(np.full((3, 3, 3), np.nan))
+
+
+def test_a_negative_component_is_told_and_set_to_zero() -> None:
+    """Specimens that differ less than their draws would make them."""
+    rng = np.random.default_rng(7)
+    grid = normal_grid(rng, (6, 6, 4), (0.0, 1.0, 1.0, 0.0, 0.1))
+    grid -= grid.mean(axis=(1, 2), keepdims=True)
+    found = nested_shares(grid)
+    assert found.specimen is not None
+    assert found.specimen.estimate == 0.0
+    assert "negative specimen component set to 0" in found.message

@@ -1,0 +1,97 @@
+"""Figures and findings of range of motion, from tables of any size and outcome."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from grid_cases import JOINTS, STUDY, made_up, table_of
+from matplotlib.figure import Figure
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.range_of_motion.grid import read_grid
+from spinepipe.jobs.range_of_motion.summary import summary_rows
+from spinepipe.jobs.range_of_motion.variance import variance_rows
+from spinepipe.report.page.results import Results
+from spinepipe.report.range_of_motion import levels_figure, variance_figure
+from spinepipe.report.range_of_motion.page import range_of_motion_page
+from spinepipe.report.style import picture, style
+from spinepipe.studies import RangeOfMotion, check
+
+Size = tuple[int, int, int]
+Lost = tuple[tuple[int, int, int], ...]
+
+
+def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Cohort, Results]:
+    """Tables of a study of made-up numbers."""
+    project = made_up(root, size)
+    path, _ = table_of(root, size, lost)
+    study, cohort = check(project, STUDY)
+    assert isinstance(study, RangeOfMotion)
+    grid = read_grid(str(path), study, cohort)
+    tables = {
+        "rom_summary": pd.DataFrame(summary_rows(grid)),
+        "rom_variance": pd.DataFrame(variance_rows(grid)),
+    }
+    return study, cohort, Results(tables, {}, {}, {})
+
+
+def words(figure: Figure) -> str:
+    """All text of a figure."""
+    texts = [text.get_text() for text in figure.texts]
+    texts += [legend.get_title().get_text() for legend in figure.legends]
+    texts += [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    return " ".join(" ".join(texts).split())
+
+
+def figures(root: Path, size: Size, lost: Lost = ()) -> tuple[Figure, Figure]:
+    _, cohort, found = results(root, size, lost)
+    with style():
+        drawn = (
+            levels_figure(cohort, found.table("rom_summary")),
+            variance_figure(cohort, found.table("rom_variance")),
+        )
+        assert all(picture(figure, "svg") for figure in drawn)
+    return drawn
+
+
+def test_a_panel_for_each_test_a_row_for_each_joint(tmp_path: Path) -> None:
+    for figure in figures(tmp_path, (3, 5, 4), lost=((0, 1, 1),)):
+        assert [axis.get_title("left")[4:] for axis in figure.axes] == ["Flexion", "Left rotation"]
+        first = figure.axes[0]
+        assert [label.get_text() for label in first.get_yticklabels()] == list(JOINTS)
+        assert all("(" in axis.get_xlabel() for axis in figure.axes)  # units
+
+
+def test_what_the_bars_and_symbols_stand_for_is_told(tmp_path: Path) -> None:
+    levels, variance = figures(tmp_path, (3, 5, 4), lost=((0, 1, 1),))
+    assert "120 runs of 2 tests, 2 without an equilibrium" in words(levels)
+    assert "medians of the specimens" in words(levels)
+    assert "3 specimens, 3 drawn poses each, 3 drawn stiffness sets" in words(variance)
+    assert "specimen joint frames stiffness rest" in words(variance)
+
+
+def test_one_specimen_has_no_share_of_specimens(tmp_path: Path) -> None:
+    levels, variance = figures(tmp_path, (1, 5, 4))
+    assert "medians of the specimens" not in words(levels)
+    assert "1 specimen, 4 drawn poses of a" in words(variance)
+    assert words(variance).endswith("joint frames stiffness rest")
+
+
+def test_nothing_to_show_is_said(tmp_path: Path) -> None:
+    levels, variance = figures(tmp_path, (1, 1, 1), lost=((0, 0, 0),))
+    assert "no run has an equilibrium" in words(levels)
+    assert "at least 3 x 3 are needed" in words(variance)
+
+
+@pytest.mark.parametrize("size", [(3, 5, 4), (1, 1, 1)])
+def test_findings_have_the_numbers_of_the_tables(tmp_path: Path, size: Size) -> None:
+    study, cohort, found = results(tmp_path, size)
+    page = range_of_motion_page(study, cohort, found)
+    assert f"{size[0] * size[1] * size[2] * 2} runs of 2 tests: none without" in page
+    assert "pure moments without weight" in page
+    rows = found.table("rom_summary")
+    chosen = rows[rows["specimen"] == ("*" if size[0] > 1 else "a")]
+    flexion = chosen.query("test == 'flexion' and role == 'loaded'")
+    largest = flexion["median"].abs().max()
+    assert f" to {largest:.1f}° (" in page
+    assert ("most of the variance is due to" in page) == (size[1] > 1)
