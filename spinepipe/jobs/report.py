@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-import pyarrow.parquet as pq
-
 from spinepipe.files import appearing
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.page import READ, Results, study_page
-from spinepipe.tables import read_frames
+from spinepipe.jobs.page_inputs import results_of
+from spinepipe.report.page import READ, study_page
 
 
 def run(
@@ -15,22 +13,6 @@ def run(
 ) -> None:
     """Write the page from the files of all tables, pictures (SVG) and captions."""
     settings, cohort = study_and_cohort(root, study)
-    results = Results(
-        tables=read_frames([path for path in tables if Path(path).stem in READ]),
-        metadata={Path(path).stem: _metadata(path) for path in tables},
-        pictures=_texts(figures),
-        captions=_texts(captions),
-    )
-    page = study_page(settings, cohort, results)
+    page = study_page(settings, cohort, results_of(READ, tables, figures, captions))
     with appearing(Path(output)) as temporary:
         temporary.write_text(page, encoding="utf-8")
-
-
-def _metadata(path: str) -> dict[str, str]:
-    found = pq.read_schema(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in found.items()}
-
-
-def _texts(paths: list[str]) -> dict[str, str]:
-    """Texts of files by the name of the file, in the order given."""
-    return {Path(path).stem: Path(path).read_text(encoding="utf-8") for path in paths}

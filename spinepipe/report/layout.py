@@ -1,11 +1,12 @@
 """Panels side by side that share their rows."""
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from spinepipe.report.rows import Rows
 from spinepipe.report.spread import BAR_PT
@@ -63,11 +64,18 @@ def explain(figure: Figure, bars: Mapping[str, str], words: str, dashed: str = "
     ]
     if dashed:
         handles.append(Line2D([], [], color=GREY, lw=0.7, ls=_START_LINE, label=dashed))
+    explain_marks(figure, handles, words, len(handles))
+
+
+def explain_marks(
+    figure: Figure, handles: Sequence[Line2D | Patch], words: str, across: int
+) -> None:
+    """Below the panels: a few words, and each mark with its label, so many side by side."""
     legend = figure.legend(
-        handles=handles,
+        handles=list(handles),
         title=textwrap.fill(words, _LINE_LENGTH),
         loc="outside lower center",
-        ncols=len(handles),
+        ncols=across,
         fontsize=6.5,
         title_fontsize=6.0,
         handlelength=1.6,

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 FEWEST_FOR_DENSITY = 10
 BAR_PT, THIN_BAR_PT = 4.0, 2.5
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 KEY = "bar: interquartile range (IQR), tick: median, thin line: 5th to 95th percentile"
 
 
@@ -59,6 +60,16 @@ def draw_iqr(panel: Axes, found: Quartiles, y: float, color: str, thick_pt: floa
     ends = [found.low, found.high]
     panel.plot(ends, [y, y], color=color, lw=thick_pt, solid_capstyle="butt", zorder=4)
     panel.plot([found.median], [y], "|", color=BLACK, ms=1.6 * thick_pt + 0.6, mew=1.0, zorder=5)
+
+
+def draw_upright(panel: Axes, values: Array, x: float, color: str, width: float) -> None:
+    """Every value as a dot spread over a width, the middle half as a bar, the median as a tick."""
+    shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * width
+    panel.plot(x + shift, values, "o", color=color, ms=1.8, mew=0.0, alpha=0.5, zorder=3)
+    found = quartiles(values)
+    panel.plot([x, x], [found.low, found.high], color=color, lw=BAR_PT, solid_capstyle="butt",
+               zorder=4)  # fmt: skip
+    panel.plot([x], [found.median], "_", color=BLACK, ms=1.6 * BAR_PT + 0.6, mew=1.0, zorder=5)
 
 
 def draw_density(

@@ -6,7 +6,6 @@ import pytest
 from small_project import Project, written
 
 from spinepipe.jobs import layout
-from spinepipe.tables import TABLES as TABLE_SCHEMAS
 
 pytestmark = pytest.mark.slow
 
@@ -14,7 +13,11 @@ SIMULATION = "small/jobs/specimen=s01/pose=0005/stiffness=best02.parquet"
 BOOTSTRAP = "small/bootstrap/specimen=s01/bootstrap=start/loading=dynamic/set=001.parquet"
 CALIBRATION = "small/calibrations/specimen=s01/pose=0002.parquet"
 FIGURES = {f"small/figures/{name}.{kind}" for name in layout.FIGURES for kind in ("svg", "png")}
-TABLES = {f"small/{name}.parquet" for name in TABLE_SCHEMAS}
+OPTIONAL = (
+    *("bootstrap", "method_fits", "success_by_method"),
+    *("precision_errors", "landmark_precision", "required_precision", "against_gould_2024a"),
+)
+TABLES = {f"small/{name}.parquet" for name in (*layout.ALWAYS, *OPTIONAL)}
 OF_SIMULATIONS = {
     f"small/{name}.parquet"
     for name in (

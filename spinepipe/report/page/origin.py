@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies import JointPoseSensitivity, Study
 
 _VERSION = "version_"
 
@@ -26,7 +26,7 @@ class Origin:
     settings: str
 
 
-def origin(study: JointPoseSensitivity, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
+def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
     """What the metadata of all tables say, in alphabetical order."""
     settings = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
     digests = tuple(

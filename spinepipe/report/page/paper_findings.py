@@ -1,12 +1,18 @@
 """Finding about the paper: how many of its numbers ours are inside the range of."""
 
+import pandas as pd
+
 from spinepipe.report.page.results import Results
 from spinepipe.studies import JointPoseSensitivity
 
 
 def paper(study: JointPoseSensitivity, results: Results) -> str:
     """How the published quantities were judged."""
-    rows = results.table("against_gould_2024a")
+    return judged(results.table("against_gould_2024a"))
+
+
+def judged(rows: pd.DataFrame) -> str:
+    """The same of any table of published quantities with verdicts."""
     if rows.empty:
         return ""
     found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
@@ -18,7 +24,8 @@ def paper(study: JointPoseSensitivity, results: Results) -> str:
         ("not_computed", "are not computed"),
     )
     told = [f"{found[name]} {words}" for name, words in others if name in found]
-    return (
+    words = (
         f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
-        f"outside for {outside}; {', '.join(told)}."
+        f"outside for {outside}"
     )
+    return "; ".join(part for part in (words, ", ".join(told)) if part) + "."

@@ -34,8 +34,10 @@ _OWN_MM, _SAMPLED_MM, _ARROW_SHARE = 11.0, 16.0, 0.18
 _TITLES = ("anterior (mm)", "superior (mm)", "right (mm)")
 
 
-def scenes(study: JointPoseSensitivity, cohort: Cohort, poses: pd.DataFrame) -> dict[str, Any]:
-    """A plotly figure, as plain data, of each of the first specimens."""
+def scenes(
+    study: JointPoseSensitivity | None, cohort: Cohort, poses: pd.DataFrame
+) -> dict[str, Any]:
+    """A plotly figure, as plain data, of each of the first specimens; `poses` may have no rows."""
     return {
         name: _scene(view_of(cohort, name, study), cohort, poses)
         for name in cohort.specimen_names[:MOST_SPECIMENS]
@@ -46,7 +48,11 @@ def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:
     parts = [
         *_vertebrae(view, cohort),
         *_frames(list(view.frames), "own", _OWN_MM, 8.0, 1.0),
-        *_frames(_sampled(poses, view.specimen), "sampled", _SAMPLED_MM, 1.0, 0.3),
+        *(
+            _frames(_sampled(poses, view.specimen), "sampled", _SAMPLED_MM, 1.0, 0.3)
+            if len(poses)
+            else ()
+        ),
         *_once(_loads(view)),
     ]
     axes = {
@@ -111,6 +117,8 @@ def _landmarks(view: SpecimenView) -> Iterator[Any]:
 
 def _sampled(poses: pd.DataFrame, specimen: str) -> list[Pose]:
     """Frames of at most so many sampled poses, evenly spaced over all that have frames."""
+    if poses.empty:
+        return []
     rows = poses[(poses["specimen"] == specimen) & (poses["status"] == Status.CONVERGED.value)]
     numbers = rows["pose"].unique()
     step = max(1, -(-len(numbers) // MOST_POSES))

@@ -71,7 +71,12 @@ def sortable(
 
 _NUMERIC = ("number", "integer")
 _SAME = ("specimen", "status")
-_UNITS: Mapping[str, str] = {"see unit": "", "mm or deg, see unit": "", "mm2, deg2": ""}
+_UNITS: Mapping[str, str] = {
+    "see unit": "",
+    "mm or deg, see unit": "",
+    "N/m or N m/rad, see unit": "",
+    "mm2, deg2": "",
+}
 
 
 def _unit(column: Column) -> str:

@@ -9,7 +9,7 @@ from spinepipe.report.page.significance import FOLDED, folded, in_full
 from spinepipe.report.page.sortable import Sortable, sortable
 from spinepipe.report.pose_against_stiffness import TREE, importance_by_factor
 from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import AGAINST, IMPORTANCE, STATISTICS, TABLES
+from spinepipe.tables import AGAINST_GOULD_2024A, IMPORTANCE, STATISTICS, TABLES
 from spinepipe.tables.schema import Column
 
 SHOWN = {
@@ -43,8 +43,11 @@ _AGAINST_ORDER = (
     *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
     *("verdict", "reason", "where"),
 )
-_AGAINST = tuple(
-    column for name in _AGAINST_ORDER for column in AGAINST.columns if column.name == name
+AGAINST_COLUMNS = tuple(
+    column
+    for name in _AGAINST_ORDER
+    for column in AGAINST_GOULD_2024A.columns
+    if column.name == name
 )
 """What a reader compares stands first; the short name is left to the file."""
 
@@ -69,8 +72,8 @@ def _of(
         yield _folded(frame, study.significance)
     elif name == "importance":
         yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
-    elif name == AGAINST.name:
-        yield sortable(name, title, about, frame, _AGAINST)
+    elif name == AGAINST_GOULD_2024A.name:
+        yield sortable(name, title, about, frame, AGAINST_COLUMNS)
     else:
         yield sortable(name, title, about, frame, TABLES[name].columns)
 

@@ -1,0 +1,192 @@
+"""Figure: signed error at the largest load, specimen by level, for each load case and stage."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import Patch, Rectangle
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.cohort.named import case, short
+from spinepipe.report.cohort.stages import Stage, stages
+from spinepipe.report.layout import explain_marks
+from spinepipe.report.spread import Array, finite
+from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
+from spinepipe.report.words import POSITIVE, count, fixed
+from spinepipe.studies import CohortStiffness
+
+COLORS = "PuOr_r"
+"""Purple to orange over white: colour-blind readers tell its ends apart."""
+
+MOST_CASES = 6
+_ROW_MM, _LEAST_ROW_MM, _HEAD_MM, _KEY_MM, _NAMES_MM = 4.6, 1.0, 8.0, 34.0, 14.0
+_CELL_WITH_NUMBER_MM, _LINE_MM = 6.4, 2.6
+_LABEL_MM, _LETTERS, _NAME = 2.7, 135, 14
+_EMPTY, _HATCH = "#E4E4E4", "#9A9A9A"
+_FAR = 2.0
+"""Where the largest error is more than this times the 95th percentile, the scale ends there."""
+
+
+def error_map_figure(
+    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A column of panels per load case, a line of panels per stage."""
+    errors, signs = tables["errors"], tables["sign_checks"]
+    loaded = errors[errors["loaded"].astype(bool)] if len(errors) else errors
+    cases = list(dict.fromkeys(loaded["test"])) if len(loaded) else []
+    found = stages(loaded, len(cohort.specimen_names)) if cases else []
+    values = finite(loaded["peak_error"]) if cases else np.array([])
+    if not found or not len(values):
+        total = count(len(errors), "row")
+        return saying(f"No error in a loaded direction can be shown: none of {total} has one.")
+    figure, axes = _grid(cohort, len(found), min(len(cases), MOST_CASES))
+    image = None
+    scale = _scale(found)
+    for line, stage in enumerate(found):
+        for column, test in enumerate(cases[:MOST_CASES]):
+            axis = axes[line][column]
+            grid = _square(stage.rows[stage.rows["test"] == test], cohort)
+            image = _draw(axis, grid, scale, _room(cohort, len(axes[0]), len(found)))
+            _frame(axis, signs, test, cohort)
+            _label(axis, cohort, line == len(found) - 1, column == 0)
+            words = _over(test, loaded, len(axes[0])) if line == 0 else ""
+            axis.set_title(f" \n{words}" if words else " ", fontweight="normal", fontsize=6.5,
+                           linespacing=1.7)  # fmt: skip
+        _heading(axes[line][0], line, stage.title)
+    assert image is not None
+    _explain(figure, axes, image, scale, found, signs)
+    return figure
+
+
+def _line_mm(cohort: Cohort, lines: int) -> float:
+    """Height of a specimen's row so that all lines of panels fit on a page."""
+    left = TALLEST_MM - _KEY_MM - _NAMES_MM - lines * _HEAD_MM
+    return min(_ROW_MM, max(_LEAST_ROW_MM, left / (lines * len(cohort.specimen_names))))
+
+
+def _cell_mm(cohort: Cohort, across: int) -> float:
+    names = max(len(short(name, _NAME)) for name in cohort.specimen_names)
+    return (WIDTH_MM - 6.0 - 1.3 * names - 5.0 * across) / (across * len(cohort.joint_names))
+
+
+def _room(cohort: Cohort, across: int, lines: int) -> bool:
+    """Whether a number can be read in each cell."""
+    wide = _cell_mm(cohort, across) >= _CELL_WITH_NUMBER_MM
+    return wide and _line_mm(cohort, lines) >= _LINE_MM
+
+
+def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Axes]]]:
+    rows = len(cohort.specimen_names) * _line_mm(cohort, lines)
+    figure = blank(lines * (rows + _HEAD_MM) + _NAMES_MM + _KEY_MM)
+    axes = figure.subplots(lines, across, squeeze=False)
+    return figure, [list(line) for line in axes]
+
+
+def _scale(found: Sequence[Stage]) -> Normalize:
+    """Symmetric around zero; an end that few errors reach is drawn in."""
+    sizes = [np.abs(finite(stage.rows["peak_error"])) for stage in found]
+    known = [values for values in sizes if len(values)]
+    end = max(float(values.max()) for values in known)
+    most = max(float(np.percentile(values, 95.0)) for values in known)
+    end = most if end > _FAR * most > 0.0 else end
+    return Normalize(-end, end) if end > 0.0 else Normalize(-1.0, 1.0)
+
+
+def _square(rows: pd.DataFrame, cohort: Cohort) -> Array:
+    """(S, J) errors, NaN where there is none; levels from cranial to caudal."""
+    wide = rows.pivot_table("peak_error", "specimen", "joint", aggfunc="first")
+    wide = wide.reindex(index=list(cohort.specimen_names), columns=list(cohort.joint_names[::-1]))
+    return wide.to_numpy(float)
+
+
+def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage:
+    axis.set_facecolor(_EMPTY)
+    axis.add_patch(Rectangle((-0.5, -0.5), grid.shape[1], grid.shape[0], hatch="//////", lw=0,
+                             facecolor="none", edgecolor=_HATCH, zorder=0))  # fmt: skip
+    shown = np.ma.masked_invalid(grid)
+    image = axis.imshow(shown, cmap=COLORS, norm=scale, aspect="auto", zorder=1)
+    for row, column in np.argwhere(np.isfinite(grid)) if numbers else ():
+        value = grid[row, column]
+        dark = abs(scale(value) - 0.5) > 0.31
+        axis.text(column, row, fixed(value, 1), ha="center", va="center", fontsize=5.0,
+                  color=WHITE if dark else BLACK, zorder=3, in_layout=False)  # fmt: skip
+    for side in axis.spines.values():
+        side.set_visible(False)
+    return image
+
+
+def _frame(axis: Axes, signs: pd.DataFrame, test: str, cohort: Cohort) -> None:
+    """A frame around each place whose measured motion goes against the load."""
+    levels = list(cohort.joint_names[::-1])
+    for _, row in _flipped(signs)[_flipped(signs)["test"] == test].iterrows():
+        x, y = levels.index(row["joint"]), cohort.specimen_names.index(row["specimen"])
+        axis.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, fill=False, edgecolor=BLACK, lw=1.3,
+                                 zorder=4, clip_on=False))  # fmt: skip
+
+
+def _flipped(signs: pd.DataFrame) -> pd.DataFrame:
+    return signs[signs["verdict"] == "flipped"] if len(signs) else signs.assign(test=[], joint=[])
+
+
+def _label(axis: Axes, cohort: Cohort, lowest: bool, leftmost: bool) -> None:
+    levels, names = cohort.joint_names[::-1], cohort.specimen_names
+    height = axis.get_figure().get_figheight() * 25.4  # type: ignore[union-attr]
+    grid = axis.get_gridspec()
+    assert grid is not None
+    row_mm = (height - _KEY_MM - _NAMES_MM - grid.nrows * _HEAD_MM) / (grid.nrows * len(names))
+    every = max(1, int(np.ceil(_LABEL_MM / row_mm)))
+    axis.set_yticks(range(0, len(names), every), [short(name, _NAME) for name in names[::every]])
+    turned = max(len(name) for name in levels) * 1.25 + 1.0 > _cell_mm(cohort, grid.ncols)
+    axis.set_xticks(range(len(levels)), [short(name, _NAME) for name in levels],
+                    rotation=90 if turned else 0)  # fmt: skip
+    axis.tick_params(length=0.0, labelleft=leftmost, labelbottom=lowest, pad=2.0, labelsize=6.0)
+
+
+def _over(test: str, loaded: pd.DataFrame, across: int) -> str:
+    """Load case, and what a positive motion in it is where there is room."""
+    coordinate = loaded.loc[loaded["test"] == test, "coordinate"].iloc[0]
+    direction = f" (+ is {POSITIVE[coordinate]})"
+    room = _LETTERS // across
+    words = short(case(test), room)
+    return words + direction if len(words) + len(direction) <= room else words
+
+
+def _heading(axis: Axes, line: int, words: str) -> None:
+    """Letter and words above the first panel of a line, over the names of the load cases."""
+    above = 12.5 if line == 0 else 3.5
+    axis.annotate(f"{chr(ord('a') + line)}   {words}", (0.0, 1.0), (0.0, above), va="bottom",
+                  xycoords="axes fraction", textcoords="offset points", fontsize=7.5,
+                  fontweight="bold", annotation_clip=False, in_layout=False)  # fmt: skip
+
+
+def _explain(
+    figure: Figure,
+    axes: Sequence[Sequence[Axes]],
+    image: AxesImage,
+    scale: Normalize,
+    found: Sequence[Stage],
+    signs: pd.DataFrame,
+) -> None:
+    sizes = np.abs(np.concatenate([finite(stage.rows["peak_error"]) for stage in found]))
+    beyond = float(sizes.max()) > float(scale.vmax or 0.0) * (1.0 + 1e-9)
+    bar = figure.colorbar(image, ax=[panel for line in axes for panel in line], pad=0.012,
+                          location="bottom", aspect=60, shrink=0.6,
+                          extend="both" if beyond else "neither")  # fmt: skip
+    bar.set_label("predicted less measured motion at the largest load, loaded direction (°)")
+    bar.outline.set_linewidth(0.4)
+    handles = [Patch(facecolor=_EMPTY, edgecolor=_HATCH, hatch="//////", lw=0,
+                     label="not measured, or no result")]  # fmt: skip
+    if len(_flipped(signs)):
+        label = "measured motion goes against the load: sign flipped?"
+        handles.append(Patch(facecolor=WHITE, edgecolor=BLACK, lw=1.3, label=label))
+    cases = found[0].rows["test"].nunique()
+    words = [
+        "Predicted less measured, + and − of the coordinate as above the panels",
+        f"largest error {fixed(float(sizes.max()), 1)}°" + ", beyond the scale" * beyond,
+        f"the first {MOST_CASES} of {cases} load cases" if cases > MOST_CASES else "",
+    ]
+    explain_marks(figure, handles, "; ".join(word for word in words if word) + ".", len(handles))

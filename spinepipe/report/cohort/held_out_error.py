@@ -1,0 +1,128 @@
+"""Figure: error of motion that was fitted and of motion that was held out, by representation."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from scipy import stats
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.cohort.held_out import rotation_errors
+from spinepipe.report.cohort.named import NAME
+from spinepipe.report.layout import explain_marks, head
+from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.spread import Array, finite
+from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
+from spinepipe.report.words import count, number
+from spinepipe.studies import CohortStiffness
+from spinepipe.tables.cohort_stiffness import REPRESENTATIONS
+
+PANELS = {
+    "fitted": "Fitted motion",
+    "left_out_case": "Left-out load case",
+    "left_out_specimen": "Left-out specimen",
+}
+LEAST_DEG = 1e-3
+"""Smaller errors, of exact fits, are drawn there."""
+
+_ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
+_PUBLISHED: dict[str, tuple[str, tuple[int, tuple[int, int]]]] = {
+    "literature": (GREY, (0, (4, 2))),
+    "literature_levels": (THEIRS, (0, (1, 1))),
+}
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+
+def held_out_error_figure(
+    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel for fitted motion and one for each way of holding motion out."""
+    errors = tables["errors"]
+    found = rotation_errors(errors) if len(errors) else errors
+    panels = [name for name in PANELS if len(found) and (found["stage"] == name).any()]
+    if not panels:
+        return saying("No error of a fit can be shown: no fit has a result.")
+    fitted = found[found["stage"].isin(panels)]
+    rows = [name for name in REPRESENTATIONS[::-1] if name in set(fitted["representation"])]
+    published = _published(found)
+    figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
+    axes = figure.subplots(1, len(panels), sharey=True, sharex=True, squeeze=False).ravel()
+    low, high = _reach([*finite(fitted["error"]), *published.values()])
+    for index, (name, axis) in enumerate(zip(panels, axes, strict=True)):
+        head(axis, index, PANELS[name])
+        axis.set_xscale("log")
+        axis.set_xlim(low, high)
+        log_ticks(axis.xaxis, low, high, 5)
+        axis.set_xlabel("root mean square error of rotations (°)")
+        axis.set_yticks(range(len(rows)), [NAME[row].replace(" of ", "\nof ") for row in rows])
+        axis.set_ylim(-0.55, len(rows) - 0.35)
+        axis.spines["left"].set_visible(False)
+        for representation, value in published.items():
+            color, dashes = _PUBLISHED[representation]
+            axis.axvline(value, color=color, ls=dashes, lw=1.0, zorder=1)
+        _draw(axis, found[found["stage"] == name], rows)
+    _explain(figure, published, len(cohort.specimen_names))
+    return figure
+
+
+def interval_of_mean(values: Array) -> tuple[float, float] | None:
+    """95 % interval of the mean by Student's t; None of fewer than two values."""
+    if len(values) < 2:
+        return None
+    error = float(stats.sem(values))
+    reach = float(stats.t.ppf(0.975, len(values) - 1)) * error
+    mean = float(values.mean())
+    return max(0.0, mean - reach), mean + reach
+
+
+def _published(found: pd.DataFrame) -> dict[str, float]:
+    """Mean error over specimens of each published set."""
+    rows = found[found["stage"] == "literature"]
+    means = rows.groupby("representation")["error"].mean()
+    return {name: float(means[name]) for name in _PUBLISHED if name in means.index}
+
+
+def _reach(values: Sequence[float]) -> tuple[float, float]:
+    sizes = np.maximum(np.asarray(values, dtype=float), LEAST_DEG)
+    return float(sizes.min()) / 1.35, float(sizes.max()) * 1.35
+
+
+def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
+    low, _ = axis.get_xlim()
+    for y, name in enumerate(names):
+        values = finite(rows.loc[rows["representation"] == name, "error"])
+        axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=0)
+        if not len(values):
+            note(axis, 0.02, y, "no result", GREY)
+            continue
+        shown = np.maximum(values, LEAST_DEG)
+        shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * 0.3
+        axis.plot(shown, y - 0.12 + shift, "o", color=OURS, ms=3.0, mew=0, alpha=0.55, zorder=3)
+        words = f"{number(float(values.mean()))}°"
+        ends = interval_of_mean(values)
+        if ends is not None:
+            axis.plot([max(ends[0], low), ends[1]], [y + 0.16] * 2, color=BLACK, lw=1.1, zorder=4,
+                      solid_capstyle="butt")  # fmt: skip
+            words = f"{words} ({number(ends[0])}–{number(ends[1])})"
+        middle = max(float(values.mean()), LEAST_DEG)
+        axis.plot([middle], [y + 0.16], "D", color=BLACK, ms=3.2, mew=0, zorder=5)
+        note(axis, 0.02, y + 0.4, words, BLACK)
+
+
+def _explain(figure: Figure, published: Mapping[str, float], specimens: int) -> None:
+    handles = [Line2D([], [], color=OURS, marker="o", ms=3.0, mew=0, ls="", alpha=0.55,
+                      label="a specimen")]  # fmt: skip
+    mean = "mean with 95 % interval" if specimens > 1 else "mean"
+    handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
+    for name, value in published.items():
+        color, dashes = _PUBLISHED[name]
+        label = f"{NAME[name]}: {number(value)}°"
+        handles.append(Line2D([], [], color=color, ls=dashes, lw=1.0, label=label))
+    words = (
+        "All measured rotations of all joints, load steps and used cycles; "
+        f"{count(specimens, 'specimen')}. Vertical lines: stiffness that was not fitted at all."
+    )
+    explain_marks(figure, handles, words, len(handles))

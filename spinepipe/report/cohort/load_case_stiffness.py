@@ -1,0 +1,173 @@
+"""Figure: stiffness fitted to one load case against stiffness fitted to all of them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.cohort.case_ratios import ratios
+from spinepipe.report.cohort.chosen import single_cases
+from spinepipe.report.cohort.named import NAME, case, short
+from spinepipe.report.layout import explain_marks, head
+from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.sections import sections
+from spinepipe.report.spread import BAR_PT, Array, finite, quartiles
+from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
+from spinepipe.report.words import AXIS, count
+from spinepipe.studies import CohortStiffness
+from spinepipe.units import COORDINATES
+
+_SHOWN = ("per_specimen", "per_joint")
+_ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_LEAST_REACH, _FARTHEST = 1.15, 30.0
+_FEW, _MOST_INTERVALS = 12, 120
+"""Fits of a row that keep their order; and that have an interval each."""
+
+
+def load_case_stiffness_figure(
+    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A line of panels per representation, a panel per coordinate, a row per load case."""
+    stiffness = tables["stiffness"]
+    cases = single_cases(stiffness) if len(stiffness) else []
+    if len(cases) < 2:
+        return saying("One load case: nothing to compare fits of single load cases with.")
+    found = ratios(stiffness, tables["errors"])
+    found = found[found["ratio"].notna()]
+    shown = [name for name in _SHOWN if name in set(found["representation"])]
+    shown = shown or list(dict.fromkeys(found["representation"]))[:1]
+    if not shown:
+        return saying("No stiffness was found both for a load case by itself and for all of them.")
+    names = [name for name in COORDINATES if name in set(found["coordinate"])]
+    height = _ROW_MM * len(cases) + _AROUND_MM
+    lines, figure = sections([(len(names), height)] * len(shown), _KEY_MM)
+    number_of = 0
+    for representation, axes in zip(shown, lines, strict=True):
+        for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
+            head(axis, number_of, AXIS[name])
+            number_of += 1
+            here = found[
+                (found["representation"] == representation) & (found["coordinate"] == name)
+            ]
+            _draw(axis, here, cases)
+            axis.set_yticks(range(len(cases)), [_two_lines(one) for one in cases[::-1]])
+            place = axis.get_subplotspec()
+            axis.tick_params(labelleft=place is None or place.is_first_col())
+            if index == 0:
+                axis.set_ylabel(NAME[representation], fontweight="bold")
+    tested = [_tested(study, tables["statistics"], name) for name in shown]
+    _explain(figure, found[found["representation"].isin(shown)], tested)
+    return figure
+
+
+def _two_lines(test: str) -> str:
+    words = short(case(test), 32).split(" ")
+    middle = -(-len(words) // 2)
+    return "\n".join(" ".join(part) for part in (words[:middle], words[middle:]) if part)
+
+
+def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
+    axis.set_xscale("log")
+    axis.axvline(1.0, color=BLACK, lw=0.6, zorder=1)
+    low, high = _reach(rows)
+    axis.set_xlim(low, high)
+    log_ticks(axis.xaxis, low, high, 5)
+    axis.set_ylim(-0.55, len(cases) - 0.4)
+    axis.spines["left"].set_visible(False)
+    axis.set_xlabel("stiffness, this load case / all")
+    for y, test in enumerate(cases[::-1]):
+        axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=0)
+        here = rows[rows["fitted_to"] == test]
+        if not len(here):
+            axis.text(0.02, y, "no result", transform=axis.get_yaxis_transform(), color=GREY,
+                      fontsize=6.0, va="center")  # fmt: skip
+            continue
+        _draw_row(axis, here, y)
+
+
+def _reach(rows: pd.DataFrame) -> tuple[float, float]:
+    """Both ways equally far, as far as stiffness that the data hold goes."""
+    held = rows[~rows["doubted"]] if (~rows["doubted"]).any() else rows
+    sizes = np.abs(np.log(finite(held[["ratio", "low", "high"]])))
+    far = float(np.exp(sizes.max())) if len(sizes) else _LEAST_REACH
+    end = min(_FARTHEST, max(_LEAST_REACH, far * 1.05))
+    return 1.0 / end, end
+
+
+def _draw_row(axis: Axes, rows: pd.DataFrame, y: int) -> None:
+    """Each fit with its interval; where there are many, dots with their middle half."""
+    loaded = bool(rows["loaded"].any())
+    color = OURS if loaded else GREY
+    low, high = axis.get_xlim()
+    n = len(rows)
+    if n > _MOST_INTERVALS:
+        axis.plot(np.clip(rows["ratio"], low, high), y + _shifts(n), "o", color=color, ms=1.8,
+                  mew=0, alpha=0.3, zorder=3, rasterized=True)  # fmt: skip
+    else:
+        for at, row in zip(y + _shifts(n), rows.to_dict("records"), strict=True):
+            _draw_fit(axis, row, float(at), color, n <= _FEW)
+    if n > _FEW:  # of all fits: without those not held by the data the median would be biased
+        middle = quartiles(np.clip(finite(rows["ratio"]), low, high))
+        axis.plot([middle.median] * 2, [y - 0.36, y + 0.36], color=BLACK, lw=1.2, zorder=6)
+        axis.plot([middle.low, middle.high], [y, y], color=BLACK, lw=BAR_PT * 0.5, alpha=0.8,
+                  solid_capstyle="butt", zorder=5)  # fmt: skip
+
+
+def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool) -> None:
+    """One fit with its interval, or its side where it is beyond the axis."""
+    low, high = axis.get_xlim()
+    x = min(max(row["ratio"], low), high)
+    beyond = x != row["ratio"]
+    if not pd.isna(row["low"]) and not beyond:
+        ends = [max(row["low"], low), min(row["high"], high)]
+        axis.plot(ends, [y, y], color=color, lw=0.8 if roomy else 0.5, zorder=3,
+                  alpha=1.0 if roomy else 0.45, solid_capstyle="butt")  # fmt: skip
+    shape = "o" if not beyond else "<" if x == low else ">"
+    face = WHITE if row["doubted"] or beyond else color
+    axis.plot([x], [y], shape, color=color, mfc=face, ms=3.0 if roomy else 2.2, mew=0.6,
+              zorder=4, clip_on=False)  # fmt: skip
+
+
+def _shifts(n: int) -> Array:
+    """(n,) places around the middle of a row: in order where they are few, else mixed."""
+    if n > _FEW:
+        return np.asarray((np.arange(n) * _GOLDEN % 1.0 - 0.5) * 0.5, dtype=float)
+    return 0.3 - 0.6 * (np.arange(n) + 0.5) / n
+
+
+def _explain(figure: Figure, rows: pd.DataFrame, tested: Sequence[str]) -> None:
+    handles = [
+        Line2D([], [], color=OURS, marker="o", ms=3.0, lw=0.8, label="this load case loads it"),
+        Line2D([], [], color=GREY, marker="o", ms=3.0, lw=0.8, label="it does not"),
+    ]
+    if rows["doubted"].any():
+        handles.append(Line2D([], [], color=GREY, marker="o", mfc=WHITE, ms=3.0, lw=0.8,
+                              label="not identifiable or at a bound"))  # fmt: skip
+    words = (
+        "Symbol: a specimen, or a joint of it; line: 95 % interval of the fit to this load case; "
+        f"black, where more than {_FEW} stand in a row: median and middle half; lines are left out "
+        f"of rows of more than {_MOST_INTERVALS}; ◁▷: beyond the axis."
+    )
+    told = " ".join(part for part in (words, *tested) if part)
+    explain_marks(figure, handles, told, len(handles))
+
+
+def _tested(study: CohortStiffness, statistics: pd.DataFrame, representation: str) -> str:
+    """How many specimens the nested F test calls load-case specific."""
+    if not len(statistics):
+        return ""
+    family = statistics["family"] == f"load_case_specific/{representation}"
+    known = statistics.loc[family, "p_holm"].dropna()
+    if not len(known):
+        return ""
+    many = int((known < study.significance).sum())
+    return (
+        f"{NAME[representation].capitalize()}: separate stiffness is significantly better in "
+        f"{many} of {count(len(known), 'specimen')} (nested F test, Holm)."
+    )
