@@ -168,7 +168,7 @@ def _descend(evaluator: Evaluator, start: Array, known: Sequence[Optimum]) -> Op
     problem = evaluator.problem
     standing, stiffened = _stand_up(evaluator, start)
     if standing is None:
-        nowhere = Evaluation(None, None, (), evaluator.coordinate)
+        nowhere = Evaluation(None, None, (), evaluator.coordinate, evaluator.sharing)
         x = problem.upper.copy()
         at_bound = np.ones(len(x), dtype=int)
         return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, TIPPED, 0, stiffened)

@@ -1,5 +1,6 @@
 """A calibration problem: a model, the tests it was measured in, and what may be moved to fit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -79,13 +80,19 @@ class Problem:
 class Evaluation:
     """Weighted residuals (N,) and Jacobian (N, m) at one point; None where it has no equilibrium.
 
-    ``poses`` holds (T, n) of every case, ``coordinate`` (N,) which of the six each residual is of.
+    Attributes
+    ----------
+    poses : (T, n) of every case.
+    coordinate : (N,) which of the six each residual is of.
+    sharing : (N,) number of the residuals that share an error of step 0 which the cost takes no
+        account of; -1 for none.
     """
 
     residual: Array | None
     jacobian: Array | None
     poses: tuple[Array, ...]
     coordinate: NDArray[np.int64]
+    sharing: NDArray[np.int64]
     message: str = ""
 
 
@@ -115,6 +122,7 @@ class Evaluator:
             raise RefusedModel(refusal)
         self._used = [_used(m, problem.weights) for m in problem.cases]
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
+        self.sharing = sharing(problem.cases, self._used, problem.correlated)
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         self._solver: AtRest | Settling = (
             Settling(problem.free, problem.course)
@@ -147,13 +155,13 @@ class Evaluator:
         systems = [system.with_model(model) for system in self._systems]
         solved = self._solver.solve(x, systems)
         if isinstance(solved, str):
-            return Evaluation(None, None, (), self.coordinate, solved)
+            return Evaluation(None, None, (), self.coordinate, self.sharing, solved)
         numbers = range(len(systems))
         residual = np.concatenate([self._residual(n, systems[n], solved.poses[n]) for n in numbers])
         jacobian = np.concatenate(
             [self._jacobian(n, systems[n], solved.poses[n], solved.by_x[n]) for n in numbers]
         )
-        return Evaluation(residual, jacobian, solved.poses, self.coordinate)
+        return Evaluation(residual, jacobian, solved.poses, self.coordinate, self.sharing)
 
     def _residual(self, number: int, system: System, poses: Array) -> Array:
         """(N,) weighted residuals of the readings of one case that enter the cost."""
@@ -179,6 +187,18 @@ class Evaluator:
         if self.problem.correlated and self.problem.cases[number].zeroed:
             errors = whitened(errors, used)
         return errors[used]
+
+
+def sharing(
+    cases: Sequence[MeasuredCase], used: Sequence[NDArray[np.bool_]], correlated: bool
+) -> NDArray[np.int64]:
+    """(N,) see `Evaluation`: one number for each zeroed case, joint and coordinate."""
+    numbers = []
+    for first, (case, read) in enumerate(zip(cases, used, strict=True)):
+        _, joint, coordinate = np.nonzero(read)
+        own = (first * read.shape[1] + joint) * 6 + coordinate
+        numbers.append(own if case.zeroed and not correlated else np.full(len(own), -1))
+    return np.concatenate(numbers)
 
 
 def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:

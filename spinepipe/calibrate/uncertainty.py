@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.calibrate.problem import Evaluation, Problem
+from spinepipe.calibrate.zeroing import shared_sums
 from spinepipe.effects.contract import Array
 from spinepipe.units import BORDER_PER_SI
 
@@ -64,6 +65,9 @@ def uncertainty(
 ) -> Uncertainty:
     """Uncertainty of a fit from its Jacobian; unknowns at a bound are held there.
 
+    Where residuals share the error of step 0 and least squares took no account of it, the
+    covariance does: (J'J)^-1 J' (I + S) J (J'J)^-1, and the scatter is that before zeroing.
+
     Parameters
     ----------
     noise : (6,) m and rad, of one reading (before zeroing); with None the scatter of the weighted
@@ -77,9 +81,9 @@ def uncertainty(
     inside = at_bound == 0
     freedom = len(evaluation.residual) - int(inside.sum())
     covariance, error = infinite, np.full(m, np.inf)
-    deviation = _deviation(problem, evaluation, freedom, noise)
+    deviation = _deviation(problem, evaluation, inside, freedom, noise)
     if deviation is not None:
-        inner, known = _covariance(evaluation.jacobian[:, inside], deviation)
+        inner, known = _covariance(evaluation, inside, deviation)
         covariance = infinite.copy()
         covariance[np.ix_(inside, inside)] = inner
         error[inside] = np.where(known, np.sqrt(np.diagonal(inner)), np.inf)
@@ -87,30 +91,46 @@ def uncertainty(
 
 
 def _deviation(
-    problem: Problem, evaluation: Evaluation, freedom: int, noise: Array | None
+    problem: Problem,
+    evaluation: Evaluation,
+    inside: NDArray[np.bool_],
+    freedom: int,
+    noise: Array | None,
 ) -> Array | None:
-    """(N,) SD of each weighted residual: declared, or one scatter for all, or None if unknown."""
-    residual = evaluation.residual
+    """(N,) SD of each weighted residual: declared, or one scatter for all, or None if unknown.
+
+    Of residuals that share the error of step 0 it is the SD before zeroing.
+    """
+    residual, jacobian = evaluation.residual, evaluation.jacobian
     assert residual is not None
+    assert jacobian is not None
     if noise is not None:
         return declared_deviation(problem, evaluation.coordinate, noise)
     if freedom <= 0:
         return None
-    return np.full(len(residual), np.sqrt(residual @ residual / freedom))
+    left, _, _ = _seen(jacobian[:, inside])
+    everything = len(residual) + np.count_nonzero(evaluation.sharing >= 0)  # trace of I + S
+    fitted = np.sum(left**2) + np.sum(shared_sums(left, evaluation.sharing) ** 2)
+    return np.full(len(residual), np.sqrt(residual @ residual / (everything - fitted)))
 
 
-def _covariance(jacobian: Array, deviation: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Covariance (m, m) of the unknowns and which of them (m,) the data determine at all."""
-    if jacobian.shape[1] == 0:
-        return np.zeros((0, 0)), np.zeros(0, dtype=bool)
-    m = jacobian.shape[1]
+def _seen(jacobian: Array) -> tuple[Array, Array, Array]:
+    """Directions that leave a trace: left vectors (N, k), singular values (k,), right (k, m)."""
     left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
-    if not (len(singular) and singular[0] > 0.0):
-        return np.full((m, m), np.inf), np.zeros(m, dtype=bool)
-    seen = singular > RANK_TOLERANCE * singular[0]
-    gain = (right[seen].T / singular[seen]) @ left[:, seen].T * deviation
-    unseen = np.linalg.norm(np.eye(m) - right[seen].T @ right[seen], axis=0)
+    seen = singular > RANK_TOLERANCE * max(singular.max(initial=0.0), np.finfo(float).tiny)
+    return left[:, seen], singular[seen], right[seen]
+
+
+def _covariance(
+    evaluation: Evaluation, inside: NDArray[np.bool_], deviation: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Covariance (m, m) of the unknowns and which of them (m,) the data determine at all."""
+    assert evaluation.jacobian is not None
+    left, singular, right = _seen(evaluation.jacobian[:, inside])
+    gain = (right.T / singular) @ left.T * deviation
+    shared = shared_sums(gain.T, evaluation.sharing)
+    covariance = gain @ gain.T + shared.T @ shared
+    unseen = np.linalg.norm(np.eye(right.shape[1]) - right.T @ right, axis=0)
     known = unseen < UNSEEN_SHARE
-    covariance = gain @ gain.T
     covariance[~known], covariance[:, ~known] = np.inf, np.inf
     return covariance, known

@@ -30,3 +30,11 @@ def whitened(errors: Array, used: NDArray[np.bool_]) -> Array:
     shared: Array = (1.0 - 1.0 / np.sqrt(1.0 + n)) / n * errors.sum(axis=0)
     result: Array = errors - shared
     return result
+
+
+def shared_sums(rows: Array, sharing: NDArray[np.int64]) -> Array:
+    """(G, k) sums of rows (N, k) that share an error; those of number -1 are left out."""
+    _, group = np.unique(sharing, return_inverse=True)
+    sums = np.zeros((group.max(initial=-1) + 1, rows.shape[1]))
+    np.add.at(sums, group, rows)
+    return sums[1:] if (sharing < 0).any() else sums

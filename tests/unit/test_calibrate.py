@@ -409,6 +409,7 @@ def test_uncertainty_of_a_known_jacobian_in_closed_form() -> None:
     evaluation = replace(
         Evaluator(problem).at(np.zeros(1)),
         residual=np.zeros(2), jacobian=np.array([[6.0], [8.0]]), coordinate=np.array([3, 4]),
+        sharing=np.full(2, -1),
     )  # fmt: skip
     noise = np.deg2rad(np.full(6, 0.5))
     found = uncertainty(problem, evaluation, np.zeros(1, dtype=int), 1.0, noise)

@@ -167,3 +167,31 @@ def test_the_whitened_jacobian_is_the_slope_of_the_whitened_residuals(gappy: Pro
     expected = (ends[1] - ends[0]) / 2e-3
     found = evaluator.at(np.zeros(3)).jacobian @ along
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_plain_least_squares_says_how_sure_it_is_of_zeroed_readings() -> None:
+    """Errors of the estimates spread as told, though the cost takes readings for independent."""
+    errors, told = [], []
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        problem = replace(zeroed_problem(rng, steps=8, weights=ANGLES), correlated=False)
+        found = fit(problem)
+        errors.append(found.x)
+        told.append(found.uncertainty.standard_error)
+    spread = np.std(errors, axis=0)
+    np.testing.assert_allclose(np.mean(told, axis=0), spread, rtol=0.2)
+
+
+def test_scatter_and_errors_of_zeroed_readings_by_explicit_matrices() -> None:
+    problem = zeroed_problem(np.random.default_rng(3), weights=ANGLES)
+    problem = replace(with_gaps(problem), correlated=False)
+    found = fit(problem)
+    at = Evaluator(problem).at(found.x)
+    shared = at.sharing[:, None] == at.sharing
+    omega = np.eye(len(at.residual)) + shared
+    inverse = np.linalg.inv(at.jacobian.T @ at.jacobian)
+    left_over = np.eye(len(omega)) - at.jacobian @ inverse @ at.jacobian.T
+    variance = at.residual @ at.residual / np.trace(left_over @ omega)
+    expected = variance * inverse @ at.jacobian.T @ omega @ at.jacobian @ inverse
+    np.testing.assert_allclose(found.uncertainty.covariance, expected, rtol=1e-6)
+    assert shared.sum(axis=1).max() == 3

@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Sequence
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -73,7 +74,8 @@ def _one(task: tuple[int, float, Path]) -> Path:
     seed, error, folder = task
     path = folder / f"seed={seed:04d}-centre_error_mm={error:g}.parquet"
     if not path.exists():
-        rows = _rows(seed, error, folder / f"cohort_{seed}_{error:g}")
+        with TemporaryDirectory() as place:
+            rows = _rows(seed, error, Path(place) / "phantom")
         partial = path.with_suffix(".part")
         rows.to_parquet(partial)
         partial.rename(path)
@@ -102,9 +104,6 @@ def _rows(seed: int, error: float, folder: Path) -> pd.DataFrame:
         at = [(p.rows[0], p.column) for p in problem.free]
         off = [np.log(k[j, c]) - truth[number, j, c - 3] for j, c in at]
         frames.append(_frame("partially_pooled", at, off, np.sqrt(np.diag(own.covariance))))
-    for file in folder.iterdir():
-        file.unlink()
-    folder.rmdir()
     return pd.concat(frames, ignore_index=True).assign(seed=seed, centre_error_mm=error)
 
 
