@@ -10,7 +10,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from benchmarks import engine, identification, lost_fits, real_geometry, study
+from benchmarks import cohort, engine, identification, lost_fits, real_geometry, study
 from benchmarks.timing import machine
 
 RESULTS = Path(__file__).parent / "results"
@@ -23,6 +23,7 @@ def main() -> None:
         "identification": identification_parts,
         "lost_fits": lost_fits_parts,
         "whole_study": whole_study,
+        "cohort": cohort_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
@@ -100,6 +101,26 @@ def whole_study() -> None:
     lines = _head("The whole study", about)
     rows = _study_rows(lines, study.whole_runs())
     _write("whole_study", lines, {"machine": about, "study": rows})
+
+
+def cohort_parts() -> None:
+    """One specimen beside OpenSim, six pooled, and the whole cohort study."""
+    about = _about()
+    lines = _head("Cohort study", about)
+    one, pooled_s = cohort.specimen(), cohort.pooled_s()
+    lines += [
+        "",
+        "| what | spinepipe ms | peer | peer ms | ratio | agreement |",
+        "|---|---|---|---|---|---|",
+        f"| {one.what} | {1e3 * one.ours_s:.0f} | {one.peer} | {1e3 * one.peer_s:.0f} "
+        f"| {one.ratio:.0f} | {one.agreement} |",
+        f"| six specimens pooled, three load cases, two cycles of ten steps | {1e3 * pooled_s:.0f} "
+        "| none | | | |",
+    ]
+    print(*lines[-4:], sep="\n", flush=True)
+    rows = _study_rows(lines, cohort.runs(), cohort.STUDY)
+    data = {"machine": about, "specimen": {**asdict(one), "ratio": one.ratio}, "pooled_s": pooled_s}
+    _write("cohort", lines, {**data, "study": rows})
 
 
 def real_geometry_part(given: str | None) -> None:

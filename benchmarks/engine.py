@@ -37,12 +37,14 @@ class Result:
         return self.peer_s / self.ours_s
 
 
-def _moments(chain: PeerChain) -> list[PeerChain]:
-    """Flexion, right bending and left rotation by a pure moment on the top vertebra."""
+def with_moments(chain: PeerChain, share: float = 1.0) -> list[PeerChain]:
+    """Flexion, right bending, left rotation: a share of the pure moment on the top vertebra."""
     top = chain.n_joints - 1
     axes = (np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     point = chain.centres[top]
-    return [chain.with_loads(Load(top, np.zeros(3), MOMENT_NM * axis, point)) for axis in axes]
+    return [
+        chain.with_loads(Load(top, np.zeros(3), share * MOMENT_NM * axis, point)) for axis in axes
+    ]
 
 
 def _largest_difference(ours: np.ndarray, peer: np.ndarray) -> str:
@@ -51,7 +53,7 @@ def _largest_difference(ours: np.ndarray, peer: np.ndarray) -> str:
 
 def equilibria() -> Iterator[Result]:
     """One equilibrium under 7.5 N m of flexion."""
-    peer_chain = _moments(t12_s1_chain())[0]
+    peer_chain = with_moments(t12_s1_chain())[0]
     model, case = spine_model(peer_chain), load_case(peer_chain)
     system = System(Chain(model), model, case)
     ours = cpu_seconds(lambda: follow(system), 200)
@@ -84,7 +86,7 @@ def equilibria() -> Iterator[Result]:
 def calibrations() -> Iterator[Result]:
     """Rotational stiffness from three load cases with exact data: 3 shared and 18 per level."""
     chain = t12_s1_chain()
-    loaded = _moments(chain)
+    loaded = with_moments(chain)
     rng = np.random.default_rng(5)
     for grouping, groups, repeats in (
         ("per_specimen", opensim_calibration.one_per_axis(chain.n_joints), 3),
@@ -110,11 +112,12 @@ def calibrations() -> Iterator[Result]:
             ours.median,
             "OpenSim static root-find + least squares",
             peer.median,
-            f"off truth by {_off(found, truth)}, OpenSim by {_off(fits[-1].stiffness, truth)}",
+            f"off truth by {off(found, truth)}, OpenSim by {off(fits[-1].stiffness, truth)}",
         )
 
 
-def _off(found: np.ndarray, truth: np.ndarray) -> str:
+def off(found: np.ndarray, truth: np.ndarray) -> str:
+    """Largest relative error."""
     return f"{np.abs(found / truth - 1.0).max():.0e}"
 
 

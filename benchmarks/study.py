@@ -13,6 +13,7 @@ from pathlib import Path
 
 import psutil
 
+from spinepipe.jobs.layouts import files_of
 from spinepipe.studies import JointPoseSensitivity, check
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -62,9 +63,10 @@ def runs() -> Iterator[Run]:
 
 def whole_runs() -> Iterator[Run]:
     """Run the whole study, bootstraps, methods, tests and report included."""
+    wanted = files_of(*check(ROOT, STUDY)).results()
     with copy_of_project() as folder:
-        yield run_workflow("whole study, cold", folder, ["all"], "300 s")
-        yield run_workflow("nothing to do", folder, ["all"], "")
+        yield run_workflow("whole study, cold", folder, wanted, "300 s")
+        yield run_workflow("nothing to do", folder, wanted, "")
 
 
 @contextlib.contextmanager

@@ -42,6 +42,6 @@ def machine() -> dict[str, str]:
         "processor": names[0] if names else platform.processor(),
         "cores": str(os.cpu_count()),
         "memory_gib": f"{pages / 2**30:.1f}",
-        "system": platform.platform(),
+        "system": platform.system(),
         "python": platform.python_version(),
     }

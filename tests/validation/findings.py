@@ -8,14 +8,15 @@ from pathlib import Path
 
 import pandas as pd
 
-from spinepipe.jobs.digest import code_digest
 from tests.generators.phantom import phantom, write
+from tests.validation.made_by import made_by
 
 ROOT = Path(__file__).resolve().parents[2]
 LAWS = ("linear", "stiffening")
 PHANTOMS = 5
 PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
 STUDY = "study: phantom\nkind: cohort_stiffness\ncohort: phantom\n"
+JOBS = ("fit", "pool", "literature", "left_out", "mae", "ranking", "statistics", "findings")
 KEPT = ("findings", "ranking", "mae", "statistics", "sign_checks")
 """Tables of each study that are kept."""
 
@@ -31,8 +32,7 @@ def tables(seeds: Sequence[int] = range(PHANTOMS)) -> dict[str, pd.DataFrame]:
 
 
 def _studies(seeds: Sequence[int]) -> Iterator[tuple[str, int, Path]]:
-    digest = code_digest("spinepipe.jobs.cohort_stiffness.findings")[:12]
-    base = ROOT / "results" / "validation" / "findings" / digest
+    base = ROOT / "results" / "validation" / "findings" / made_by(*JOBS)
     for seed in seeds:
         for law in LAWS:
             folder = base / f"law={law}" / f"seed={seed:04d}"

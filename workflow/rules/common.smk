@@ -1,5 +1,6 @@
 # Helpers of the rules: studies, digests and which files a job needs. How a job is run: execution.smk.
 import os
+import re
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -23,7 +24,7 @@ def results_of(kind):
 
     The pattern names the studies, so that rules of other kinds may write files of the same name.
     """
-    names = studies.names_of_kind(Path(ROOT), kind)
+    names = [re.escape(name) for name in studies.names_of_kind(Path(ROOT), kind)]
     return f"results/{{study,{'|'.join(names) or 'none of this kind'}}}"
 
 

@@ -28,6 +28,7 @@ def lift_rate_limit():
     through all that are ready (docs/decisions/0007).
     """
     if workflow.local_exec:
+        assert hasattr(workflow.scheduler, "job_rate_limiter"), "see decision 0007"
         workflow.scheduler.job_rate_limiter = None
 
 

@@ -1,0 +1,20 @@
+"""What a measured result hangs on: results are kept as long as this stays the same."""
+
+import hashlib
+from pathlib import Path
+
+from spinepipe.jobs.digest import code_digest
+
+TESTS = Path(__file__).resolve().parents[1]
+SOURCES = ("generators/phantom", "validation")
+
+
+def made_by(*jobs: str) -> str:
+    """Digest of these jobs of kind cohort_stiffness, of the generator and of the validation."""
+    found = hashlib.sha256()
+    for job in jobs:
+        found.update(code_digest(f"spinepipe.jobs.cohort_stiffness.{job}").encode())
+    for folder in SOURCES:
+        for path in sorted((TESTS / folder).glob("*.py")):
+            found.update(path.read_bytes())
+    return found.hexdigest()[:12]
