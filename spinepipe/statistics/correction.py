@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from statsmodels.stats.multitest import multipletests
+from numpy.typing import NDArray
 
 
 def family_size(ps: Sequence[float | None]) -> int:
@@ -24,10 +24,20 @@ def corrected(
     ValueError
         For a p outside 0 to 1.
     """
-    known = [p for p in ps if p is not None]
-    if not known:
-        return [None] * len(ps)
-    if not all(0.0 <= p <= 1.0 for p in known):  # also false for a NaN
+    known = np.array([p for p in ps if p is not None], dtype=float)
+    if not np.all((known >= 0.0) & (known <= 1.0)):  # also false for a NaN
         raise ValueError("a p value lies between 0 and 1")
-    values = iter(np.asarray(multipletests(known, method=method)[1]).tolist())
+    values = iter((_holm(known) if method == "holm" else len(known) * known).clip(max=1.0).tolist())
     return [None if p is None else next(values) for p in ps]
+
+
+def _holm(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Holm 1979: the i-th smallest of n times n - i, none below its predecessor.
+
+    Written out because statsmodels collects garbage at each call, 0.1 s in a long-lived process.
+    """
+    order = np.argsort(p, kind="stable")
+    steps = np.maximum.accumulate(np.arange(len(p), 0, -1) * p[order])
+    result = np.empty_like(steps)
+    result[order] = steps
+    return result

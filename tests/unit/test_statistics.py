@@ -6,6 +6,7 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.multitest import multipletests
 
 from spinepipe.statistics import (
     Ended,
@@ -387,3 +388,13 @@ def test_agreement_of_two_pairs_is_too_few() -> None:
     assert (found.status, found.bias, found.lower_limit) == (Ended.TOO_FEW, None, None)
     with pytest.raises(ValueError, match="finite"):
         bland_altman([1.0, np.nan, 3.0], [1.0, 2.0, 3.0])
+
+
+def test_corrections_are_those_of_statsmodels() -> None:
+    rng = np.random.default_rng(4)
+    for n in (1, 2, 7, 40):
+        ps = rng.uniform(size=n) ** 3
+        ps[n // 2 :: 3] = ps[0]  # ties
+        for method in ("bonferroni", "holm"):
+            expected = multipletests(ps, method=method)[1]
+            np.testing.assert_allclose(corrected(ps.tolist(), method), expected, rtol=1e-14)
