@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
@@ -25,20 +24,15 @@ def _sums(vectors: Sequence[Sequence[Array]]) -> Array:
     return np.array([np.sum([np.zeros(3), *of_step], axis=0) for of_step in vectors])
 
 
-def peak_step(case: LoadCase, among: NDArray[np.bool_] | None = None) -> int:
+def peak_step(case: LoadCase) -> int:
     """Place of the load step with the largest moment; the first of equal ones.
 
     Where no moment is applied, the step with the largest force.
-
-    Parameters
-    ----------
-    among : (T,) the steps to choose from; None for all.
     """
     applied = moments(case)
     if not applied.any():
         applied = _sums([[wrench.force for wrench in step.wrenches] for step in case.steps])
-    sizes = np.linalg.norm(applied, axis=1)
-    return int(np.argmax(sizes if among is None else np.where(among, sizes, -1.0)))
+    return int(np.argmax(np.linalg.norm(applied, axis=1)))
 
 
 def loaded_coordinate(case: LoadCase) -> str | None:

@@ -23,9 +23,10 @@ def f_test_nested(rss_small: float, df_small: int, rss_large: float, df_large: i
         more parameters, with the same weights.
     df_small, df_large : their residual degrees of freedom, values less parameters.
 
-    n of the outcome is ``df_large``. Effect size: partial R2, the share of the smaller model's
-    residual sum of squares that the further parameters explain. A larger model that fits worse
-    was not fitted to the end: F is 0 then, and the message says so.
+    n of the outcome is ``df_large``, 0 where the larger model leaves none. Effect size: partial
+    R2, the share of the smaller model's residual sum of squares that the further parameters
+    explain. A larger model that fits worse was not fitted to the end: F is 0 then, and the message
+    says so.
 
     Raises
     ------
@@ -35,7 +36,7 @@ def f_test_nested(rss_small: float, df_small: int, rss_large: float, df_large: i
     _check(rss_small, df_small, rss_large, df_large)
     if df_large < 1:
         message = f"{df_large} degrees of freedom left by the larger model; at least 1 is needed"
-        return NESTED.without(Ended.TOO_FEW, df_large, message)
+        return NESTED.without(Ended.TOO_FEW, max(df_large, 0), message)
     if rss_large == 0.0:
         message = "the larger model fits exactly: no residual to compare with"
         return NESTED.without(Ended.CONSTANT, df_large, message)

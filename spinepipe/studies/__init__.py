@@ -1,7 +1,7 @@
 """Studies: what is asked of a cohort, validated before anything runs."""
 
 from spinepipe.studies.check import check
-from spinepipe.studies.cohort_stiffness import CohortStiffness, CrossValidation, LevelStiffness
+from spinepipe.studies.cohort_stiffness import CohortStiffness, CrossValidation
 from spinepipe.studies.identification import (
     Bootstrap,
     DampingBootstrap,
@@ -11,6 +11,7 @@ from spinepipe.studies.identification import (
     Success,
 )
 from spinepipe.studies.joint_pose_sensitivity import Calibration, JointPoseSensitivity
+from spinepipe.studies.published_stiffness import LevelStiffness
 from spinepipe.studies.range_of_motion import PoseSd, RangeOfMotion, VirtualTests
 from spinepipe.studies.read import KINDS, read
 from spinepipe.studies.selection import Selection, names_of_kind, read_selection

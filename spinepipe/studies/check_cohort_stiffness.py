@@ -7,15 +7,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.cohort_stiffness import CohortStiffness
+from spinepipe.studies.fitted_to import ALL, ALL_BUT, NOBODY, NOTHING
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 __all__ = ["check_cohort_stiffness"]
-
-ALL, ALL_BUT, NOTHING = "all", "all_but_", "nothing"
-"""What ``fitted_to`` calls load cases together, so that no test can be called like this."""
-
-NOBODY = "nobody"
-"""Who is left out of a pooled fit of all specimens."""
 
 _UNFIT = re.compile(r"[/={}\\\x00-\x1f]|^\.|^\s|\s$")
 """What names of files, or of rules' wildcards, do not bear."""
@@ -56,10 +51,13 @@ def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterat
     for name in study.tests or cohort.tests:
         reserved = name in (ALL, NOTHING) or name.startswith(ALL_BUT)
         if name in cohort.tests and (reserved or _UNFIT.search(name)):
-            allowed = "names without / \\ = { }, not beginning with a dot or a space, "
-            allowed += f"and other than '{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
+            allowed = (
+                "names without / \\ = { } and control characters, not beginning with a dot or a "
+                "space, not ending with a space, and other than "
+                f"'{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
+            )
             place = (f"{cohort.folder.name}/loads.csv", None, "test")
-            yield Problem(*place, f"test '{name}'", allowed, "rename it in loads and motion")
+            yield Problem(*place, f"test {name!r}", allowed, "rename it in loads and motion")
     yield from _measured(document, study, cohort)
 
 

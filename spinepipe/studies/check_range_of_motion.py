@@ -30,12 +30,18 @@ def _at(document: Document, key: str) -> tuple[str, int | None, str]:
 
 def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
     """Sampled frames need to know how uncertain they are."""
-    if study.n_poses == 1 or study.pose_sd is not None or cohort.measurement_sd is not None:
+    if study.n_poses == 1 or study.pose_sd is not None:
         return
-    found = f"null with {study.poses} poses, and cohort '{cohort.name}' has no measurement_sd"
+    found = f"null with {study.poses} poses, and "
     allowed = "translation_mm and rotation_deg, or poses: 1 for the cohort's own frames only"
-    remedy = "set pose_sd, give the cohort a measurement_sd, or set poses: 1"
-    yield Problem(*_at(document, "pose_sd"), found, allowed, remedy)
+    remedy = "set pose_sd, or set poses: 1"
+    if cohort.motion is not None:
+        found += f"cohort '{cohort.name}' has motion.csv: its measurement_sd is that of a reading"
+        yield Problem(*_at(document, "pose_sd"), found, allowed, remedy)
+    elif cohort.measurement_sd is None:
+        found += f"cohort '{cohort.name}' has no measurement_sd"
+        remedy = "set pose_sd, give the cohort a measurement_sd, or set poses: 1"
+        yield Problem(*_at(document, "pose_sd"), found, allowed, remedy)
 
 
 def _tests(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:

@@ -1,46 +1,22 @@
 """The study kind that asks how stiffness differs between specimens, levels and load cases."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints
+from pydantic import BaseModel, Field
 
 from spinepipe.anatomy import published
 from spinepipe.cohort.header import MeasurementSd
-from spinepipe.studies.coordinates import FORM, Coordinate, Rotational
-from spinepipe.studies.identification import distinct
-from spinepipe.studies.published_stiffness import PublishedStiffness
+from spinepipe.studies.coordinates import FORM
+from spinepipe.studies.lists import Coordinates, EachOnce, Tests
+from spinepipe.studies.published_stiffness import LevelStiffness, PublishedStiffness
 from spinepipe.studies.study import Study
 
-__all__ = ["CohortStiffness", "CrossValidation", "LevelStiffness"]
+__all__ = ["CohortStiffness", "CrossValidation"]
 
 _PAPER = published("gould_2024b")
 
-_TestName = Annotated[str, StringConstraints(min_length=1)]
-_Tests = Annotated[
-    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
-_Coordinates = Annotated[
-    tuple[Coordinate, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
 Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
-_Representations = Annotated[
-    tuple[Representation, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
-
-
-class LevelStiffness(BaseModel):
-    """Published rotational stiffness of one joint; level_ratio keeps the ratios of these."""
-
-    model_config = FORM
-
-    extension_nm_per_rad: Rotational = Field(description="flexion-extension stiffness, N m/rad")
-    right_bending_nm_per_rad: Rotational = Field(description="lateral bending stiffness, N m/rad")
-    left_rotation_nm_per_rad: Rotational = Field(description="axial rotation stiffness, N m/rad")
-
-    def in_order(self) -> tuple[float, ...]:
-        """(3,) N m/rad in the order of the rotations."""
-        return tuple(dict(self).values())
 
 
 def _published_levels() -> dict[str, LevelStiffness]:
@@ -70,7 +46,7 @@ class CohortStiffness(Study):
 
     kind: Literal["cohort_stiffness"] = Field(description="kind of study")
     seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
-    tests: _Tests | None = Field(
+    tests: Tests | None = Field(
         default=None, description="load cases used; null: all that have a load and a motion"
     )
     cycles: Literal["after_first", "quietest", "all"] = Field(
@@ -82,11 +58,11 @@ class CohortStiffness(Study):
     steps: Literal["all", "peak"] = Field(
         default="all", description="load steps that enter the cost: all, or that of largest moment"
     )
-    representations: _Representations = Field(
+    representations: EachOnce[Representation] = Field(
         default=("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
         description="how stiffness is described; what the literature says is always shown beside",
     )
-    free: _Coordinates = Field(
+    free: Coordinates = Field(
         default=("extension", "right_bending", "left_rotation"),
         description="coordinates whose stiffness is fitted; the others keep the published value",
     )

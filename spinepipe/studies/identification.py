@@ -7,24 +7,11 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from spinepipe.anatomy import published
 from spinepipe.studies.coordinates import FORM, Rotational, Stiffness, Translational
+from spinepipe.studies.lists import EachOnce
 from spinepipe.units import COORDINATES
 
 _BOX = published("gould_2024a")["start_stiffness_box"]
 _LOW, _HIGH = _BOX["low"], _BOX["high"]
-
-
-def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
-    """The names as they are.
-
-    Raises
-    ------
-    ValueError
-        For a name that stands there twice.
-    """
-    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
-    if twice:
-        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
-    return names
 
 
 def _rising(sds: tuple[float, ...]) -> tuple[float, ...]:
@@ -34,9 +21,7 @@ def _rising(sds: tuple[float, ...]) -> tuple[float, ...]:
 
 
 _Loading = Literal["equilibrium", "quasi_static", "dynamic"]
-_Loadings = Annotated[
-    tuple[_Loading, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
+_Loadings = EachOnce[_Loading]
 _Millimetres = Annotated[float, Field(gt=0, le=20)]
 _SDs = Annotated[
     tuple[_Millimetres, ...], Field(strict=False, min_length=1), AfterValidator(_rising)

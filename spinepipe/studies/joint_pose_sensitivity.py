@@ -1,10 +1,10 @@
 """The study kind that asks how much the landmarks' uncertainty does to stiffness and motion."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints
+from pydantic import BaseModel, Field
 
-from spinepipe.studies.coordinates import FORM, Coordinate, Damping, Shift, Stiffness, Weights
+from spinepipe.studies.coordinates import FORM, Damping, Shift, Stiffness, Weights
 from spinepipe.studies.identification import (
     DampingBootstrap,
     Dynamic,
@@ -12,20 +12,11 @@ from spinepipe.studies.identification import (
     Methods,
     StartBootstrap,
     Success,
-    distinct,
 )
+from spinepipe.studies.lists import Coordinates, Tests
 from spinepipe.studies.study import Study
 
 __all__ = ["Calibration", "JointPoseSensitivity"]
-
-
-_TestName = Annotated[str, StringConstraints(min_length=1)]
-_Tests = Annotated[
-    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
-_Coordinates = Annotated[
-    tuple[Coordinate, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
 
 
 class Calibration(BaseModel):
@@ -33,7 +24,7 @@ class Calibration(BaseModel):
 
     model_config = FORM
 
-    free: _Coordinates = Field(
+    free: Coordinates = Field(
         default=("anterior", "superior", "extension"),
         description="coordinates whose stiffness is fitted; the others keep their start",
     )
@@ -60,7 +51,7 @@ class JointPoseSensitivity(Study):
 
     kind: Literal["joint_pose_sensitivity"] = Field(description="kind of study")
     seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
-    tests: _Tests | None = Field(
+    tests: Tests | None = Field(
         default=None, description="load cases used; null: all that have a load and a motion"
     )
     poses: int = Field(

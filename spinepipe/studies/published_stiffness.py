@@ -1,11 +1,11 @@
 """Published stiffness that studies start from where a study file names none."""
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from spinepipe.anatomy import published
-from spinepipe.studies.coordinates import Rotational, Stiffness, Translational
+from spinepipe.studies.coordinates import FORM, Rotational, Stiffness, Translational
 
-__all__ = ["PublishedStiffness"]
+__all__ = ["LevelStiffness", "PublishedStiffness"]
 
 _UNIFORM = {
     name: float(value)
@@ -37,3 +37,17 @@ class PublishedStiffness(Stiffness):
         default=_UNIFORM["left_rotation_nm_per_rad"],
         description="axial rotation stiffness, N m/rad",
     )
+
+
+class LevelStiffness(BaseModel):
+    """Rotational stiffness of one joint, where joints differ."""
+
+    model_config = FORM
+
+    extension_nm_per_rad: Rotational = Field(description="flexion-extension stiffness, N m/rad")
+    right_bending_nm_per_rad: Rotational = Field(description="lateral bending stiffness, N m/rad")
+    left_rotation_nm_per_rad: Rotational = Field(description="axial rotation stiffness, N m/rad")
+
+    def in_order(self) -> tuple[float, ...]:
+        """(3,) N m/rad in the order of the rotations."""
+        return tuple(dict(self).values())

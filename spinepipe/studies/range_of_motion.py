@@ -1,27 +1,19 @@
 """The study kind that asks how far spines of known geometry move in tests that nobody did."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints
+from pydantic import BaseModel, Field
 
-from spinepipe.studies.cohort_stiffness import LevelStiffness
 from spinepipe.studies.coordinates import FORM, Damping
-from spinepipe.studies.identification import distinct
-from spinepipe.studies.published_stiffness import PublishedStiffness
+from spinepipe.studies.lists import EachOnce, Tests
+from spinepipe.studies.published_stiffness import LevelStiffness, PublishedStiffness
 from spinepipe.studies.study import Study
 
 __all__ = ["PoseSd", "RangeOfMotion", "VirtualTests"]
 
-_TestName = Annotated[str, StringConstraints(min_length=1)]
-_Tests = Annotated[
-    tuple[_TestName, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
-]
 VirtualTest = Literal[
     "flexion", "extension", "right_bending", "left_bending", "left_rotation", "right_rotation"
-]
-_VirtualTests = Annotated[
-    tuple[VirtualTest, ...], Field(strict=False, min_length=1), AfterValidator(distinct)
 ]
 
 
@@ -44,7 +36,7 @@ class VirtualTests(BaseModel):
     model_config = FORM
 
     moment_nm: float = Field(default=7.5, gt=0, le=100, description="largest moment, N m")
-    tests: _VirtualTests = Field(
+    tests: EachOnce[VirtualTest] = Field(
         default=("flexion", "extension", "right_bending", "left_bending", "left_rotation",
                  "right_rotation"),
         description="where the moment turns the vertebra",
@@ -68,15 +60,15 @@ class RangeOfMotion(Study):
     )
     pose_sd: PoseSd | None = Field(
         default=None,
-        description="uncertainty of the joint frames; null: the cohort's measurement_sd, which "
-        "without motion.csv is what a pose read from its geometry is worth",
+        description="uncertainty of the joint frames; null: the cohort's measurement_sd, which is "
+        "that of a frame only in a cohort without motion.csv: others must name it here",
     )
     virtual_tests: VirtualTests | None = Field(
         default_factory=VirtualTests,
         description="tests that are computed; null: those of the cohort's loads.csv, of each its "
         "first cycle",
     )
-    tests: _Tests | None = Field(
+    tests: Tests | None = Field(
         default=None,
         description="with virtual_tests: null, the tests of loads.csv that are used; null: all",
     )

@@ -1,15 +1,7 @@
 """Result tables: one schema each, from which files are checked and the docs are generated."""
 
-from spinepipe.tables.cohort_stiffness import (
-    ERRORS,
-    FINDINGS,
-    FITS,
-    MAE,
-    POOLING,
-    RANKING,
-    SIGN_CHECKS,
-    STIFFNESS,
-)
+from spinepipe.tables.cohort_stiffness import ERRORS, FITS, POOLING, SIGN_CHECKS, STIFFNESS
+from spinepipe.tables.cohort_stiffness_analyses import FINDINGS, MAE, RANKING
 from spinepipe.tables.identification import (
     AGAINST_GOULD_2024A,
     AGAINST_GOULD_2024B,

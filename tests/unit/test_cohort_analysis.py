@@ -8,18 +8,23 @@ import pandas as pd
 import pytest
 
 from spinepipe.jobs.cohort_stiffness.claims import Claim, above_zero
-from spinepipe.jobs.cohort_stiffness.error_findings import overprediction_percent
+from spinepipe.jobs.cohort_stiffness.error_findings import every_level, overprediction_percent
 from spinepipe.jobs.cohort_stiffness.findings import finding_rows
-from spinepipe.jobs.cohort_stiffness.load_case_findings import load_case_findings, specific
+from spinepipe.jobs.cohort_stiffness.load_case_findings import (
+    load_case_findings,
+    loaded_ratios,
+    specific,
+)
 from spinepipe.jobs.cohort_stiffness.load_case_tests import nested_fits
 from spinepipe.jobs.cohort_stiffness.mae import mae_rows
 from spinepipe.jobs.cohort_stiffness.ranking import ranked, ranking_rows
-from spinepipe.jobs.cohort_stiffness.specimen_errors import specimen_rms
 from spinepipe.jobs.cohort_stiffness.spread_findings import share_between, stiffness_spreads
-from spinepipe.jobs.cohort_stiffness.stages import of_joint_fits, of_single_cases
 from spinepipe.jobs.cohort_stiffness.statistics import all_tests
 from spinepipe.jobs.tested_rows import corrected_rows
+from spinepipe.report.stage_errors import of_joint_fits, of_single_cases
+from spinepipe.statistics import mean_of
 from spinepipe.tables import FINDINGS, MAE, RANKING, STATISTICS, from_rows
+from spinepipe.tables.specimen_errors import specimen_rms
 from spinepipe.units import ROTATIONS
 
 CLAIM = Claim("name", "It is so.", "a number", "deg")
@@ -398,8 +403,12 @@ def test_one_significant_specimen_leaves_load_cases_undecided() -> None:
 
 
 def test_loaded_stiffness_against_that_of_the_other_load_cases() -> None:
-    errors = pd.DataFrame([seen("a", "L5S1", 1.0, test=test) for test in ("flexion", "x", "y")])
-    errors.loc[1:, "coordinate"] = ["right_bending", "left_rotation"]
+    driven = {"flexion": "extension", "x": "right_bending", "y": "left_rotation"}
+    errors = pd.DataFrame(
+        seen(specimen, "L5S1", 1.0, test=test, coordinate=name)
+        for specimen in "abc"
+        for test, name in driven.items()
+    )
     stiffness = [
         stiff(specimen, joint, log + twice, fitted_to=label)
         for specimen, log in zip("abc", (0.5, 0.6, 0.7), strict=True)
@@ -611,9 +620,165 @@ def test_without_cross_validation_nothing_is_ranked_by_it() -> None:
 def test_pooled_spreads_are_told_beside() -> None:
     pooling = [
         {"fitted_to": "all", "without": who, "coordinate": "extension", "between_specimens": value,
-         "between_levels": None}
+         "between_levels": None, "status": "converged", "message": ""}
         for who, value in (("nobody", 0.25), ("a", 0.5))
     ]  # fmt: skip
     rows = list(stiffness_spreads(pd.DataFrame(rated()), pd.DataFrame(pooling), 0.05))
     assert "SD of the logarithm 0.25" in rows[0]["message"]
     assert "pooled" not in rows[1]["message"]
+    unsettled = [row | {"status": "not_converged", "message": "they swing"} for row in pooling]
+    rows = list(stiffness_spreads(pd.DataFrame(rated()), pd.DataFrame(unsettled), 0.05))
+    assert "no pooled fit; they swing" in rows[0]["message"]
+    assert "0.25" not in rows[0]["message"]
+
+
+# labels of fits and tests
+
+
+def test_the_joint_fit_of_several_load_cases_is_not_that_to_one_of_them() -> None:
+    """Also where the joint fits have left no errors: the tests tell that there are several."""
+    rows = [seen("a", "L5S1", 1.0, test=test, fitted_to="flexion") for test in ("flexion", "bend")]
+    assert of_joint_fits(pd.DataFrame(rows), "fitted").empty
+    folds = [seen("a", "L5S1", 1.0, fitted_to="all_but_bend")]
+    assert of_joint_fits(pd.DataFrame(folds), "fitted").empty
+
+
+def test_folds_that_failed_are_not_those_of_two_load_cases() -> None:
+    """Of three load cases, two of which are read in rotations, the fit to one is no fold."""
+    rows = [
+        seen("a", "L5S1", 1.0, stage="left_out_case", test=test, fitted_to=label)
+        for test in ("flexion", "bend")
+        for label in ("flexion", "bend", "pull", "all")
+        if label not in (test, "all")
+    ]
+    assert of_joint_fits(pd.DataFrame(rows), "left_out_case").empty
+
+
+def test_a_left_out_case_beside_one_read_in_translations_only() -> None:
+    frames = without_rotations_in("pull", tests=("flexion", "bend", "pull"))
+    found = analysed(frames)["statistics"]
+    family = "between_specimens/per_joint/left_out_case"
+    rows = found[(found["family"] == family) & (found["test"] == "Friedman")]
+    assert set(rows["stratum"]) == {"flexion", "bend"}
+    assert (rows.loc[rows["response"] == "rotation_error", "n"] == 3 * len(JOINTS)).all()
+
+
+def test_of_two_load_cases_one_may_be_read_in_translations_only() -> None:
+    frames = without_rotations_in("pull", tests=("flexion", "pull"))
+    found = analysed(frames)
+    family = "between_specimens/per_joint/left_out_case"
+    assert (found["statistics"]["family"] == family).any()
+    ranking = found["ranking"]
+    assert ranking.loc[ranking["criterion"] == "left_out_case", "rank"].notna().all()
+
+
+def test_loaded_stiffness_beside_a_load_case_without_main_moment() -> None:
+    """Of two loaded tests and a pull, the others of flexion are in all_but_flexion."""
+    rows = [
+        stiff(specimen, "L5S1", log, fitted_to=label)
+        for specimen in "ab"
+        for label, log in (("flexion", 0.5), ("bend", 9.0), ("pull", 9.0), ("all_but_flexion", 0.0))
+    ]
+    directions = pd.DataFrame(
+        {"specimen": specimen, "test": test, "coordinate": name}
+        for specimen in "ab"
+        for test, name in (("flexion", "extension"), ("bend", "right_bending"))
+    )
+    assert loaded_ratios(pd.DataFrame(rows), directions)["ratio"].to_list() == [0.5, 0.5]
+
+
+def test_loaded_stiffness_of_specimens_with_different_main_moments() -> None:
+    rows = [
+        stiff(specimen, "L5S1", log, fitted_to=label, coordinate=name)
+        for specimen in "ab"
+        for name in ("extension", "right_bending")
+        for label, log in (("x", 0.5), ("all_but_x", 0.0))
+    ]
+    errors = pd.DataFrame(
+        seen(specimen, "L5S1", 1.0, test="x", coordinate=name)
+        for specimen, name in (("a", "extension"), ("b", "right_bending"))
+    )
+    none = pd.DataFrame(columns=["family", "p", "message"])
+    *_, row = load_case_findings(pd.DataFrame(rows), errors, none, 0.05)
+    assert "; 2 ratios" in row["message"]  # each in its own coordinate
+
+
+def without_rotations_in(test: str, **choices: Any) -> dict[str, pd.DataFrame]:
+    """One test was read in a translation only, in which it has no main moment."""
+    frames = study(**choices)
+    errors = frames["errors"]
+    here = errors["test"] == test
+    errors.loc[here, "loaded"] = False
+    errors = errors[~here | (errors["coordinate"] == "extension")].copy()
+    errors.loc[errors["test"] == test, "coordinate"] = "superior"
+    return {**frames, "errors": errors}
+
+
+# other findings of a review
+
+
+def test_a_representation_without_errors_under_one_test() -> None:
+    rows = [
+        seen(specimen, joint, 1.0 + place, name, test=test, fitted_to=test, coordinate=c)
+        for place, specimen in enumerate("abcd")
+        for joint in ("L4L5", "L5S1")
+        for name in ("per_specimen", "level_ratio")
+        for test in ("flexion", "bend")
+        for c in ROTATIONS
+        if (name, test) != ("level_ratio", "bend")
+    ]
+    found = statistics_of(rows)["family"]
+    families = found[found.str.startswith("per_specimen_against_level_ratio")]
+    assert set(families) == {"per_specimen_against_level_ratio/flexion"}
+
+
+def test_more_unknowns_than_readings_are_too_few() -> None:
+    rows = [fit("all", 1.0, 20, 9), fit("x", 0.0, 10, 12), fit("y", 0.0, 10, 12)]
+    fits = pd.DataFrame(rows)
+    found = statistics_of([seen("a", "L5S1", 1.0)], fits)
+    row = only(found, family="load_case_specific/per_joint")
+    assert (row["status"], row["n"]) == ("too_few", 0)
+    assert "-4 degrees of freedom" in row["message"]
+
+
+def test_a_test_that_drives_two_coordinates_has_two_rows_of_errors() -> None:
+    """Specimen b lay on its side: its main moment has another axis."""
+    rows = [
+        seen("a", "L5S1", 2.0, measured_peak=10.0),
+        seen("a", "L5S1", 8.0, coordinate="right_bending", loaded=False),
+        seen("b", "L5S1", 3.0, measured_peak=20.0, coordinate="right_bending"),
+        seen("b", "L5S1", 9.0, loaded=False),
+    ]
+    found = from_rows(MAE, mae_rows(pd.DataFrame(rows))).to_pandas()
+    peak = found[found["steps"] == "peak"].set_index("coordinate")
+    assert peak["mae_deg"].to_dict() == {"extension": 2.0, "right_bending": 3.0}
+    assert peak["largest_motion_deg"].to_dict() == {"extension": 10.0, "right_bending": 20.0}
+
+
+@pytest.mark.parametrize(
+    ("errors", "holds"),
+    [((2.0, 2.0), "yes"), ((2.0, 0.5), "no"), ((2.0, None), "undecided"), ((0.5, None), "no")],
+)
+def test_worse_at_every_level_needs_every_level(
+    errors: tuple[float, float | None], holds: str
+) -> None:
+    """One stiffness leaves 1 deg at both joints."""
+    rows = [
+        seen(specimen, joint, value, name)
+        for specimen in "ab"
+        for name, values in (("per_specimen", (1.0, 1.0)), ("level_ratio", errors))
+        for joint, value in zip(("L4L5", "L5S1"), values, strict=True)
+    ]
+    table = pd.DataFrame(rows).astype({"rmse": float})
+    ratio, uniform = (table[table["representation"] == n] for n in ("level_ratio", "per_specimen"))
+    row = every_level(ratio, uniform, table)
+    assert row["holds"] == holds
+    assert ("L5S1" in row["message"]) == (errors[1] != 2.0)
+
+
+def test_interval_of_a_mean_is_students() -> None:
+    """0.4, 0.5, 0.9: mean 0.6, SD sqrt(0.07), Student's t of 2 degrees of freedom 4.302653."""
+    found = mean_of(np.array([0.4, 0.5, 0.9]))
+    reach = 4.302653 * (0.07 / 3) ** 0.5
+    assert found.interval == pytest.approx((0.6 - reach, 0.6 + reach))
+    assert mean_of(np.array([0.4])).interval is None

@@ -1,9 +1,14 @@
 """What a cohort study does with data that are not complete, not sound, or not enough."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from chain_cases import (
     DEGREES,
@@ -21,14 +26,17 @@ from chain_cases import (
 )
 
 from spinepipe import studies
-from spinepipe.jobs.cohort_stiffness import literature
-from spinepipe.jobs.cohort_stiffness.layout import CohortLayout
+from spinepipe.calibrate import pool as pooled
+from spinepipe.jobs.cohort_stiffness import findings, literature, mae, pool, ranking, statistics
+from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, CohortLayout
 from spinepipe.jobs.cohort_stiffness.predict import predicted
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
-from spinepipe.tables import read_frame
+from spinepipe.tables import TABLES, read, read_frame, to_arrow
+from spinepipe.tables import write as write_table
 from spinepipe.units import COORDINATES
 from tests.generators.phantom import SEED, phantom, write
 
@@ -37,11 +45,26 @@ TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
 TESTS = tuple(MOMENT_OF)
 
 
-def no_nan(tables: Tables) -> None:
-    """Empty cells are nulls; no number is NaN or infinite. (Reading turns nulls into NaN.)"""
-    for table in tables.values():
-        numbers = table.select_dtypes("number").to_numpy(float)
-        assert not np.isinf(numbers).any()
+def no_nan(root: Path) -> None:
+    """Empty cells of the files are nulls; no number is NaN or infinite.
+
+    (Frames cannot tell: reading turns nulls into NaN.)
+    """
+    files = list(root.glob("*.parquet"))
+    assert files
+    for path in files:
+        for column in read(path).columns:
+            if pa.types.is_floating(column.type):
+                known = column.drop_null().to_numpy()
+                assert np.isfinite(known).all(), path.stem
+
+
+def test_a_nan_in_a_file_does_not_pass(tmp_path: Path) -> None:
+    pq.write_table(pa.table({"x": pa.array([1.0, None])}), tmp_path / "nulls.parquet")
+    no_nan(tmp_path)
+    pq.write_table(pa.table({"x": pa.array([1.0, np.nan])}), tmp_path / "nans.parquet")
+    with pytest.raises(AssertionError, match="nans"):
+        no_nan(tmp_path)
 
 
 def dropped(chains: Chains, **where: object) -> Chains:
@@ -68,7 +91,7 @@ def test_without_a_test_the_others_are_fitted(tmp_path: Path) -> None:
     identifiable = by_joint(found["stiffness"], "identifiable")
     assert not identifiable["extension"].any()
     assert identifiable[["right_bending", "left_rotation"]].all(axis=None)
-    no_nan(found)
+    no_nan(project.root)
 
 
 @pytest.mark.parametrize(
@@ -213,7 +236,7 @@ def test_a_level_without_readings_in_a_curved_spine(phantom_project: Path) -> No
     identifiable = found["stiffness"].groupby("joint")["identifiable"].all()
     assert not identifiable["L3L4"]
     assert identifiable.drop("L3L4").all()
-    no_nan(found)
+    no_nan(phantom_project)
 
 
 def test_a_flipped_sign_drives_a_joint_to_its_bound(phantom_project: Path) -> None:
@@ -399,7 +422,7 @@ def test_a_pool_of_nobody(tmp_path: Path) -> None:
     assert found["stiffness"]["stiffness"].isna().all()
     assert set(found["stiffness"]["status"]) == {"unstable"}
     assert found["errors"].empty
-    no_nan(found)
+    no_nan(tmp_path)
 
 
 # --- translations -------------------------------------------------------------------------------
@@ -471,7 +494,7 @@ def test_translations_that_no_force_drives_are_not_identifiable(tmp_path: Path) 
     known = by_joint(found["stiffness"], "identifiable")
     assert known[[*ROTATIONS, "superior"]].all(axis=None)
     assert not known[["anterior", "right"]].any(axis=None)
-    no_nan(found)
+    no_nan(tmp_path)
 
 
 def test_pure_moments_tell_nothing_of_translations(tmp_path: Path) -> None:
@@ -499,12 +522,177 @@ def test_readings_under_no_load_are_fitted_to_nothing(tmp_path: Path) -> None:
     found = project.fit("a", "per_joint", "flexion")
     assert not found["stiffness"]["identifiable"].any()
     assert project.literature("a")["sign_checks"].empty
-    no_nan(found)
+    no_nan(tmp_path)
 
 
 def test_every_table_is_made_of_a_small_study(tmp_path: Path) -> None:
     project = Chains(TRUTH, noise_deg=0.02).write(tmp_path)
     study, _ = studies.check(tmp_path, STUDY)
     assert isinstance(study, CohortStiffness)
-    for tables in (project.literature("a"), project.fit("a", "per_specimen"), project.pool()):
-        no_nan(tables)
+    project.literature("a")
+    no_nan(tmp_path)
+    project.fit("a", "per_specimen")
+    no_nan(tmp_path)
+    project.pool()
+    no_nan(tmp_path)
+
+
+# --- all jobs one after the other ---------------------------------------------------------------
+
+
+def analysed(project: Written) -> Tables:
+    """All tables of the study: job files made, joined and analysed, each by its job."""
+    settings, cohort = study_of_kind(CohortStiffness, str(project.root), STUDY)
+    layout = CohortLayout.of(settings, cohort)
+    parts = made_of_jobs(project, settings.representations, layout.load_sets)
+    for name, frames in parts.items():
+        columns = {c.name: list(pd.concat(frames)[c.name]) for c in TABLES[name].columns}
+        write_table(to_arrow(TABLES[name], columns), project.root / f"{name}.parquet", {})
+    for name in ("mae", "ranking", "statistics", "findings"):
+        files = [str(project.root / f"{one}.parquet") for one in COHORT_ANALYSES[name]
+                 if one in layout.tables]  # fmt: skip
+        output = str(project.root / f"{name}.parquet")
+        JOBS[name](str(project.root), STUDY, files, output)
+        parts[name] = [read_frame(output)]
+    no_nan(project.root)
+    return {name: pd.concat(frames, ignore_index=True) for name, frames in parts.items()}
+
+
+JOBS = {
+    "mae": mae.run,
+    "ranking": ranking.run,
+    "statistics": statistics.run,
+    "findings": findings.run,
+}
+
+
+def made_of_jobs(
+    project: Written, representations: Sequence[str], labels: Sequence[str]
+) -> dict[str, list[pd.DataFrame]]:
+    """Tables of literature and own fits, with the columns that folders carry."""
+    parts: dict[str, list[pd.DataFrame]] = {"stiffness": [], "errors": [], "fits": []}
+
+    def keep(tables: Tables, **carried: str) -> None:
+        for name, frame in tables.items():
+            if name in parts and len(frame):
+                parts[name].append(frame.assign(**carried))
+
+    for specimen in TRUTH:
+        keep(project.literature(specimen), specimen=specimen)
+        for name, label in product(representations, labels):
+            carried = {"specimen": specimen, "representation": name, "fitted_to": label}
+            keep(project.fit(specimen, name, label), **carried)
+    return parts
+
+
+def test_the_settings_of_the_paper_leave_too_few_readings_for_each_joint(tmp_path: Path) -> None:
+    """One step, rotations only: 6, 6 and 9 readings, 9 unknowns each: -6 degrees of freedom."""
+    settings = "steps: peak\ncost: published\nrepresentations: [per_joint]\nstarts: 1\n"
+    found = analysed(Chains(TRUTH, noise_deg=0.02, study=settings).write(tmp_path))
+    tests = found["statistics"]
+    nested = tests[tests["family"] == "load_case_specific/per_joint"]
+    assert len(nested) == len(TRUTH)
+    assert set(nested["status"]) == {"too_few"}
+    assert set(nested["n"]) == {0}
+    assert nested["message"].str.startswith("-6 degrees of freedom").all()
+    claim = found["findings"].set_index("finding").loc["stiffness_is_load_case_specific"]
+    assert claim["holds"] == "undecided"
+    assert "-6 degrees of freedom" in claim["message"]
+
+
+def with_a_pull(chains: Chains, instead_of: str, translations: bool) -> Chains:
+    """One test pulls upwards and has no moment; read in a translation only, or in rotations."""
+    here = chains.loads["test"] == instead_of
+    chains.loads.loc[here, list(WRENCH)] = 0.0
+    chains.loads.loc[here, "fy_n"] = 10.0 * chains.loads.loc[here, "step"]
+    for column, value in (("px_mm", 0.0), ("py_mm", 90.0), ("pz_mm", 0.0)):
+        chains.loads[column] = value
+    for column in MILLIMETRES:
+        chains.motion[column] = np.nan
+    here = chains.motion["test"] == instead_of
+    chains.motion.loc[here, list(DEGREES)] = np.nan if translations else 0.01
+    if translations:
+        chains.motion.loc[here, "superior_mm"] = 0.01 * chains.motion.loc[here, "step"]
+    return chains
+
+
+PULLED = "free: [extension, right_bending, superior]\nrepresentations: [per_specimen]\nstarts: 1\n"
+
+
+@pytest.mark.parametrize("translations", [True, False])
+@pytest.mark.parametrize("tests", [TESTS, (TESTS[0], TESTS[2])])
+def test_a_test_that_only_pulls(tests: tuple[str, ...], translations: bool, tmp_path: Path) -> None:
+    """It has no loaded coordinate, and errors of rotations only where these were read."""
+    chains = Chains(TRUTH, tests, noise_deg=0.02, study=PULLED)
+    found = analysed(with_a_pull(chains, TESTS[2], translations).write(tmp_path))
+    turned = set(tests[:-1])
+    assert set(found["mae"]["test"]) == turned
+    tested = found["statistics"]
+    family = tested["family"] == "between_levels/per_specimen/left_out_case"
+    of = family & (tested["response"] == "rotation_error")
+    assert set(tested.loc[of, "stratum"]) == (turned if translations else set(tests))
+    order = found["ranking"]
+    held_out = order[(order["criterion"] == "left_out_case") & (order["source"] == "own")]
+    assert held_out["rank"].notna().all()
+    assert set(held_out["specimens"]) == {len(TRUTH)}
+
+
+# --- pools that do not end, and bounds ----------------------------------------------------------
+
+
+def test_a_pool_that_does_not_settle_tells_nobody_a_stiffness(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each specimen is at rest, the spreads are not: so each stiffness would go on."""
+    unsettled = {"status": Status.NOT_CONVERGED, "message": "the spreads do not settle"}
+    monkeypatch.setattr(pool, "pool", lambda problems: replace(pooled(problems), **unsettled))
+    project = Chains(TRUTH, noise_deg=0.02).write(tmp_path)
+    for without in ("nobody", "a"):
+        found = project.pool(without=without)
+        rows = found["stiffness"]
+        assert set(rows["status"]) == {"not_converged"}
+        assert rows["message"].str.contains("the spreads do not settle").all()
+        assert rows["stiffness"].isna().all()
+        assert not rows["identifiable"].eq(True).any()
+        assert found["errors"].empty
+        assert found["fits"][["cost", "aicc", "bic", "effective_unknowns"]].isna().all(axis=None)
+        assert set(found["pooling"]["status"]) == {"not_converged"}
+        no_nan(tmp_path)
+
+
+def test_a_pooled_stiffness_at_a_bound_is_not_known(tmp_path: Path) -> None:
+    """Bounds of 2 around the published values: 1.5 x 240 N m/rad lies inside, 20 does not."""
+    stiff = A.copy()
+    stiff[:, 0] = 20.0
+    truth = {"a": stiff, "b": 0.9 * stiff, "c": 0.8 * stiff}
+    project = Chains(truth, study="bound_factor: 2\n", noise_deg=0.02).write(tmp_path)
+    rows = project.pool()["stiffness"]
+    at = rows["at_bound"] != "no"
+    assert set(rows.loc[at, "coordinate"]) == {"extension"}
+    assert at.sum() == 9
+    assert not rows.loc[at, "identifiable"].any()
+    assert rows.loc[at, ["standard_error", "low", "high"]].isna().all(axis=None)
+    assert rows.loc[~at, "identifiable"].all()
+
+
+def test_what_is_expected_of_a_newcomer_was_not_fitted(tmp_path: Path) -> None:
+    rows = Chains(TRUTH, noise_deg=0.02).write(tmp_path).pool(without="a")["stiffness"]
+    assert rows["identifiable"].isna().all()
+    assert rows["standard_error"].notna().all()
+
+
+def test_cycles_that_differ_in_their_main_moment(tmp_path: Path) -> None:
+    """Two of three cycles bend sideways: that is what the test loads, and what signs are of."""
+    chains = Chains({"a": A}, ["flexion"], cycles=3, study="cycles: all\n")
+    chains.loads.loc[chains.loads["cycle"] > 1, ["mx_nm", "mz_nm"]] = chains.loads.loc[
+        chains.loads["cycle"] > 1, ["mz_nm", "mx_nm"]
+    ].to_numpy()
+    chains.motion.loc[chains.motion["cycle"] > 1, ["right_bending_deg", "extension_deg"]] = (
+        chains.motion.loc[chains.motion["cycle"] > 1, ["extension_deg", "right_bending_deg"]]
+    ).to_numpy()
+    found = chains.write(tmp_path).literature("a")
+    assert set(found["errors"].loc[found["errors"]["loaded"], "coordinate"]) == {"right_bending"}
+    signs = found["sign_checks"]
+    assert set(signs["coordinate"]) == {"right_bending"}
+    assert set(signs["readings"]) == {2 * 4}
+    assert set(signs["verdict"]) == {"as_expected"}

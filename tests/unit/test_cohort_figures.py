@@ -11,14 +11,12 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
-from scipy import stats
 
 from spinepipe.jobs.cohort_stiffness.figures import DRAW
-from spinepipe.jobs.cohort_stiffness.layout import ANALYSES, FIGURES, OF_JOBS
+from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, COHORT_FIGURES, OF_JOBS
 from spinepipe.report.cohort.case_ratios import ratios
 from spinepipe.report.cohort.error_map import error_map_figure
 from spinepipe.report.cohort.held_out import rotation_errors
-from spinepipe.report.cohort.held_out_error import interval_of_mean
 from spinepipe.report.cohort.named import short
 from spinepipe.report.cohort.stages import stages
 from spinepipe.report.style import WIDTH_MM, style
@@ -60,10 +58,10 @@ def ticks(axis: Axis) -> list[Text]:
 
 
 def test_every_figure_has_a_caption_and_tables_that_studies_have() -> None:
-    assert set(DRAW) == set(FIGURES)
-    for name, tables in FIGURES.items():
+    assert set(DRAW) == set(COHORT_FIGURES)
+    for name, tables in COHORT_FIGURES.items():
         assert len((CAPTIONS / f"{name}.rst").read_text(encoding="utf-8")) > 200, name
-        assert set(tables) <= {*OF_JOBS, *ANALYSES}, name
+        assert set(tables) <= {*OF_JOBS, *COHORT_ANALYSES}, name
 
 
 @pytest.mark.parametrize("name", DRAW)
@@ -234,13 +232,6 @@ def test_left_out_load_cases_are_predicted_by_the_fit_that_left_them_out() -> No
     rows = tables_of(two)["errors"]
     rows.loc[rows["stage"] == "left_out_case", "rmse"] = 0.4
     assert rotation_errors(rows).set_index("stage")["error"]["left_out_case"] == pytest.approx(0.4)
-
-
-def test_interval_of_a_mean_is_students() -> None:
-    values = np.array([0.4, 0.5, 0.9])
-    expected = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
-    assert interval_of_mean(values) == pytest.approx((max(0.0, expected.low), expected.high))
-    assert interval_of_mean(values[:1]) is None
 
 
 def test_held_out_figure_tells_the_mean_of_each_row() -> None:

@@ -10,7 +10,7 @@ from study_cases import STUDY, project
 from study_cases import Size as OtherSize
 
 from spinepipe.jobs.cohort_stiffness import figures, report
-from spinepipe.jobs.cohort_stiffness.layout import FIGURES
+from spinepipe.jobs.cohort_stiffness.layout import COHORT_FIGURES
 from spinepipe.report.cohort.findings import findings
 from spinepipe.report.cohort.page import READ, TITLES, cohort_page, left_out
 from spinepipe.report.cohort.tables import shown_tables
@@ -63,7 +63,7 @@ def test_page_has_the_same_bytes_twice() -> None:
 
 
 def test_every_figure_has_a_title_and_every_table_read_a_shape() -> None:
-    assert set(TITLES) == set(FIGURES)
+    assert set(TITLES) == set(COHORT_FIGURES)
     assert set(READ) <= set(TABLES)
 
 
@@ -211,12 +211,12 @@ def made(tmp_path: Path) -> Path:
 
 def test_jobs_draw_all_figures_and_write_the_page(made: Path) -> None:
     folder = made / "results" / STUDY
-    pictures = [str(folder / f"{name}.svg") for name in FIGURES]
-    for name, path in zip(FIGURES, pictures, strict=True):
-        tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
+    pictures = [str(folder / f"{name}.svg") for name in COHORT_FIGURES]
+    for name, path in zip(COHORT_FIGURES, pictures, strict=True):
+        tables = [str(folder / f"{table}.parquet") for table in COHORT_FIGURES[name]]
         figures.run(str(made), STUDY, name, tables, path, path.replace(".svg", ".png"))
     files = sorted(str(path) for path in folder.glob("*.parquet"))
-    captions = [str(CAPTIONS / f"{name}.rst") for name in FIGURES]
+    captions = [str(CAPTIONS / f"{name}.rst") for name in COHORT_FIGURES]
     report.run(str(made), STUDY, files, pictures, captions, str(folder / "report.html"))
     page = (folder / "report.html").read_text(encoding="utf-8")
     for number, title in enumerate(TITLES.values(), start=1):

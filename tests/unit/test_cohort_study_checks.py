@@ -140,8 +140,18 @@ def test_names_of_tests_that_results_could_not_bear(name: str, tmp_path: Path) -
         table["test"] = table["test"].replace("left_lateral_bending", name)
     (problem,) = complaints(made, tmp_path)
     assert (problem.file, problem.column) == ("chains/loads.csv", "test")
-    assert problem.found == f"test '{name}'"
+    assert problem.found == f"test {name!r}"
     assert "rename" in problem.remedy
+
+
+def test_all_that_a_name_may_not_hold_is_told(tmp_path: Path) -> None:
+    made = chains()
+    for table in (made.loads, made.motion):
+        table["test"] = table["test"].replace("left_lateral_bending", "a\x07b")
+    (problem,) = complaints(made, tmp_path)
+    assert problem.found == "test 'a\\x07b'"
+    for says in ("control characters", "not ending with a space", "not beginning with a dot"):
+        assert says in problem.allowed
 
 
 def test_a_test_that_is_not_chosen_may_be_called_anything(tmp_path: Path) -> None:

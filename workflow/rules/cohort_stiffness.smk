@@ -1,6 +1,6 @@
 # Study kind cohort_stiffness: how stiffness differs between specimens, levels and load cases.
 # Each job is a function `run` of spinepipe.jobs.cohort_stiffness.
-from spinepipe.jobs.cohort_stiffness.layout import ANALYSES, FIGURES
+from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, COHORT_FIGURES
 
 COHORTS = results_of("cohort_stiffness")
 OWN = "specimen={specimen}/representation={representation}/fitted_to={fitted_to}"
@@ -62,7 +62,7 @@ rule pool:
 
 
 # Jobs that make one table of tables: what each reads.
-for job, read in ANALYSES.items():
+for job, read in COHORT_ANALYSES.items():
 
     rule:
         name:
@@ -80,7 +80,7 @@ for job, read in ANALYSES.items():
             run_job(rule, params.job, wildcards, input, output, log)
 
 
-for figure, drawn_from in FIGURES.items():
+for figure, drawn_from in COHORT_FIGURES.items():
 
     rule:
         name:

@@ -12,6 +12,7 @@ from spinepipe.comparison.gould_2024b.paper import COORDINATES, LOAD, P_BELOW, P
 from spinepipe.comparison.ranges import Range, factor_of_two
 from spinepipe.comparison.run import NotComputed, Run
 from spinepipe.comparison.tested import tested
+from spinepipe.statistics import critical_h
 
 WHERE = "Table 7"
 _PRINTED = PAPER["per_specimen_against_level_ratio"]
@@ -100,19 +101,15 @@ def _of_h(test: str, motion: str, p: float, h: float) -> Iterator[Claim]:
         f"{key}.decision", "section 3.4, Table 7", f"the models' {words} are said to differ",
         "1: yes, 0: no", 0.0, 1.0,
         f"B17: H = {h:g} is held against {float(_PRINTED['critical_h']):g}, but of two groups "
-        f"{_critical_h(_GROUPS):.2f} is enough, as its p of {ours:.3f} shows",
+        f"{critical_h(_GROUPS, P_BELOW):.2f} is enough, as its p of {ours:.3f} shows",
     )  # fmt: skip
 
 
-def _critical_h(groups: int) -> float:
-    return float(chi2.isf(P_BELOW, groups - 1))
-
-
 def _critical() -> Claim:
-    paper, ours = float(_PRINTED["critical_h"]), _critical_h(_GROUPS)
+    paper, ours = float(_PRINTED["critical_h"]), critical_h(_GROUPS, P_BELOW)
     return Claim(
         "table_7.critical_h", WHERE, "critical H of two groups", "H", paper,
         Range(paper, paper, "the paper's value itself"), lambda run: Ours(ours), "",
         contradicted=f"B17: two groups have one degree of freedom, {ours:.2f}; {paper:g} is "
-        f"that of three groups, {_critical_h(_GROUPS + 1):.2f}",
+        f"that of three groups, {critical_h(_GROUPS + 1, P_BELOW):.2f}",
     )  # fmt: skip

@@ -7,6 +7,7 @@ import pandas as pd
 
 from spinepipe.comparison.gould_2024b.paper import LITERATURE, LOADED
 from spinepipe.comparison.run import NotComputed, Run
+from spinepipe.tables.specimen_errors import largest_mean_motion
 
 
 def of_stage(model: str, stage: str, test: str) -> dict[str, str]:
@@ -63,4 +64,6 @@ def whole_rms(seen: pd.DataFrame) -> float:
 
 def largest_motion(seen: pd.DataFrame) -> float:
     """Largest over specimens of the mean measured motion over joints, deg."""
-    return float(seen["measured_peak"].abs().groupby(seen["specimen"]).mean().max())
+    largest = largest_mean_motion(seen)
+    assert largest is not None  # `errors` has no empty ones
+    return largest

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import pandas as pd
 
-from spinepipe.jobs.cohort_stiffness.stages import (
+from spinepipe.jobs.tested_rows import Tested
+from spinepipe.report.stage_errors import (
     FITTED,
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
     of_single_cases,
 )
-from spinepipe.jobs.tested_rows import Tested
 from spinepipe.statistics import Outcome, friedman, kruskal_wallis
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)

@@ -4,16 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from scipy import stats
 
-from spinepipe.effects.contract import Array
+from spinepipe.statistics import Mean, mean_of
 
 Row = dict[str, Any]
-
-SAME = 1e-9
-"""Values that differ by less than this share of their size differ by rounding."""
 
 
 @dataclass(frozen=True)
@@ -45,36 +40,15 @@ class Claim:
         return self.row("undecided", message)
 
 
-@dataclass(frozen=True)
-class Mean:
-    """Mean of values that are independent of each other; numbers are None where there are none.
-
-    Attributes
-    ----------
-    interval : 95 % t interval. p : of the t test against zero, two-sided.
-    message : why there is no interval, or how many values there are.
-    """
-
-    value: float | None
-    interval: tuple[float, float] | None
-    p: float | None
-    message: str
-
-
-def mean_of(values: Array) -> Mean:
-    """Mean of values (specimens,) and its t interval."""
-    n = len(values)
-    if n == 0:
-        return Mean(None, None, None, "no specimen has all results")
-    value = float(values.mean())
-    if n == 1:
-        return Mean(value, None, None, "one specimen only: no interval")
-    if np.ptp(values) <= SAME * np.abs(values).max():
-        return Mean(value, None, None, f"the same in all {n} specimens: no interval")
-    tested = stats.ttest_1samp(values, 0.0)
-    ends = tested.confidence_interval(0.95)
-    interval = float(ends.low), float(ends.high)
-    return Mean(value, interval, float(tested.pvalue), f"{n} specimens")
+def told(mean: Mean) -> str:
+    """Of how many specimens a mean is, or why it has no interval."""
+    if mean.n == 0:
+        return "no specimen has all results"
+    if mean.n == 1:
+        return "one specimen only: no interval"
+    if mean.interval is None:
+        return f"the same in all {mean.n} specimens: no interval"
+    return f"{mean.n} specimens"
 
 
 def above_zero(claim: Claim, values: pd.Series, significance: float, note: str = "") -> Row:
@@ -86,7 +60,7 @@ def above_zero(claim: Claim, values: pd.Series, significance: float, note: str =
     holds = "undecided"
     if mean.p is not None and mean.value is not None and mean.p < significance:
         holds = "yes" if mean.value > 0.0 else "no"
-    return claim.row(holds, joined(mean.message, note), mean.value, mean.interval, mean.p)
+    return claim.row(holds, joined(told(mean), note), mean.value, mean.interval, mean.p)
 
 
 def joined(*notes: str) -> str:

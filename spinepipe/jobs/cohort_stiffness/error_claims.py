@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from spinepipe.jobs.cohort_stiffness.claims import Claim
-from spinepipe.jobs.cohort_stiffness.stages import (
+from spinepipe.report.stage_errors import (
     FITTED,
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,

@@ -7,9 +7,9 @@ import pandas as pd
 
 from spinepipe.jobs.cohort_stiffness.claims import Claim, Row, above_zero, joined, listed, words
 from spinepipe.jobs.cohort_stiffness.error_claims import COMPARISONS, RATIO, UNIFORM, Errors
-from spinepipe.jobs.cohort_stiffness.specimen_errors import rotations, specimen_rms
-from spinepipe.jobs.cohort_stiffness.stages import of_joint_fits, of_single_cases
+from spinepipe.report.stage_errors import of_joint_fits, of_single_cases
 from spinepipe.statistics import wilcoxon_signed_rank
+from spinepipe.tables.specimen_errors import rotations, specimen_rms
 
 EVERY_LEVEL = Claim(
     "wrong_level_ratio_worse_at_every_level",
@@ -75,19 +75,21 @@ def _note(pair: pd.DataFrame) -> str:
 
 
 def every_level(ratio: pd.DataFrame, uniform: pd.DataFrame, errors: pd.DataFrame) -> Row:
-    """Yes where the ratio of levels is worse at all joints, else no."""
+    """Yes where the ratio of levels is worse at all joints, no where it is not at one."""
     worse: list[str] = []
     better: list[str] = []
+    unknown: list[str] = []
     for joint in errors["joint"].unique():
         parts = [table[table["joint"] == joint] for table in (ratio, uniform, errors)]
         pair = specimen_pairs(*parts)
-        if len(pair):
-            above = pair["larger"].mean() > pair["smaller"].mean()
-            (worse if above else better).append(str(joint))
+        above = pair["larger"].mean() > pair["smaller"].mean()
+        (unknown if pair.empty else worse if above else better).append(str(joint))
     if not worse + better:
         return EVERY_LEVEL.unknown("no specimen has all results of both")
+    lost = f"nothing to compare at: {listed(unknown)}" if unknown else ""
     message = f"of {len(worse + better)} joints; not worse at: {listed(better)}; no test"
-    return EVERY_LEVEL.row("no" if better else "yes", message, float(len(worse)))
+    holds = "no" if better else "undecided" if unknown else "yes"
+    return EVERY_LEVEL.row(holds, joined(message, lost), float(len(worse)))
 
 
 def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:

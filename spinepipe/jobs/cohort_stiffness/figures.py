@@ -25,7 +25,7 @@ DRAW: dict[str, Draw] = {
     "held_out_error": held_out_error_figure,
     "load_case_stiffness": load_case_stiffness_figure,
 }
-"""What draws each figure; its tables are in `spinepipe.jobs.cohort_stiffness.layout.FIGURES`."""
+"""What draws each figure; its tables are in ``COHORT_FIGURES`` of the layout."""
 
 
 def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: str) -> None:

@@ -11,7 +11,7 @@ from spinepipe.jobs.cohort_stiffness.criteria import criteria
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, Tested, specimen_tests
+from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
@@ -65,7 +65,7 @@ def _fit(
     tests: SpecimenTests,
 ) -> tuple[Problem | None, Fit | None, str]:
     """The problem and its fit, or why there is none."""
-    chosen: tuple[Tested, ...] = tests.fitted_to(fitted_to)
+    chosen: tuple[TestedCycle, ...] = tests.fitted_to(fitted_to)
     if not chosen:
         return None, None, f"{specimen}: {tests.why_none(fitted_to)}"
     try:

@@ -5,25 +5,24 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.cohort_stiffness.pool import NOBODY, REPRESENTATION
-from spinepipe.jobs.cohort_stiffness.tested import ALL, load_sets, tests_of
 from spinepipe.jobs.study_files import StudyFiles
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_COHORTS, stands_for
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import ALL, NOBODY, POOLED, load_sets, tests_of
 
 OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""
 
-ANALYSES: dict[str, tuple[str, ...]] = {
+COHORT_ANALYSES: dict[str, tuple[str, ...]] = {
     "mae": ("errors",),
     "ranking": ("errors", "fits"),
     "statistics": ("errors", "fits"),
-    "findings": ("stiffness", "fits", "errors", "mae", "ranking", "statistics", "pooling"),
+    "findings": ("stiffness", "errors", "statistics", "pooling"),
     "against_gould_2024b": ("stiffness", "fits", "errors", "mae", "statistics"),
 }
 """Tables computed from others, and which."""
 
-FIGURES: dict[str, tuple[str, ...]] = {
+COHORT_FIGURES: dict[str, tuple[str, ...]] = {
     "stiffness_by_level": ("stiffness",),
     "error_map": ("errors", "sign_checks"),
     "held_out_error": ("errors",),
@@ -53,20 +52,22 @@ class CohortLayout(StudyFiles):
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
-        rebuilt = paper_of(cohort.name) is not None
+        rebuilt = stands_for(cohort.name, OF_COHORTS)
         return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt)
 
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
-        pooled = ("pooling",) if REPRESENTATION in self.study.representations else ()
-        analysed = (name for name in ANALYSES if self.rebuilt or not name.startswith("against"))
+        pooled = ("pooling",) if POOLED in self.study.representations else ()
+        analysed = (
+            name for name in COHORT_ANALYSES if self.rebuilt or not name.startswith("against")
+        )
         return ("stiffness", "fits", "errors", "sign_checks", *pooled, *analysed)
 
     @property
     def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
         """Figures and the tables each is drawn from."""
-        return FIGURES
+        return COHORT_FIGURES
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -82,7 +83,7 @@ class CohortLayout(StudyFiles):
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
-        whole = table != "sign_checks" and REPRESENTATION in self.study.representations
+        whole = table != "sign_checks" and POOLED in self.study.representations
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
@@ -108,7 +109,7 @@ class CohortLayout(StudyFiles):
     @property
     def _single(self) -> tuple[str, ...]:
         """Representations fitted specimen by specimen."""
-        return tuple(name for name in self.study.representations if name != REPRESENTATION)
+        return tuple(name for name in self.study.representations if name != POOLED)
 
     def _fits(self) -> list[str]:
         return [

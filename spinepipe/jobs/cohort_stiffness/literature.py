@@ -14,8 +14,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import NOTHING
 from spinepipe.tables import ERRORS, SIGN_CHECKS, STIFFNESS, from_rows, write
-from spinepipe.tables.cohort_stiffness import NOTHING
 
 LITERATURE = ("literature", "literature_levels")
 

@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from spinepipe.jobs.cohort_stiffness.claims import Claim, Row, joined, mean_of
+from spinepipe.jobs.cohort_stiffness.claims import Claim, Row, joined, told
 from spinepipe.jobs.cohort_stiffness.load_case_tests import FAMILY
-from spinepipe.jobs.cohort_stiffness.tested import ALL_BUT
+from spinepipe.statistics import mean_of
+from spinepipe.studies.fitted_to import label_of_others
 
 LITTLE = 0.05
 """Share of the squared error below which what is not significant is called absent."""
@@ -51,7 +52,7 @@ def load_case_findings(
         note = MISFIT if representation == "per_specimen" else ""
         yield specific(claim, found, significance, note)
     loaded = errors[errors["loaded"].astype(bool)]
-    directions = loaded[["test", "coordinate"]].drop_duplicates()
+    directions = loaded[["specimen", "test", "coordinate"]].drop_duplicates()
     ratios = loaded_ratios(stiffness[stiffness["representation"] == "per_joint"], directions)
     yield _ratio(ratios, significance)
 
@@ -69,10 +70,12 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
     explained = float(known["effect"].mean())
     absent = below == 0 and explained < LITTLE
     holds = "yes" if p < significance else "no" if absent else "undecided"
-    told = f"{below} of {n} specimens; separate fits explain {100 * explained:.2g} % of the squares"
+    found = (
+        f"{below} of {n} specimens; separate fits explain {100 * explained:.2g} % of the squares"
+    )
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
     interval = float(ends.low), float(ends.high)
-    return claim.row(holds, joined(told, lost, note), below / n, interval, p)
+    return claim.row(holds, joined(found, lost, note), below / n, interval, p)
 
 
 def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataFrame:
@@ -82,7 +85,7 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
 
     Parameters
     ----------
-    stiffness : rows of one representation. directions : test and its loaded coordinate.
+    stiffness : rows of one representation. directions : specimen, test and loaded coordinate.
     """
     own = stiffness[(stiffness["source"] == "own") & (stiffness["at_bound"] == "no")]
     own = own[own["identifiable"].eq(True)].dropna(subset=["stiffness", "standard_error"])
@@ -91,18 +94,12 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
     own = own[own["error"] > 0.0]
     keys = ["specimen", "test", "joint", "coordinate"]
     loaded = own.merge(directions.assign(fitted_to=directions["test"]))
-    others = own.merge(directions.assign(fitted_to=_others(directions["test"])))
+    labels = stiffness["fitted_to"].unique()
+    to_others = {test: label_of_others(labels, test) for test in directions["test"].unique()}
+    others = own.merge(directions.assign(fitted_to=directions["test"].map(to_others)))
     both = loaded.merge(others, on=keys, suffixes=("", "_of_others"))
     error = (both["error"] ** 2 + both["error_of_others"] ** 2) ** 0.5
     return both[keys].assign(ratio=both["log"] - both["log_of_others"], error=error)
-
-
-def _others(tests: pd.Series) -> pd.Series:
-    """What fits to all other tests are called."""
-    names = list(tests.unique())
-    if len(names) == 2:
-        return tests.map({names[0]: names[1], names[1]: names[0]})
-    return ALL_BUT + tests
 
 
 def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
@@ -114,7 +111,7 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     mean = mean_of((sums / weight.groupby(ratios["specimen"]).sum()).to_numpy(float))
     assert mean.value is not None
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
-    told = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
+    many = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
     ends = mean.interval
     holds = "undecided"
     if mean.p is not None and mean.p < significance:
@@ -122,4 +119,4 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     elif ends is not None and -np.log(MARGIN) < ends[0] and ends[1] < np.log(MARGIN):
         holds = "no"
     interval = None if ends is None else (float(np.exp(ends[0])), float(np.exp(ends[1])))
-    return RATIO.row(holds, joined(mean.message, told), float(np.exp(mean.value)), interval, mean.p)
+    return RATIO.row(holds, joined(told(mean), many), float(np.exp(mean.value)), interval, mean.p)

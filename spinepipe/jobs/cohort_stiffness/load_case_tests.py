@@ -4,19 +4,19 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.jobs.cohort_stiffness.stages import joint_label
-from spinepipe.jobs.cohort_stiffness.tested import ALL, ALL_BUT
 from spinepipe.jobs.tested_rows import Tested
 from spinepipe.statistics import Ended, Outcome, f_test_nested
 from spinepipe.statistics.nested import NESTED
+from spinepipe.studies.fitted_to import ALL, POOLED, joint_label, load_cases
 
 FAMILY = "load_case_specific"
-POOLED = "partially_pooled"
-"""Its fits are no least squares fits: they are drawn towards the cohort."""
 
 
 def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
-    """The extra sum of squares F test for each specimen and each plain representation."""
+    """The extra sum of squares F test for each specimen and each plain representation.
+
+    Pooled fits are no least squares fits: they are drawn towards the cohort.
+    """
     plain = fits[fits["representation"] != POOLED]
     for (representation, specimen), rows in plain.groupby(
         ["representation", "specimen"], sort=False
@@ -28,10 +28,10 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
 
 def nested_fits(rows: pd.DataFrame) -> Outcome:
     """The test for the fits of one specimen in one representation."""
-    if joint_label(rows) != ALL:
+    if joint_label(rows["fitted_to"]) != ALL:
         return _without("one load case only: nothing to compare")
     joint = rows[rows["fitted_to"] == ALL]
-    single = rows[(rows["fitted_to"] != ALL) & ~rows["fitted_to"].str.startswith(ALL_BUT)]
+    single = rows[rows["fitted_to"].isin(load_cases(rows["fitted_to"]))]
     single = single[single["readings"] > 0]  # the specimen has no such load case
     if joint["cost"].isna().any() or joint.empty or single["cost"].isna().any():
         return _without("a fit is missing")

@@ -8,11 +8,13 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.studies import CohortStiffness
 from spinepipe.tables import MAE, from_rows, read_frames, write
+from spinepipe.tables.specimen_errors import largest_mean_motion
 
 STEPS = {"peak": ("peak_error", "measured_peak"), "all": ("mae", "measured")}
 """Columns of the error and of the motion, at the largest load and over all load steps."""
 
-GROUP = ["representation", "fitted_to", "source", "stage", "test"]
+PLACE = ["test", "coordinate"]
+GROUP = ["representation", "fitted_to", "source", "stage", *PLACE]
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
@@ -25,23 +27,17 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
     """Rows of the table ``mae`` from those of ``errors``."""
     loaded = errors[errors["loaded"].astype(bool)]
-    largest = {steps: largest_motion(loaded, columns[1]) for steps, columns in STEPS.items()}
+    once = loaded.drop_duplicates(["specimen", *PLACE, "joint"])
+    measured = dict(iter(once.groupby(PLACE, sort=False)))
     rows = []
     for key, part in loaded.groupby(GROUP, sort=False):
         named = dict(zip(GROUP, map(str, key), strict=True))
-        named["coordinate"] = part["coordinate"].iloc[0]
+        here = measured[named["test"], named["coordinate"]]
         for steps, (error, motion) in STEPS.items():
             found = specimen_mae(part, error, motion)
-            motions = largest[steps].get(named["test"])
-            rows.append({**named, "steps": steps, **_spread(found, motions)})
+            largest = largest_mean_motion(here, motion)
+            rows.append({**named, "steps": steps, **_spread(found, largest)})
     return rows
-
-
-def largest_motion(loaded: pd.DataFrame, motion: str) -> dict[str, float]:
-    """Largest over specimens of the mean size of the measured motion over joints, by test."""
-    once = loaded.drop_duplicates(["specimen", "test", "joint"])
-    mean = once[motion].abs().groupby([once["test"], once["specimen"]]).mean()
-    return dict(mean.dropna().groupby(level="test").max())
 
 
 def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:

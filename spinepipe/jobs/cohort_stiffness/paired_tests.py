@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from spinepipe.jobs.cohort_stiffness.stages import (
+from spinepipe.jobs.tested_rows import Tested
+from spinepipe.report.stage_errors import (
     FITTED,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
     of_single_cases,
 )
-from spinepipe.jobs.tested_rows import Tested
 from spinepipe.statistics import kruskal_wallis, wilcoxon_signed_rank
 from spinepipe.units import ROTATIONS
 
@@ -69,8 +69,8 @@ def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
         return
     for test in both[0]["test"].unique():
         first, second = (_rms(part[part["test"] == test]) for part in both)
-        for response in first:
-            pair = pd.concat([first[response], second.get(response)], axis=1, join="inner")
+        for response in (name for name in first if name in second):
+            pair = pd.concat([first[response], second[response]], axis=1, join="inner")
             values = pair.to_numpy(float)
             family = f"per_specimen_against_level_ratio/{test}"
             published = kruskal_wallis([values[:, 0], values[:, 1]])

@@ -9,11 +9,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import NOBODY, POOLED
 from spinepipe.tables import ERRORS, FITS, POOLING, STIFFNESS, from_rows, write
-
-REPRESENTATION = "partially_pooled"
-NOBODY = "nobody"
-"""Who is left out when all specimens are fitted."""
 
 
 def run(
@@ -38,7 +35,7 @@ def run(
     seen = [row for name in told for row in rows.errors(name)]
     records = [rows.record(name) for name in told] if everyone else []
     source = "own" if everyone else "others_pooled"
-    by = {"representation": REPRESENTATION, "source": source}
+    by = {"representation": POOLED, "source": source}
     origin = provenance("cohort_stiffness.pool", settings, cohort)
     shape = STIFFNESS.without("fitted_to")
     write(from_rows(shape, [{**row, **by} for row in values]), stiffness, origin)
@@ -59,9 +56,7 @@ def _problems(
             refusals[name] = f"{name}: {tests.why_none(fitted_to)}"
             continue
         try:
-            found[name] = calibration_problem(
-                settings, cohort, name, REPRESENTATION, tests.frames, chosen
-            )
+            found[name] = calibration_problem(settings, cohort, name, POOLED, tests.frames, chosen)
         except RefusedModel as error:
             refusals[name] = str(error)
     return found, refusals

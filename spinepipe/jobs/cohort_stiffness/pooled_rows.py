@@ -16,6 +16,7 @@ from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import POOLED
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]
@@ -24,7 +25,7 @@ NOBODY_FITTED = "no specimen has motion to fit"
 
 @dataclass(frozen=True)
 class PooledRows:
-    """What a pooled fit says, specimen by specimen.
+    """What a pooled fit says, specimen by specimen; nothing where it did not end.
 
     Attributes
     ----------
@@ -71,7 +72,7 @@ class PooledRows:
             counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
             empty = dict.fromkeys(("effective_unknowns", "cost"))
             return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
-        usable = own.status.usable
+        usable = status.usable
         cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
         return {
             "readings": own.n_readings,
@@ -109,7 +110,7 @@ class PooledRows:
         }
         if found is None or spread is None:
             return row
-        start = float(start_stiffness(self.study, self.cohort, "partially_pooled")[0, place])
+        start = float(start_stiffness(self.study, self.cohort, POOLED)[0, place])
         return row | {
             "centre": start * float(np.exp(spread.mean)),
             "between_levels": spread.level or None,  # zero: not told from the rest
@@ -129,45 +130,51 @@ class PooledRows:
         return self.found.specimens[list(self.problems).index(specimen)]
 
     def _ended(self, specimen: str) -> tuple[Status, str]:
+        """Its own status, or the pool's: each stiffness hangs on the spreads of all."""
         own = self._own(specimen)
         if specimen in self.refusals:
             return Status.REFUSED, self.refusals[specimen]
         if self.found is None:
             return Status.REFUSED, NOBODY_FITTED
+        pool = self.found.status, self.found.message
         if own is None:
-            notes = ["what the others lead one to expect", self.found.message]
-            return self.found.status, "; ".join(note for note in notes if note)
+            return pool[0], _joined("what the others lead one to expect", pool[1])
+        if own.status.usable and not pool[0].usable:
+            return pool[0], _joined(own.message, f"pooled fit: {pool[1] or pool[0].value}")
         return own.status, own.message
 
     def _values(self, specimen: str) -> tuple[Array, Array, Indices] | None:
         """Stiffness, error of its logarithm and bounds reached (J, 6); None without a fit.
 
-        A newcomer has one as soon as somebody stands that it can be expected to be like.
+        A newcomer has one where the pool has ended: it can be expected to be like the others.
         """
-        if self.found is None or specimen in self.refusals:
+        if self.found is None or not self._ended(specimen)[0].usable:
             return None
         own = self._own(specimen)
-        standing = any(one.poses for one in self.found.specimens)
-        if not (standing if own is None else own.status.usable):
-            return None
         x = self.found.newcomer if own is None else own.x
         covariance = self.found.newcomer_covariance if own is None else own.covariance
         free = next(iter(self.problems.values())).free
-        k = start_stiffness(self.study, self.cohort, "partially_pooled")
+        k = start_stiffness(self.study, self.cohort, POOLED)
         error = np.full(k.shape, np.inf)
         bound = np.zeros(k.shape, dtype=int)
         for index, unknown in enumerate(free):
             at = unknown.rows[0], unknown.column
             k[at] *= np.exp(x[index])
-            error[at] = np.sqrt(covariance[index, index])
             bound[at] = 0 if own is None else own.at_bound[index]
+            if not bound[at]:  # the covariance is not told of bounds
+                error[at] = np.sqrt(covariance[index, index])
         return k, error, bound
 
     def _rows(self, k: Array, error: Array, bound: Indices, specimen: str) -> list[Row]:
         status, message = self._ended(specimen)
-        known = error < self.study.identifiable_below
+        fitted = specimen in self.problems or specimen in self.refusals
+        known = (error < self.study.identifiable_below) if fitted else None
         rows = stiffness_rows(
             self.cohort.joint_names, self.study.free, k, error, np.inf, known, bound
         )
         ended = {"specimen": specimen, "status": status.value, "message": message}
         return [{**row, **ended} for row in rows]
+
+
+def _joined(*notes: str) -> str:
+    return "; ".join(note for note in notes if note)

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.cohort_stiffness.problem import stiff_model
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, Tested
+from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, driven
 from spinepipe.model import RefusedModel
 from spinepipe.statics import Chain, Status, System, follow
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
@@ -18,7 +18,7 @@ Row = dict[str, Any]
 
 
 def predicted(
-    cohort: Cohort, specimen: str, frames: tuple[Pose, ...], tested: Sequence[Tested], k: Array
+    cohort: Cohort, specimen: str, frames: tuple[Pose, ...], tested: Sequence[TestedCycle], k: Array
 ) -> list[tuple[Array | None, Status, str]]:
     """(T, J, 6) m and rad of each case as it was measured, or why there is none.
 
@@ -51,6 +51,7 @@ def error_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) ->
     for test in tests.tests:
         here = [(one, end) for one, end in zip(tests.tested, ended, strict=True)
                 if one.case.test == test]  # fmt: skip
+        loaded = driven([one for one, _ in here])
         failed = [end for _, end in here if end[0] is None]
         status, message = (failed[0][1], failed[0][2]) if failed else (Status.CONVERGED, "")
         for joint, name in enumerate(cohort.joint_names):
@@ -61,7 +62,7 @@ def error_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) ->
                         "test": test,
                         "joint": name,
                         "coordinate": coordinate,
-                        "loaded": here[0][0].loaded == coordinate,
+                        "loaded": loaded == coordinate,
                         "unit": COORDINATE_UNITS[coordinate],
                         **numbers,
                         "status": status.value,
@@ -71,7 +72,7 @@ def error_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) ->
 
 
 def _numbers(
-    here: Sequence[tuple[Tested, tuple[Array | None, Status, str]]],
+    here: Sequence[tuple[TestedCycle, tuple[Array | None, Status, str]]],
     joint: int,
     place: int,
     lost: bool,

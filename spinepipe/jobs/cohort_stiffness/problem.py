@@ -8,8 +8,8 @@ from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.jobs.cohort_stiffness.tested import Tested
-from spinepipe.jobs.inputs import on_bushings
+from spinepipe.jobs.cohort_stiffness.tested import TestedCycle
+from spinepipe.jobs.inputs import on_bushings, stiffness_of_joints
 from spinepipe.model import SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.studies import CohortStiffness
@@ -27,18 +27,13 @@ GROUPING = {
 }
 """Which joints share an unknown: those that keep their ratios move together."""
 
-_ROTATION = slice(len(TRANSLATIONS), None)
-
 
 def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:
     """(J, 6) SI: the published stiffness a representation starts from."""
-    values = np.tile(
-        np.array(study.stiffness.in_order(), dtype=float), (len(cohort.joint_names), 1)
-    )
+    levels = {}
     if representation in LEVEL_REPRESENTATIONS:
-        for row, joint in enumerate(cohort.joint_names):
-            values[row, _ROTATION] = study.level_stiffness[joint].in_order()
-    return values
+        levels = {joint: study.level_stiffness[joint] for joint in cohort.joint_names}
+    return stiffness_of_joints(cohort, study.stiffness, levels)
 
 
 def stiff_model(
@@ -55,7 +50,7 @@ def calibration_problem(
     specimen: str,
     representation: str,
     frames: tuple[Pose, ...],
-    tested: Sequence[Tested],
+    tested: Sequence[TestedCycle],
 ) -> Problem:
     """The fit of one representation to these tests.
 
@@ -77,7 +72,7 @@ def calibration_problem(
     return Problem(model, cases, free, weights, -reach, reach, correlated=shared)
 
 
-def _in_cost(study: CohortStiffness, one: Tested) -> Array:
+def _in_cost(study: CohortStiffness, one: TestedCycle) -> Array:
     """(T, J, 6) readings that enter the cost, NaN elsewhere."""
     readings = one.measured.copy()
     if study.steps == "peak":

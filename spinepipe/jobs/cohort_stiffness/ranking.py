@@ -7,19 +7,21 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.cohort_stiffness.specimen_errors import specimen_rms
-from spinepipe.jobs.cohort_stiffness.stages import (
-    LEFT_OUT_SPECIMEN,
-    LITERATURE,
-    joint_label,
-    of_joint_fits,
-)
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
+from spinepipe.report.stage_errors import (
+    LEFT_OUT_SPECIMEN,
+    LITERATURE,
+    joint_label_of,
+    of_joint_fits,
+)
 from spinepipe.statistics import wilcoxon_signed_rank
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import POOLED
 from spinepipe.tables import RANKING, from_rows, read_frames, write
-from spinepipe.tables.cohort_stiffness import CRITERIA, REPRESENTATIONS
+from spinepipe.tables.cohort_stiffness_analyses import CRITERIA
+from spinepipe.tables.cohort_stiffness_columns import REPRESENTATIONS
+from spinepipe.tables.specimen_errors import specimen_rms
 
 INFORMATION = ("aicc", "bic")
 NOT_FITTED = ("literature", "literature_levels")
@@ -72,14 +74,14 @@ def _source(name: str, criterion: str) -> str:
         return "literature"
     if criterion != LEFT_OUT_SPECIMEN:
         return "own"
-    return "others_pooled" if name == "partially_pooled" else "others_median"
+    return "others_pooled" if name == POOLED else "others_median"
 
 
 def _information(
     fits: pd.DataFrame, criterion: str, names: list[str]
 ) -> dict[Candidate, pd.Series]:
     """Criterion by specimen of each representation fitted to all load cases."""
-    joint = fits[fits["fitted_to"] == joint_label(fits)].dropna(subset=criterion)
+    joint = fits[fits["fitted_to"] == joint_label_of(fits)].dropna(subset=criterion)
     found = {}
     for name in names:
         of_name = joint[joint["representation"] == name]

@@ -8,7 +8,7 @@ from spinepipe.calibrate.zeroing import whitened
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.cohort_stiffness.predict import predicted
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, Tested
+from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, driven
 from spinepipe.units import COORDINATES
 
 CERTAIN = 3.0
@@ -37,14 +37,15 @@ def sign_rows(
     ended = predicted(cohort, specimen, tests.frames, tests.tested, k)
     rows = []
     for test in tests.tests:
+        loaded = driven([one for one in tests.tested if one.case.test == test])
+        if loaded is None:
+            continue
         here = [
             (one, motion)
             for one, (motion, _, _) in zip(tests.tested, ended, strict=True)
-            if one.case.test == test and one.loaded is not None
+            if one.case.test == test and one.loaded == loaded
         ]
-        if not here or here[0][0].loaded is None:
-            continue
-        place = COORDINATES.index(here[0][0].loaded)
+        place = COORDINATES.index(loaded)
         read = [_independent(one, motion, cohort.zeroed_at_step_0) for one, motion in here]
         for joint, name in enumerate(cohort.joint_names):
             measured, expected = (
@@ -60,7 +61,7 @@ def sign_rows(
     return rows
 
 
-def _independent(one: Tested, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
+def _independent(one: TestedCycle, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
     """Measured and expected motion (T, J, 6), NaN where there is none.
 
     Zeroed readings share the error of step 0, which would pass for motion: both are whitened.

@@ -7,8 +7,11 @@ import pandas as pd
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
-from spinepipe.jobs.cohort_stiffness.claims import SAME, Claim, Row, joined, listed, words
-from spinepipe.jobs.cohort_stiffness.stages import joint_label
+from spinepipe.jobs.cohort_stiffness.claims import Claim, Row, joined, listed, words
+from spinepipe.report.stage_errors import joint_label_of
+from spinepipe.statics import Status
+from spinepipe.statistics.mean import SAME
+from spinepipe.studies.fitted_to import NOBODY
 
 LITTLE = 0.1
 """A share whose whole interval lies below this is called no difference."""
@@ -26,7 +29,7 @@ def stiffness_spreads(
     stiffness: pd.DataFrame, pooling: pd.DataFrame | None, significance: float
 ) -> Iterator[Row]:
     """Do specimens, and do levels, differ in stiffness? One finding per coordinate."""
-    label = joint_label(stiffness)
+    label = joint_label_of(stiffness)
     own = stiffness[(stiffness["fitted_to"] == label) & (stiffness["source"] == "own")]
     own = own[own["representation"] == "per_joint"]
     for coordinate in stiffness["coordinate"].unique():
@@ -53,8 +56,12 @@ def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, wh
     """What the pooled fit says of the same, for the message."""
     if pooling is None:
         return ""
-    here = (pooling["fitted_to"] == label) & (pooling["without"] == "nobody")
-    found = pooling.loc[here & (pooling["coordinate"] == coordinate), f"between_{what}"].dropna()
+    here = (pooling["fitted_to"] == label) & (pooling["without"] == NOBODY)
+    rows = pooling[here & (pooling["coordinate"] == coordinate)]
+    usable = rows["status"].map(lambda name: Status(name).usable).astype(bool)
+    if not usable.all():
+        return joined("no pooled fit", *rows.loc[~usable, "message"])
+    found = rows[f"between_{what}"].dropna()
     return f"pooled fit: SD of the logarithm {found.iloc[0]:.2g}" if len(found) else ""
 
 

@@ -7,12 +7,12 @@ import pandas as pd
 from spinepipe.jobs.cohort_stiffness.between_tests import between_groups
 from spinepipe.jobs.cohort_stiffness.load_case_tests import load_case_specific
 from spinepipe.jobs.cohort_stiffness.paired_tests import against_level_ratio, signed_ranks
-from spinepipe.jobs.cohort_stiffness.specimen_errors import rotations
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.studies import CohortStiffness
 from spinepipe.tables import STATISTICS, from_rows, read_frames, write
+from spinepipe.tables.specimen_errors import rotations
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:

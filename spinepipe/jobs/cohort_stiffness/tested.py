@@ -1,5 +1,6 @@
 """The tests of one specimen that a cohort study uses: chosen cycles, loads and readings."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,15 +14,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
 from spinepipe.studies import CohortStiffness
-from spinepipe.units import COORDINATE_COLUMNS
+from spinepipe.studies.fitted_to import ALL, ALL_BUT, tests_of
 
-ALL = "all"
-ALL_BUT = "all_but_"
 FIRST_CYCLE = 1
 
 
 @dataclass(frozen=True)
-class Tested:
+class TestedCycle:
     """One cycle of one test.
 
     Attributes
@@ -37,19 +36,24 @@ class Tested:
     loaded: str | None
 
 
+def driven(cycles: Sequence[TestedCycle]) -> str | None:
+    """The coordinate that most cycles of a test load; of equally many that of the first."""
+    return Counter(one.loaded for one in cycles).most_common(1)[0][0]
+
+
 @dataclass(frozen=True)
 class SpecimenTests:
     """Joint frames of a specimen in the neutral pose, and its tests."""
 
     frames: tuple[Pose, ...]
-    tested: tuple[Tested, ...]
+    tested: tuple[TestedCycle, ...]
 
     @property
     def tests(self) -> tuple[str, ...]:
         """Names of the tests with readings."""
         return tuple(dict.fromkeys(one.case.test for one in self.tested))
 
-    def fitted_to(self, label: str) -> tuple[Tested, ...]:
+    def fitted_to(self, label: str) -> tuple[TestedCycle, ...]:
         """The tests that a label of ``fitted_to`` means, as far as the specimen has them."""
         if label == ALL:
             return self.tested
@@ -68,27 +72,6 @@ class SpecimenTests:
         return f"no motion to fit for {label}"
 
 
-def load_sets(study: CohortStiffness, tests: Sequence[str]) -> tuple[str, ...]:
-    """Labels of what stiffness is fitted to: each test, all, and all but one."""
-    several = len(tests) > 1
-    held_out = several and study.cross_validation.load_cases
-    return (
-        *tests,
-        *((ALL,) if several else ()),
-        *((f"{ALL_BUT}{test}" for test in tests) if held_out and len(tests) > 2 else ()),
-    )
-
-
-def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
-    """The study's tests: those chosen, else all that have a reading."""
-    if study.tests:
-        return study.tests
-    assert cohort.motion is not None
-    read = cohort.motion[list(COORDINATE_COLUMNS)].notna().any(axis=1)
-    moved = set(cohort.motion.loc[read, "test"])
-    return tuple(test for test in cohort.tests if test in moved)
-
-
 def specimen_tests(study: CohortStiffness, cohort: Cohort, specimen: str) -> SpecimenTests:
     """The chosen tests of a specimen; cycles without any reading are none."""
     return _specimen_tests(cohort, specimen, tests_of(study, cohort), study.cycles)
@@ -101,7 +84,7 @@ def _specimen_tests(
     cases = load_cases(cohort, specimen, tests, np.zeros(3))
     motions = measured_motion(cohort, specimen, cases)
     found = [
-        Tested(case, _readings(motion.q, cohort), peak_step(case), loaded_coordinate(case))
+        TestedCycle(case, _readings(motion.q, cohort), peak_step(case), loaded_coordinate(case))
         for case, motion in zip(cases, motions, strict=True)
     ]
     read = [one for one in found if np.isfinite(one.measured).any()]
@@ -115,9 +98,9 @@ def _readings(q: Array, cohort: Cohort) -> Array:
     return readings
 
 
-def _chosen(cycles: str, found: Sequence[Tested]) -> list[Tested]:
+def _chosen(cycles: str, found: Sequence[TestedCycle]) -> list[TestedCycle]:
     """Cycles that are used, test by test; ``cycles`` as in the study."""
-    chosen: list[Tested] = []
+    chosen: list[TestedCycle] = []
     for test in dict.fromkeys(one.case.test for one in found):
         of_test = [one for one in found if one.case.test == test]
         later = [one for one in of_test if one.case.cycle != FIRST_CYCLE] or of_test

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import doubted, single_cases
-from spinepipe.report.cohort.named import ALL
+from spinepipe.report.cohort.chosen import doubted
+from spinepipe.studies.fitted_to import ALL, load_cases
 
 _KEYS = ["specimen", "representation", "joint", "coordinate"]
 _SHARED = ("per_specimen", "level_ratio")
@@ -24,7 +24,7 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     own = stiffness[stiffness["source"] == "own"]
     first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
     own = own[~own["representation"].isin(_SHARED) | first]
-    single = own[own["fitted_to"].isin(single_cases(stiffness))]
+    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
     whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
     both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
     divided = {

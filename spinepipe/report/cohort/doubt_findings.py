@@ -5,9 +5,9 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import fitted_to_most
 from spinepipe.report.cohort.named import NAME, case
 from spinepipe.report.page.results import Results
+from spinepipe.report.stage_errors import joint_label_of
 from spinepipe.report.words import AXIS, count, fixed, percent
 from spinepipe.statics.status import Status
 from spinepipe.studies import CohortStiffness
@@ -63,7 +63,7 @@ def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
     at = rows[rows["status"] == Status.CONVERGED_AT_BOUND.value]
     if at.empty:
         return
-    whole = at["fitted_to"] == fitted_to_most(rows)
+    whole = at["fitted_to"] == joint_label_of(rows)
     places = [f"{_fit(row)} ({row['message']})" for row in at[whole].to_dict("records")]
     fewer = int((~whole).sum())
     parts = [
@@ -91,7 +91,7 @@ def identifiable(study: CohortStiffness, results: Results) -> Iterator[str]:
     rows = results.table("stiffness")
     if rows.empty:
         return
-    own = rows[(rows["fitted_to"] == fitted_to_most(rows)) & (rows["source"] == "own")]
+    own = rows[(rows["fitted_to"] == joint_label_of(rows)) & (rows["source"] == "own")]
     parts = [_lost(str(name), part) for name, part in own.groupby("representation", sort=False)]
     told = "; ".join(part for part in parts if part)
     if told:

@@ -5,11 +5,12 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import NOTHING, fitted_to_most
 from spinepipe.report.cohort.named import NAME, case
 from spinepipe.report.page.results import Results
+from spinepipe.report.stage_errors import joint_label_of
 from spinepipe.report.words import number
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import NOTHING
 
 _CRITERIA = {
     "fitted": "Motion that was fitted",
@@ -58,14 +59,14 @@ def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
     rows = results.table("mae")
     if rows.empty:
         return
-    labels = [fitted_to_most(rows), NOTHING]
+    labels = [joint_label_of(rows), NOTHING]
     chosen = rows[
         (rows["steps"] == "peak")
         & rows["stage"].isin(["literature", "fitted"])
         & rows["fitted_to"].isin(labels)
         & rows["mae_deg"].notna()
     ]
-    for test, part in chosen.groupby("test", sort=False):
+    for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
         told = [
             f"{NAME[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
             for row in part.to_dict("records")

@@ -148,8 +148,8 @@ def _label(axis: Axes, cohort: Cohort, lowest: bool, leftmost: bool) -> None:
 
 def _over(test: str, loaded: pd.DataFrame, across: int) -> str:
     """Load case, and what a positive motion in it is where there is room."""
-    coordinate = loaded.loc[loaded["test"] == test, "coordinate"].iloc[0]
-    direction = f" (+ is {POSITIVE[coordinate]})"
+    driven = loaded.loc[loaded["test"] == test, "coordinate"].unique()
+    direction = f" (+ is {POSITIVE[driven[0]]})" if len(driven) == 1 else ""
     room = _LETTERS // across
     words = short(case(test), room)
     return words + direction if len(words) + len(direction) <= room else words

@@ -7,18 +7,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from scipy import stats
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.cohort.held_out import rotation_errors
 from spinepipe.report.cohort.named import NAME
 from spinepipe.report.layout import explain_marks, head
 from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.spread import Array, finite
+from spinepipe.report.spread import finite
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number
+from spinepipe.statistics import mean_of
 from spinepipe.studies import CohortStiffness
-from spinepipe.tables.cohort_stiffness import REPRESENTATIONS
+from spinepipe.tables.cohort_stiffness_columns import REPRESENTATIONS
 
 PANELS = {
     "fitted": "Fitted motion",
@@ -68,16 +68,6 @@ def held_out_error_figure(
     return figure
 
 
-def interval_of_mean(values: Array) -> tuple[float, float] | None:
-    """95 % interval of the mean by Student's t; None of fewer than two values."""
-    if len(values) < 2:
-        return None
-    error = float(stats.sem(values))
-    reach = float(stats.t.ppf(0.975, len(values) - 1)) * error
-    mean = float(values.mean())
-    return max(0.0, mean - reach), mean + reach
-
-
 def _published(found: pd.DataFrame) -> dict[str, float]:
     """Mean error over specimens of each published set."""
     rows = found[found["stage"] == "literature"]
@@ -102,8 +92,9 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
         shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * 0.3
         axis.plot(shown, y - 0.12 + shift, "o", color=OURS, ms=3.0, mew=0, alpha=0.55, zorder=3)
         words = f"{number(float(values.mean()))}°"
-        ends = interval_of_mean(values)
-        if ends is not None:
+        interval = mean_of(values).interval
+        if interval is not None:
+            ends = max(0.0, interval[0]), interval[1]
             axis.plot([max(ends[0], low), ends[1]], [y + 0.16] * 2, color=BLACK, lw=1.1, zorder=4,
                       solid_capstyle="butt")  # fmt: skip
             words = f"{words} ({number(ends[0])}–{number(ends[1])})"

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.cohort.case_ratios import ratios
-from spinepipe.report.cohort.chosen import single_cases
 from spinepipe.report.cohort.named import NAME, case, short
 from spinepipe.report.layout import explain_marks, head
 from spinepipe.report.log_axis import log_ticks
@@ -20,6 +19,7 @@ from spinepipe.report.spread import BAR_PT, Array, finite, quartiles
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
 from spinepipe.report.words import AXIS, count
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import load_cases
 from spinepipe.units import COORDINATES
 
 _SHOWN = ("per_specimen", "per_joint")
@@ -35,7 +35,7 @@ def load_case_stiffness_figure(
 ) -> Figure:
     """A line of panels per representation, a panel per coordinate, a row per load case."""
     stiffness = tables["stiffness"]
-    cases = single_cases(stiffness) if len(stiffness) else []
+    cases = load_cases(stiffness["fitted_to"])
     if len(cases) < 2:
         return saying("One load case: nothing to compare fits of single load cases with.")
     found = ratios(stiffness, tables["errors"])

@@ -10,9 +10,6 @@ NAME = {
 }
 """Representations of stiffness in words."""
 
-ALL, ALL_BUT = "all", "all_but_"
-"""What ``fitted_to`` calls all load cases together, and how it begins where one was left out."""
-
 _LONGEST = 22
 
 

@@ -6,10 +6,12 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import fitted_to_most
 from spinepipe.report.page.results import Results
+from spinepipe.report.stage_errors import joint_label_of
 from spinepipe.report.words import AXIS, number
+from spinepipe.statics.status import Status
 from spinepipe.studies import CohortStiffness
+from spinepipe.studies.fitted_to import NOBODY
 
 _PARTS = {
     "between_specimens": "between specimens",
@@ -23,8 +25,9 @@ def spreads(study: CohortStiffness, results: Results) -> Iterator[str]:
     rows = results.table("pooling")
     if rows.empty:
         return
-    whole = rows[(rows["without"] == "nobody") & (rows["fitted_to"] == fitted_to_most(rows))]
-    told = [_spread(row) for row in whole.dropna(subset=["centre"]).to_dict("records")]
+    whole = rows[(rows["without"] == NOBODY) & (rows["fitted_to"] == joint_label_of(rows))]
+    settled = whole[whole["status"].map(lambda name: Status(name).usable).astype(bool)]
+    told = [_spread(row) for row in settled.dropna(subset=["centre"]).to_dict("records")]
     if told:
         yield (
             "Stiffness in the middle of the cohort, and the factor that one SD stands for: "

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import NOTHING, fitted_to_most
 from spinepipe.report.cohort.named import NAME
+from spinepipe.report.stage_errors import joint_label_of
+from spinepipe.studies.fitted_to import NOTHING
 
 MANY_SPECIMENS = 16
 """With more of them only three stages have room."""
@@ -44,7 +45,7 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
     ----------
     loaded : rows of ``errors`` in the loaded coordinate, at least one.
     """
-    label = fitted_to_most(loaded)
+    label = joint_label_of(loaded)
     chosen = loaded[loaded["fitted_to"].isin([label, NOTHING])]
     wanted = list(_FEW if specimens > MANY_SPECIMENS else _ALL)
     for stage in ("fitted", "left_out_specimen"):

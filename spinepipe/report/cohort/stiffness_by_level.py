@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.chosen import doubted, fitted_to_most, own
+from spinepipe.report.cohort.chosen import doubted, own
 from spinepipe.report.cohort.levels import label_levels, places, shade
 from spinepipe.report.cohort.mark import Mark, draw_marks, handle
 from spinepipe.report.cohort.named import NAME, listed
@@ -16,6 +16,7 @@ from spinepipe.report.cohort.reach import reach
 from spinepipe.report.layout import explain_marks, head
 from spinepipe.report.log_axis import log_ticks
 from spinepipe.report.spread import draw_upright, finite
+from spinepipe.report.stage_errors import joint_label_of
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, blank, saying
 from spinepipe.report.words import AXIS, count, number, stiffness_unit
 from spinepipe.studies import CohortStiffness
@@ -145,7 +146,7 @@ def _explain(
 
 
 def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
-    label = fitted_to_most(stiffness)
+    label = joint_label_of(stiffness)
     fitted = "all load cases" if label == "all" else label.replace("_", " ")
     words = [f"Fitted to {fitted}"]
     if _crowded(cohort):

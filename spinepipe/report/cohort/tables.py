@@ -2,11 +2,11 @@
 
 import pandas as pd
 
-from spinepipe.report.cohort.chosen import fitted_to_most
-from spinepipe.report.cohort.named import ALL_BUT
 from spinepipe.report.page.results import Results
 from spinepipe.report.page.sortable import Sortable, sortable
 from spinepipe.report.page.tables import AGAINST_COLUMNS
+from spinepipe.report.stage_errors import joint_label_of
+from spinepipe.studies.fitted_to import ALL_BUT, NOBODY
 from spinepipe.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 
 SHOWN = {
@@ -29,8 +29,6 @@ _COLUMNS = {
 }
 """What a reader compares stands first; short names are left to the files."""
 
-_NOBODY = "nobody"
-
 
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has, as the page shows them; those without rows are left out."""
@@ -50,10 +48,10 @@ def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     """Rows that the page shows, and what is said of those that it does not."""
     chosen, told = frame, ""
     if name == "stiffness":
-        whole = frame["fitted_to"] == fitted_to_most(frame)
+        whole = frame["fitted_to"] == joint_label_of(frame)
         chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
     elif name == "pooling":
-        chosen, told = frame[frame["without"] == _NOBODY], "fits of all specimens"
+        chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
     elif name in ("fits", "mae"):
         left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
         chosen, told = frame[~left_out], "fits that leave no load case out"

@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from spinepipe.jobs.cohort_stiffness.tested import ALL, ALL_BUT
-from spinepipe.tables.cohort_stiffness import NOTHING
+from spinepipe.studies.fitted_to import joint_label, label_of_others
 
 LITERATURE, FITTED = "literature", "fitted"
 LEFT_OUT_SPECIMEN, LEFT_OUT_CASE = "left_out_specimen", "left_out_case"
@@ -16,14 +15,17 @@ def of_single_cases(errors: pd.DataFrame, stage: str) -> pd.DataFrame:
 
 def of_joint_fits(errors: pd.DataFrame, stage: str) -> pd.DataFrame:
     """Errors of a stage under each test, of the fits to all tests together."""
-    return _of(errors, stage, errors["fitted_to"] == joint_label(errors))
+    return _of(errors, stage, errors["fitted_to"] == joint_label_of(errors))
 
 
-def joint_label(table: pd.DataFrame) -> str:
-    """What fits to all load cases are called; the one load case where there is no other."""
-    labels = [label for label in table["fitted_to"].unique() if not label.startswith(ALL_BUT)]
-    fitted = [label for label in labels if label != NOTHING]
-    return str(fitted[0]) if len(fitted) == 1 else ALL
+def joint_label_of(table: pd.DataFrame) -> str:
+    """What fits to all load cases are called in a table."""
+    return joint_label(_labels(table))
+
+
+def _labels(table: pd.DataFrame) -> list[str]:
+    """Labels of a table, with tests whose own fits may have left no row."""
+    return [*table["fitted_to"].unique(), *(table["test"].unique() if "test" in table else ())]
 
 
 def _of(errors: pd.DataFrame, stage: str, fits: pd.Series) -> pd.DataFrame:
@@ -35,7 +37,7 @@ def _of(errors: pd.DataFrame, stage: str, fits: pd.Series) -> pd.DataFrame:
 
 
 def _to_all_others(errors: pd.DataFrame) -> pd.Series:
-    """Which were fitted to all tests but that of the row; of two tests, to the other one."""
-    if errors["test"].nunique() == 2:
-        return (errors["fitted_to"] != ALL) & (errors["fitted_to"] != errors["test"])
-    return errors["fitted_to"] == ALL_BUT + errors["test"]
+    """Which were fitted to all tests but that of the row."""
+    labels = _labels(errors)
+    others = {test: label_of_others(labels, test) for test in errors["test"].unique()}
+    return errors["fitted_to"] == errors["test"].map(others)

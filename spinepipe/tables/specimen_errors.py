@@ -1,4 +1,4 @@
-"""One error per specimen: root mean square over its tests, joints and rotations."""
+"""From the table ``errors``: one error, and one motion, per specimen."""
 
 import numpy as np
 import pandas as pd
@@ -26,7 +26,18 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     measured = rotations(errors).drop_duplicates(["specimen", *READING])["specimen"].value_counts()
     known = rotations(chosen).dropna(subset="rmse")
     known = known[known["readings"] > 0]
-    squares = (known["rmse"] ** 2 * known["readings"]).groupby(known["specimen"]).sum()
+    squares = (known["rmse"].astype(float) ** 2 * known["readings"]).groupby(known["specimen"])
     by_specimen = known.groupby("specimen")["readings"]
-    complete = by_specimen.size() == measured.reindex(squares.index)
-    return (squares / by_specimen.sum())[complete].map(np.sqrt)
+    complete = by_specimen.size() == measured.reindex(squares.sum().index)
+    return (squares.sum() / by_specimen.sum())[complete].map(np.sqrt)
+
+
+def largest_mean_motion(rows: pd.DataFrame, motion: str = "measured_peak") -> float | None:
+    """Largest over specimens of the mean size of motion over joints; None without any.
+
+    Parameters
+    ----------
+    rows : of one test and coordinate, each joint once. motion : column of the measured motion.
+    """
+    means = rows[motion].abs().groupby(rows["specimen"]).mean().dropna()
+    return float(means.max()) if len(means) else None
