@@ -1,6 +1,7 @@
 """What many jobs of one worker read again and again, kept as long as the files are the same."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,9 +22,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import Status
-from spinepipe.studies import JointPoseSensitivity, Study, check, read
+from spinepipe.studies import JointPoseSensitivity, LevelStiffness, Study, check, read
+from spinepipe.studies.coordinates import Stiffness
 from spinepipe.tables import read_frame
-from spinepipe.units import MM_PER_M, ROTATIONS
+from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 Stamp = tuple[str, int, int]
 AnyStudy = TypeVar("AnyStudy", bound=Study)
@@ -126,6 +128,16 @@ def specimen_inputs(root: str, name: str, specimen: str, _digest: str) -> Specim
 def start_stiffness(study: JointPoseSensitivity) -> Array:
     """(6,) stiffness a study starts from, SI."""
     return np.array(study.stiffness.in_order(), dtype=float)
+
+
+def stiffness_of_joints(
+    cohort: Cohort, every: Stiffness, levels: Mapping[str, LevelStiffness]
+) -> Array:
+    """(J, 6) SI: one stiffness of all joints, with the rotations of levels that have their own."""
+    values = np.tile(np.array(every.in_order(), dtype=float), (len(cohort.joint_names), 1))
+    for joint, level in levels.items():
+        values[cohort.joint_names.index(joint), len(TRANSLATIONS) :] = level.in_order()
+    return values
 
 
 def bushing_model(

@@ -6,7 +6,7 @@ from functools import cached_property
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, stands_for
 from spinepipe.studies import JointPoseSensitivity
 
 ALWAYS = (
@@ -42,6 +42,18 @@ FIGURES: dict[str, tuple[str, ...]] = {
 }
 """Figures and the tables each is drawn from."""
 
+_JOBS = {
+    "calibrations": "calibrations",
+    "simulations": "jobs",
+    "bootstrap": "bootstrap",
+    "method_fits": "methods",
+    "precision_errors": "precision",
+}
+"""Folder of the job files of each table that is made of them."""
+
+OF_JOBS = tuple(_JOBS)
+"""Tables joined from job files."""
+
 _MOST_FILES_PER_BLOCK = 300
 _FILES_PER_BLOCK = 100
 
@@ -62,7 +74,7 @@ class Layout(StudyFiles):
     @classmethod
     def of(cls, study: JointPoseSensitivity, cohort: Cohort) -> "Layout":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, paper_of(cohort.name) is not None)
+        return cls(study, cohort.specimen_names, stands_for(cohort.name, OF_JOINT_POSE))
 
     @cached_property
     def stiffnesses(self) -> list[str]:
@@ -102,7 +114,7 @@ class Layout(StudyFiles):
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The tables of this study that are made of job files."""
-        return tuple(name for name in _JOBS if self._count(name))
+        return tuple(name for name in OF_JOBS if self._count(name))
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -165,13 +177,3 @@ class Layout(StudyFiles):
             case "precision_errors":
                 return f"sd_mm={self.study.landmark_precision.sd_mm[number]:.15g}"
         raise ValueError(f"{table} is not made of job files")
-
-
-_JOBS = {
-    "calibrations": "calibrations",
-    "simulations": "jobs",
-    "bootstrap": "bootstrap",
-    "method_fits": "methods",
-    "precision_errors": "precision",
-}
-"""Folder of the job files of each table that is made of them."""

@@ -4,25 +4,20 @@ from collections.abc import Callable
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.cohort_stiffness.layout import CohortLayout
-from spinepipe.jobs.layout import Layout
-from spinepipe.jobs.range_of_motion.layout import RangeOfMotionFiles
+from spinepipe.jobs import layout
+from spinepipe.jobs.cohort_stiffness import layout as cohort_stiffness
+from spinepipe.jobs.range_of_motion import layout as range_of_motion
 from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies import Study
 
 LAYOUTS: dict[str, Callable[[Any, Cohort], StudyFiles]] = {
-    "joint_pose_sensitivity": Layout.of,
-    "range_of_motion": RangeOfMotionFiles.of,
-    "cohort_stiffness": CohortLayout.of,
+    "joint_pose_sensitivity": layout.Layout.of,
+    "range_of_motion": range_of_motion.RangeOfMotionFiles.of,
+    "cohort_stiffness": cohort_stiffness.CohortLayout.of,
 }
 """What lists the files of each kind of study."""
 
-
-JOINED = (
-    *("calibrations", "simulations", "bootstrap", "method_fits", "precision_errors"),
-    *("stiffness", "fits", "errors", "sign_checks", "pooling"),
-    "range_of_motion",
-)
+JOINED = (*layout.OF_JOBS, *cohort_stiffness.OF_JOBS, *range_of_motion.OF_JOBS)
 """Tables of all kinds that are joined from job files."""
 
 

@@ -13,7 +13,7 @@ from spinepipe.report.bootstrap_paper import draw_errors, write_range
 from spinepipe.report.bootstrap_rows import FIT, bootstrap_rows
 from spinepipe.report.layout import explain, head, label_rows, mark_start
 from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.rounding import rounded
 from spinepipe.report.rows import EVERY_JOINT, Rows
 from spinepipe.report.sections import MOST_ACROSS, sections
@@ -168,7 +168,7 @@ def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
 
 def _bars(cohort: str) -> dict[str, str]:
     bars = {OURS: "fits in the cohort's own joint poses"}
-    paper = paper_of(cohort)
+    paper = paper_of(cohort, OF_JOINT_POSE)
     return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BLACK, THEIRS, note
 from spinepipe.report.words import number
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
@@ -41,5 +41,5 @@ def write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float)
 
 def _paper(cohort: str) -> Mapping[str, Any]:
     """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
-    found = paper_of(cohort)
+    found = paper_of(cohort, OF_JOINT_POSE)
     return {} if found is None else found[1]

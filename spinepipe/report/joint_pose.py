@@ -12,7 +12,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
 from spinepipe.report.layout import explain, grid, head, label_rows, row_height
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.rows import Rows, rows_of
 from spinepipe.report.spread import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
@@ -44,7 +44,7 @@ def joint_pose_figure(cohort: Cohort, poses: pd.DataFrame) -> Figure:
     _equal_reach(axes[3:])
     failed = total - len(sampled[["specimen", "pose"]].drop_duplicates())
     bars = {OURS: "sampled landmarks"}
-    paper = paper_of(cohort.name)
+    paper = paper_of(cohort.name, OF_JOINT_POSE)
     if paper:
         bars[THEIRS] = f"{paper[0]}, Tables 7 and 8, complete set (IQR drawn around the median)"
     explain(figure, bars, _words(total, failed, rows))
@@ -111,7 +111,7 @@ def _write(axis: Axes, y: int, found: Quartiles, center: float, paper: Quartiles
 
 def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
     """The paper's median and IQR of a joint; it prints no quartiles, the IQR is put around it."""
-    found = paper_of(cohort.name)
+    found = paper_of(cohort.name, OF_JOINT_POSE)
     if found is None:
         return None
     table = "joint_origin" if column in _ORIGIN else "joint_orientation"

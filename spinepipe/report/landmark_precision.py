@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, head
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.required import required_words
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import count, number, tick
@@ -135,7 +135,7 @@ def _mark_required(
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
     """The SD that the paper reports for its landmarks."""
-    paper = paper_of(cohort.name)
+    paper = paper_of(cohort.name, OF_JOINT_POSE)
     if paper is None:
         return
     sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
@@ -165,5 +165,6 @@ def _words(
         for _, row in both.iterrows()
         if specimens == 1
     ]
-    paper = "the paper's SD is the largest resultant, not per axis" if paper_of(cohort.name) else ""
-    return "; ".join(part for part in (poses, lines, shown, *told, paper) if part) + "."
+    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    resultant = "the paper's SD is the largest resultant, not per axis" if paper else ""
+    return "; ".join(part for part in (poses, lines, shown, *told, resultant) if part) + "."

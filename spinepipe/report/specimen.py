@@ -210,8 +210,10 @@ def _legend(figure: Figure, cohort: Cohort, view: SpecimenView) -> None:
         handles.append(
             Line2D([], [], color="none", marker="o", mfc="white", mec=BLACK, ms=5.0, label=label)
         )
-    steps = count(sum(len(case.steps) for case in view.cases), "load step")
-    title = f"{cohort.name}, {view.specimen}, neutral pose; largest load of each test ({steps})"
+    title = f"{cohort.name}, {view.specimen}, neutral pose"
+    if view.cases:
+        steps = count(sum(len(case.steps) for case in view.cases), "load step")
+        title += f"; largest load of each test ({steps})"
     figure.legend(
         handles=handles, title=title, loc="outside lower center", ncols=3, title_fontsize=6.5
     )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.layout import explain, grid, head, label_rows, mark_start, row_height
 from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.rows import EVERY_JOINT, Rows, rows_of
 from spinepipe.report.spread import (
     KEY,
@@ -73,7 +73,7 @@ def stiffness_figure(
         _draw(panel, axis, rows, solved)
     found = len(solved[["specimen", "pose"]].drop_duplicates())
     bars = {OURS: "calibrated, over all sampled joint poses"}
-    paper = paper_of(cohort.name)
+    paper = paper_of(cohort.name, OF_JOINT_POSE)
     if paper:
         bars[THEIRS] = f"{paper[0]}, {paper[1]['counts']['pose_samples_reduced']} poses"
     words = _words(study.calibration.bound_factor, found, poses, rows)
@@ -97,7 +97,7 @@ def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Pan
 
 
 def _paper(cohort: Cohort, column: str) -> Quartiles | None:
-    found = paper_of(cohort.name)
+    found = paper_of(cohort.name, OF_JOINT_POSE)
     if found is None:
         return None
     reduced = found[1]["reduced_stiffness"]

@@ -13,7 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.intervals import draw_interval
 from spinepipe.report.layout import explain, head
 from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.refused import refused
 from spinepipe.report.spread import finite
 from spinepipe.report.strip import STRIP_KEY, draw_strip
@@ -67,7 +67,7 @@ def method_name(name: str) -> str:
 
 def _paper(cohort: Cohort) -> tuple[str, int, int] | None:
     """Name, successful fits and fits of the paper."""
-    found = paper_of(cohort.name)
+    found = paper_of(cohort.name, OF_JOINT_POSE)
     if found is None:
         return None
     counts = found[1]["counts"]

@@ -10,7 +10,6 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.jobs import figures
 from spinepipe.jobs.layout import FIGURES
-from spinepipe.report.published import paper_of
 from spinepipe.report.rows import MOST_ROWS, rows_of
 from spinepipe.report.spread import quartiles
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
@@ -95,13 +94,6 @@ def test_share_without_equilibrium_counts_runs_not_rows(tmp_path: Path) -> None:
     failed = int((best.groupby("pose")["status"].first() != "converged").sum())
     assert 0 < failed < 12
     assert percent(failed, 12) in words
-
-
-def test_only_the_rebuilt_cohort_has_a_paper_beside_it() -> None:
-    assert paper_of("straight") is None
-    found = paper_of("palanca_l1l4")
-    assert found is not None
-    assert found[1]["doi"] == "10.3389/fbioe.2024.1304334"
 
 
 def test_specimens_are_pooled_only_when_there_is_no_room() -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.jobs import figures
-from spinepipe.jobs.cohort_stiffness.layout import FIGURES as COHORT_FIGURES
+from spinepipe.jobs.cohort_stiffness.layout import COHORT_FIGURES
 from spinepipe.jobs.layout import FIGURES
 from spinepipe.jobs.range_of_motion.layout import ROM_FIGURES
 from spinepipe.report.bootstrap_paper import draw_errors

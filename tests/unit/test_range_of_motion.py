@@ -21,10 +21,11 @@ from spinepipe.jobs.range_of_motion import (
     summary,
     variance,
 )
+from spinepipe.jobs.range_of_motion.grid import read_grid
 from spinepipe.problems import InputError
 from spinepipe.studies import RangeOfMotion
 from spinepipe.studies.range_of_motion import VirtualTest
-from spinepipe.tables import read_frame
+from spinepipe.tables import RANGE_OF_MOTION, from_rows, read_frame, write
 
 FILE = f"config/studies/{STUDY}.yaml"
 SIX = "[flexion, extension, right_bending, left_bending, left_rotation, right_rotation]"
@@ -230,6 +231,52 @@ def test_measured_loads_count_from_their_step_0_in_their_first_cycle(tmp_path: P
     )
 
 
+PRELOADED = """\
+specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm
+*,bend,0,L1,0,0,0,2,0,0,,,
+*,bend,0,L3,0,0,0,-2,0,0,,,
+*,bend,1,L1,0,0,0,5,0,0,,,
+*,bend,1,L3,0,0,0,-2,0,0,,,
+"""
+
+
+def test_loads_that_balance_in_step_0_are_loads(tmp_path: Path) -> None:
+    """Moments of 2 and -2 N m bend the joints between them already in step 0."""
+    root = project(tmp_path, "virtual_tests: null\n")
+    (root / "config/cohorts/stack/loads.csv").write_text(PRELOADED)
+    rows = moved(root)
+    assert rows["step"].to_list() == [1, 1, 1]
+    found = rows["predicted_right_bending_deg"]
+    np.testing.assert_allclose(found, np.rad2deg((5.0 - 2.0) / 80.0), rtol=1e-9)
+
+
+DRIVEN = """\
+specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm
+*,flexion,0,L1,0,0,0,0,0,0,,,
+*,flexion,1,L1,0,0,0,1,0,-4,,,
+*,left_rotation,0,L1,0,0,0,0,0,0,0,100,0
+*,left_rotation,1,L1,50,0,0,0,0,0,0,100,0
+"""
+
+
+def test_the_load_tells_the_loaded_coordinate_and_motion_where_no_moment_acts(
+    tmp_path: Path,
+) -> None:
+    size = (2, 3, 3)
+    root = project(tmp_path, "poses: 3\nstiffness_sets: 3\nvirtual_tests: null\n", specimens="ab")
+    (root / "config/cohorts/stack/loads.csv").write_text(DRIVEN)
+    path, rows = table_of(root, size)
+    rows["predicted_right_bending_deg"] += 30.0
+    write(from_rows(RANGE_OF_MOTION, rows.to_dict("records")), path, {})
+    study, cohort = studies.check(root, STUDY)
+    assert isinstance(study, RangeOfMotion)
+    grid = read_grid(str(path), study, cohort)
+    assert dict(zip(grid.tests, grid.loaded, strict=True)) == {
+        "flexion": "extension",  # though the made-up joints bend far more
+        "left_rotation": "right_bending",
+    }
+
+
 def test_summary_has_the_quantiles_of_pandas(tmp_path: Path) -> None:
     size = (3, 6, 4)
     root = made_up(tmp_path, size)
@@ -328,6 +375,32 @@ def test_tests_of_loads_must_exist(tmp_path: Path) -> None:
     root = project(tmp_path, "virtual_tests: null\ntests: [twist, benf]\n")
     (root / "config/cohorts/stack/loads.csv").write_text(LOADS)
     assert "did you mean 'bend'" in problems(root)["tests.1"]
+
+
+MOTION = """\
+specimen,test,step,joint,left_rotation_deg
+a,twist,0,L1L2,0
+a,twist,1,L1L2,2
+"""
+
+
+def test_the_sd_of_a_reading_is_not_taken_for_that_of_a_frame(tmp_path: Path) -> None:
+    """With motion.csv the cohort's measurement_sd speaks of motion."""
+
+    def measured(study: str) -> Path:
+        root = project(tmp_path, study)
+        (root / "config/cohorts/stack/loads.csv").write_text(LOADS)
+        (root / "config/cohorts/stack/motion.csv").write_text(MOTION)
+        return root
+
+    told = problems(measured("poses: 3\n"))
+    assert set(told) == {"pose_sd"}
+    assert (
+        "cohort 'stack' has motion.csv: its measurement_sd is that of a reading" in told["pose_sd"]
+    )
+    for fine in ("poses: 1\n", "poses: 3\npose_sd: {translation_mm: 1, rotation_deg: 2}\n"):
+        study, _ = studies.check(measured(fine), STUDY)
+        assert isinstance(study, RangeOfMotion)
 
 
 @pytest.mark.parametrize("poses", [0, 1])

@@ -1,21 +1,29 @@
 """Figures and findings of range of motion, from tables of any size and outcome."""
 
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from grid_cases import JOINTS, STUDY, made_up, table_of
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
+from spinepipe.jobs.range_of_motion import sample_frames
 from spinepipe.jobs.range_of_motion.grid import read_grid
 from spinepipe.jobs.range_of_motion.summary import summary_rows
 from spinepipe.jobs.range_of_motion.variance import variance_rows
 from spinepipe.report.page.results import Results
 from spinepipe.report.range_of_motion import levels_figure, variance_figure
+from spinepipe.report.range_of_motion.findings import findings
 from spinepipe.report.range_of_motion.page import range_of_motion_page
 from spinepipe.report.style import picture, style
 from spinepipe.studies import RangeOfMotion, check
+from spinepipe.tables import read_frame
 
 Size = tuple[int, int, int]
 Lost = tuple[tuple[int, int, int], ...]
@@ -94,4 +102,77 @@ def test_findings_have_the_numbers_of_the_tables(tmp_path: Path, size: Size) -> 
     flexion = chosen.query("test == 'flexion' and role == 'loaded'")
     largest = flexion["median"].abs().max()
     assert f" to {largest:.1f}° (" in page
-    assert ("most of the variance is due to" in page) == (size[1] > 1)
+    assert ("of the variance is due to" in page) == (size[1] > 1)
+
+
+def variance_of(stiffness: Sequence[float]) -> pd.DataFrame:
+    """Shares of a cohort's joints in one test; pose takes a third of what stiffness leaves."""
+    shares = np.array(stiffness)
+    return pd.DataFrame(
+        {
+            "specimen": "*", "test": "left_bending", "status": "done",
+            "joint": JOINTS[: len(shares)], "specimen_share": (1.0 - shares) / 3.0,
+            "pose_share": (1.0 - shares) / 3.0, "stiffness_share": shares,
+            "rest_share": (1.0 - shares) / 3.0,
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "says"),
+    [
+        ((0.61, 0.72, 0.55), "most of the variance is due to the stiffness (median 61 %, 55 % to "
+         "72 % over the joints)."),
+        ((0.45, 0.40, 0.48), "the largest share of the variance is due to the stiffness (median "
+         "45 %, 40 % to 48 % over the joints)."),
+        ((0.61, 0.72, 0.45), "the largest share of the variance is due to the stiffness (median "
+         "61 %, 45 % to 72 % over the joints)."),
+        ((0.40,), "the largest share of the variance is due to the stiffness (40 %)."),
+        ((0.60, 0.60), "most of the variance is due to the stiffness (60 % at every joint)."),
+    ],
+)  # fmt: skip
+def test_most_is_more_than_half_at_every_joint(
+    stiffness: Sequence[float], says: str, tmp_path: Path
+) -> None:
+    study, cohort, found = results(tmp_path, (3, 5, 4))
+    tables = {**found.tables, "rom_variance": variance_of(stiffness)}
+    told = findings(study, cohort, replace(found, tables=tables))
+    assert f"Left bending: {says}" in [line.replace("\u00a0", " ") for line in told]
+
+
+LOADS = """\
+specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm
+*,flexion,0,L1,0,0,0,0,0,0,0,90,0
+*,flexion,1,L1,0,0,0,0,0,-4,0,90,0
+"""
+
+
+@pytest.mark.parametrize("virtual", [True, False])
+def test_the_segment_is_shown_with_the_loads_that_were_applied(
+    virtual: bool, tmp_path: Path
+) -> None:
+    """Not with those of loads.csv, where the tests are virtual; no landmarks, so no vertebrae."""
+    study, cohort, found = results(tmp_path, (2, 3, 4))
+    (tmp_path / "config/cohorts/stack/loads.csv").write_text(LOADS)
+    sample_frames.run(str(tmp_path), STUDY, str(tmp_path / "frames.parquet"))
+    tables = {**found.tables, "frames": read_frame(tmp_path / "frames.parquet")}
+    study = study if virtual else study.model_copy(update={"virtual_tests": None})
+    cohort = check(tmp_path, STUDY)[1]
+    page = range_of_motion_page(study, cohort, replace(found, tables=tables))
+    text = page.split('<script type="application/json"')[0]
+    assert re.findall(r'data-group="(\w+)"', text) == ["own", "sampled", *["loads"] * (not virtual)]
+    assert ("Arrows end where" in text) != virtual
+    assert "drums" not in text
+    (scenes,) = re.findall(r'id="scenes">(.*?)</script>', page)
+    shown = json.loads(scenes)
+    assert list(shown) == ["a", "b"]
+    sampled = [t for t in shown["a"]["data"] if t["name"] == "superior axis, sampled"]
+    assert [len(t["x"]) // 3 for t in sampled] == [2 * len(JOINTS)], "pose 0 is no draw"
+    assert any(t["meta"] == "loads" for t in shown["a"]["data"]) != virtual
+
+
+def test_what_the_settings_leave_out_is_told(tmp_path: Path) -> None:
+    study, cohort, found = results(tmp_path, (1, 1, 1))
+    page = range_of_motion_page(study, cohort, found)
+    assert "drawn joint frames (poses: 1); drawn stiffness sets (stiffness_sets: 1)" in page
+    assert "left out" not in range_of_motion_page(*results(tmp_path / "more", (1, 5, 4)))

@@ -24,6 +24,7 @@ from spinepipe.report.page.scene import MOST_POSES, as_script, scenes
 from spinepipe.report.page.significance import folded, in_full
 from spinepipe.report.page.solids import CORNERS, LONE_DISC_MM, solids
 from spinepipe.report.page.sortable import sortable
+from spinepipe.report.specimen_view import view_of
 from spinepipe.tables import read_frame
 from spinepipe.tables.schema import Column
 
@@ -282,7 +283,8 @@ def test_scene_shows_frames_of_both_kinds(tmp_path: Path) -> None:
     size = Size(("a", "b"), 2, 250)
     folder = results(project(tmp_path, size), size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    drawn = scenes(study, cohort, read_frame(folder / "poses.parquet"))
+    views = [view_of(cohort, name, study) for name in cohort.specimen_names]
+    drawn = scenes(views, cohort, read_frame(folder / "poses.parquet"))
     assert list(drawn) == ["a", "b"]
     traces = {trace["name"]: trace for trace in drawn["a"]["data"]}
     own = traces["superior axis, own"]

@@ -24,6 +24,7 @@ from spinepipe.report.page.captions import caption
 from spinepipe.report.page.scene import scenes
 from spinepipe.report.pose_against_stiffness import pose_against_stiffness_figure
 from spinepipe.report.sections import across_of
+from spinepipe.report.specimen_view import view_of
 from spinepipe.report.style import TALLEST_MM, style
 from spinepipe.report.success import success_figure
 from spinepipe.studies import JointPoseSensitivity
@@ -257,7 +258,8 @@ def test_legend_of_the_scene_names_each_load_once(tmp_path: Path) -> None:
     study, cohort, tables = made(tmp_path, Size(("a",), 2, 4))
     assert cohort.loads is not None
     twice = pd.concat([cohort.loads.assign(cycle=cycle) for cycle in (1, 2)], ignore_index=True)
-    drawn = scenes(study, replace(cohort, loads=twice), tables["poses"])["a"]["data"]
+    again = replace(cohort, loads=twice)
+    drawn = scenes([view_of(again, "a", study)], again, tables["poses"])["a"]["data"]
     loads = [trace for trace in drawn if trace["meta"] == "loads"]
     assert len(loads) == 8, "line and head of a force and of a moment, in two cycles"
     named = sorted(t["name"] for t in loads if t["showlegend"])

@@ -4,10 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_factors
-from spinepipe.effects.contract import Array
-from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.inputs import stiffness_of_joints, study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.studies import RangeOfMotion
 from spinepipe.tables import STIFFNESS_SETS, to_arrow, write
@@ -19,7 +17,8 @@ def run(root: str, study: str, output: str) -> None:
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     joints = cohort.joint_names
     factors = sample_factors(settings.stiffness_spread, 6, settings.stiffness_sets, settings.seed)
-    values = (factors[:, None, :] * own_stiffness(settings, cohort)).reshape(-1, 6)
+    own = stiffness_of_joints(cohort, settings.stiffness, settings.level_stiffness)
+    values = (factors[:, None, :] * own).reshape(-1, 6)
     columns: dict[str, list[Any]] = {
         "stiffness": np.repeat(np.arange(len(factors)), len(joints)).tolist(),
         "joint": list(joints) * len(factors),
@@ -27,11 +26,3 @@ def run(root: str, study: str, output: str) -> None:
     }
     made_by = provenance("range_of_motion.draw_stiffness", settings, cohort)
     write(to_arrow(STIFFNESS_SETS, columns), output, made_by)
-
-
-def own_stiffness(settings: RangeOfMotion, cohort: Cohort) -> Array:
-    """(J, 6) stiffness that the study names, SI."""
-    values = np.tile(np.array(settings.stiffness.in_order()), (len(cohort.joint_names), 1))
-    for joint, level in settings.level_stiffness.items():
-        values[cohort.joint_names.index(joint), 3:] = level.in_order()
-    return values

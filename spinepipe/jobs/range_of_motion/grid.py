@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import mode
 
 import numpy as np
 import pyarrow as pa
@@ -10,8 +11,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.virtual_tests import VIRTUAL_TESTS
+from spinepipe.cohort.main_moment import loaded_coordinate
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.range_of_motion.load_steps import all_cases
 from spinepipe.studies import RangeOfMotion
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
@@ -26,7 +28,8 @@ class Grid:
 
     Attributes
     ----------
-    loaded : the coordinate that each test turns.
+    loaded : the coordinate that each test turns: that of its largest moment; of tests without
+        moments the rotation that moves most.
     motion : (S, P, K, T, J, 6) mm and deg, NaN without equilibrium.
     asked : (S, P, K, T) whether the specimen has the test at all.
     """
@@ -59,7 +62,10 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
         values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
         motion[place] = np.column_stack(values)
         asked[place[:4]] = True
-    loaded = tuple(_loaded(study, test, motion[:, :, :, i]) for i, test in enumerate(tests))
+    driven = _driven(study, cohort)
+    loaded = tuple(
+        driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)
+    )
     return Grid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
 
 
@@ -77,10 +83,22 @@ def _tests(study: RangeOfMotion, cohort: Cohort) -> tuple[str, ...]:
     return study.tests or cohort.tests
 
 
-def _loaded(study: RangeOfMotion, test: str, motion: Array) -> str:
-    """The coordinate that a test turns; of tests of loads.csv the rotation that moves most."""
-    if study.virtual_tests is not None:
-        return VIRTUAL_TESTS[test].coordinate
+def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
+    """The coordinate that the largest moment of each test drives, in most specimens.
+
+    Tests without a moment have none.
+    """
+    found: dict[str, list[str]] = {}
+    for specimen in cohort.specimen_names:
+        for case in all_cases(study, cohort, specimen):
+            coordinate = loaded_coordinate(case)
+            if coordinate is not None:
+                found.setdefault(case.test, []).append(coordinate)
+    return {test: mode(coordinates) for test, coordinates in found.items()}
+
+
+def _moves_most(motion: Array) -> str:
+    """The rotation that moves most; motion (..., 6)."""
     flat = np.abs(motion[..., 3:]).reshape(-1, 3)
     solved = flat[np.isfinite(flat).all(axis=1)]
     return ROTATIONS[int(np.median(solved, axis=0).argmax())] if len(solved) else ROTATIONS[0]

@@ -7,10 +7,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies import RangeOfMotion
 
-MOTION = "range_of_motion"
-"""The table that is made of job files, one for each specimen, pose and stiffness set."""
+OF_JOBS = ("range_of_motion",)
+"""Tables joined from job files, one for each specimen, pose and stiffness set."""
 
-TABLES = ("frames", "stiffness_sets", MOTION, "rom_summary", "rom_variance")
+TABLES = ("frames", "stiffness_sets", *OF_JOBS, "rom_summary", "rom_variance")
 
 ROM_FIGURES: dict[str, tuple[str, ...]] = {
     "range_of_motion": ("rom_summary",),
@@ -45,7 +45,7 @@ class RangeOfMotionFiles(StudyFiles):
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The table that is made of job files."""
-        return (MOTION,)
+        return OF_JOBS
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.main_moment import peak_step
 from spinepipe.cohort.specimen import load_cases
 from spinepipe.cohort.virtual_tests import virtual_load_cases
 from spinepipe.jobs.inputs import study_of_kind
@@ -57,8 +58,8 @@ def all_cases(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> tuple[L
 
 def _asked(case: LoadCase, gravity: bool, all_steps: bool) -> AskedTest:
     """Joints have no memory, so the largest load can be computed without the steps before it."""
-    largest = max(case.steps, key=_size)
-    from_neutral = not gravity and not any(_size(case.steps[0]))
+    largest = case.steps[peak_step(case)]
+    from_neutral = not gravity and not _loaded(case.steps[0])
     if all_steps:
         return AskedTest(case, from_neutral, largest.step, slice(None))
     if from_neutral or largest is case.steps[0]:
@@ -67,8 +68,6 @@ def _asked(case: LoadCase, gravity: bool, all_steps: bool) -> AskedTest:
     return AskedTest(both, from_neutral, largest.step, slice(1, None))
 
 
-def _size(step: LoadStep) -> tuple[float, float]:
-    """Total moment and total force of a step; forces tell steps without moments apart."""
-    moment = sum((wrench.moment for wrench in step.wrenches), np.zeros(3))
-    force = sum((wrench.force for wrench in step.wrenches), np.zeros(3))
-    return float(np.linalg.norm(moment)), float(np.linalg.norm(force))
+def _loaded(step: LoadStep) -> bool:
+    """Whether anything acts; loads that balance each other still press and bend."""
+    return any(wrench.force.any() or wrench.moment.any() for wrench in step.wrenches)

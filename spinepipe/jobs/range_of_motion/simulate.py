@@ -5,16 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort import Cohort
-from spinepipe.cohort.specimen import spine_model
-from spinepipe.effects import create
 from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose
-from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.inputs import on_bushings, study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.jobs.range_of_motion.drawn import drawn_frames, drawn_stiffness
 from spinepipe.jobs.range_of_motion.load_steps import AskedTest, asked_tests
-from spinepipe.model import RefusedModel, ScopedEffect, SpineModel
+from spinepipe.model import RefusedModel
 from spinepipe.statics import Chain, Status, System, follow
 from spinepipe.studies import RangeOfMotion
 from spinepipe.tables import RANGE_OF_MOTION, to_arrow, write
@@ -42,8 +38,9 @@ def run(
     tests = asked_tests(root, study, specimen, cohort.digest)
     placed = drawn_frames(frames).of(specimen, int(pose))
     values = drawn_stiffness(stiffness_sets)[int(stiffness)]
+    damping = np.array(settings.damping.in_order())
     try:
-        chain = Chain(_model(settings, cohort, specimen, placed, values))
+        chain = Chain(on_bushings(cohort, specimen, placed, values, damping))
         ends = [_motion(chain, test) for test in tests]
     except RefusedModel as error:
         nowhere = np.full(values.shape, np.nan)
@@ -55,20 +52,6 @@ def run(
     columns["stiffness"] = [int(stiffness)] * len(columns["test"])
     made_by = provenance("range_of_motion.simulate", settings, cohort)
     write(to_arrow(TABLE, columns), output, made_by)
-
-
-def _model(
-    settings: RangeOfMotion,
-    cohort: Cohort,
-    specimen: str,
-    frames: tuple[Pose, ...],
-    stiffness: Array,
-) -> SpineModel:
-    """The specimen on linear bushings; stiffness (J, 6)."""
-    joints = tuple(range(len(frames)))
-    bushing = ScopedEffect(create("linear_bushing"), joints, stiffness)
-    damping = np.array(settings.damping.in_order())
-    return spine_model(cohort, specimen, frames, (bushing,), damping)
 
 
 def _motion(chain: Chain, test: AskedTest) -> Ends:

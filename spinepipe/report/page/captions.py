@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from spinepipe.cohort import Cohort
 from spinepipe.report.agreement import in_rows
 from spinepipe.report.page.results import Results
-from spinepipe.report.published import paper_of
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.settling import settling
 from spinepipe.studies import JointPoseSensitivity
 
@@ -29,7 +29,7 @@ def caption(
 
 def _false(cohort: Cohort, results: Results) -> Iterator[str]:
     """How the sentences begin that speak of something else than this study shows."""
-    if paper_of(cohort.name) is None:
+    if paper_of(cohort.name, OF_JOINT_POSE) is None:
         yield "For the cohort rebuilt from"
     several = len(cohort.specimen_names) > 1
     yield "With one specimen," if several else "With several specimens,"

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 
 import pandas as pd
@@ -12,15 +12,15 @@ from plotly.offline import get_plotlyjs
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.origin import origin
-from spinepipe.report.page.scene import GROUPS, MOST_POSES, as_script, scenes
+from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
 from spinepipe.report.page.sortable import Sortable
 from spinepipe.report.specimen import draw_specimen
-from spinepipe.report.specimen_view import view_of
+from spinepipe.report.specimen_view import SpecimenView, view_of
 from spinepipe.report.style import picture, style
 from spinepipe.report.words import count
 from spinepipe.studies import JointPoseSensitivity, Study
 
-_MOST_NAMES = 12
+_MOST_NAMES, _MOST_SHOWN = 12, 6
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,7 @@ class Document:
     findings : sentences, the most urgent first. left_out : parts that the settings leave out.
     poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled.
     metadata : what each table's file says of where it comes from.
+    with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
     """
 
     question: str
@@ -56,6 +57,7 @@ class Document:
     metadata: Mapping[str, Mapping[str, str]]
     left_out: Sequence[str]
     poses: pd.DataFrame
+    with_loads: bool = True
 
     def html(self, study: Study, cohort: Cohort) -> str:
         """The document, which fetches nothing; the same results, the same bytes."""
@@ -63,9 +65,8 @@ class Document:
             autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
         template = environment.from_string(_part("page.html"))
-        shifted = study if isinstance(study, JointPoseSensitivity) else None
-        drawn = scenes(shifted, cohort, self.poses)
-        sampled = len(self.poses) > 0 or shifted is not None
+        views = self._views(study, cohort)
+        drawn = scenes(views, cohort, self.poses)
         return template.render(
             study=study,
             cohort=cohort,
@@ -77,14 +78,20 @@ class Document:
             origin=origin(study, self.metadata),
             left_out=self.left_out,
             drawn=list(drawn),
-            still=_address(_still(shifted, cohort)),
-            groups={name: words for name, words in GROUPS.items() if sampled or name != "sampled"},
+            still=_address(_still(views[0], cohort)),
+            groups=groups_of(drawn),
             most_poses=MOST_POSES,
             scenes=Markup(as_script(drawn)),  # as_script leaves nothing that could end the element
             style=Markup(_part("page.css")),
             script=Markup(_part("page.js.html")),
             plotly=Markup(get_plotlyjs()),
         )
+
+    def _views(self, study: Study, cohort: Cohort) -> list[SpecimenView]:
+        """What is shown of each of the first specimens."""
+        shifted = study if isinstance(study, JointPoseSensitivity) else None
+        views = [view_of(cohort, name, shifted) for name in cohort.specimen_names[:_MOST_SHOWN]]
+        return views if self.with_loads else [replace(v, cases=(), motions=()) for v in views]
 
 
 def _part(name: str) -> str:
@@ -98,12 +105,10 @@ def _specimens(cohort: Cohort) -> str:
     return f"{count(len(names), 'specimen')}: {shown}{more}"
 
 
-def _still(study: JointPoseSensitivity | None, cohort: Cohort) -> bytes:
-    """The first specimen as a drawing, for paper and for readers without scripts."""
+def _still(view: SpecimenView, cohort: Cohort) -> bytes:
+    """A specimen as a drawing, for paper and for readers without scripts."""
     with style():
-        return picture(
-            draw_specimen(cohort, view_of(cohort, cohort.specimen_names[0], study)), "svg"
-        )
+        return picture(draw_specimen(cohort, view), "svg")
 
 
 def _address(svg: bytes) -> str:

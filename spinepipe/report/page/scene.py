@@ -1,7 +1,7 @@
 """3-D view of a segment: vertebrae, its own joint frames, sampled ones, and the loads."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.report.page.solids import solids
 from spinepipe.report.specimen import AXIS_COLORS, largest_load
-from spinepipe.report.specimen_view import SpecimenView, view_of
+from spinepipe.report.specimen_view import SpecimenView
 from spinepipe.report.style import BLACK, GREY
 from spinepipe.statics.status import Status
-from spinepipe.studies import JointPoseSensitivity
 from spinepipe.units import MM_PER_M, ROTATIONS
 
-MOST_SPECIMENS, MOST_POSES = 6, 100
+MOST_POSES = 100
 GROUPS = {
     "vertebrae": "vertebrae and landmarks",
     "own": "the cohort's own joint frames",
@@ -34,14 +33,15 @@ _OWN_MM, _SAMPLED_MM, _ARROW_SHARE = 11.0, 16.0, 0.18
 _TITLES = ("anterior (mm)", "superior (mm)", "right (mm)")
 
 
-def scenes(
-    study: JointPoseSensitivity | None, cohort: Cohort, poses: pd.DataFrame
-) -> dict[str, Any]:
-    """A plotly figure, as plain data, of each of the first specimens; `poses` may have no rows."""
-    return {
-        name: _scene(view_of(cohort, name, study), cohort, poses)
-        for name in cohort.specimen_names[:MOST_SPECIMENS]
-    }
+def scenes(views: Sequence[SpecimenView], cohort: Cohort, poses: pd.DataFrame) -> dict[str, Any]:
+    """A plotly figure, as plain data, of each specimen; `poses` may have no rows."""
+    return {view.specimen: _scene(view, cohort, poses) for view in views}
+
+
+def groups_of(drawn: Mapping[str, Any]) -> dict[str, str]:
+    """Those of `GROUPS` of which a scene shows something."""
+    shown = {trace["meta"] for scene in drawn.values() for trace in scene["data"]}
+    return {name: words for name, words in GROUPS.items() if name in shown}
 
 
 def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:

@@ -61,16 +61,24 @@ def _ends(row: pd.Series) -> str:
 
 
 def _dominant(rows: pd.DataFrame) -> Iterator[str]:
-    """The factor with the largest share, test by test."""
+    """The factor with the largest share (median over the joints), test by test."""
     for test, joints in rows[rows["status"] == "done"].groupby("test", sort=False):
         shares = {name: joints[f"{name}_share"].dropna() for name in _FACTORS}
         medians = {name: share.median() for name, share in shares.items() if len(share)}
         first = max(medians, key=lambda name: medians[name])
-        low, high = (_percent(end) for end in (shares[first].min(), shares[first].max()))
+        part = "most" if shares[first].min() > 0.5 else "the largest share"
         yield (
-            f"{str(test).replace('_', ' ').capitalize()}: most of the variance is due to "
-            f"{_FACTORS[first]} ({low if low == high else f'{low} to {high}'} over the joints)."
+            f"{str(test).replace('_', ' ').capitalize()}: {part} of the variance is due to "
+            f"{_FACTORS[first]} ({_over_joints(shares[first])})."
         )
+
+
+def _over_joints(shares: pd.Series) -> str:
+    """Median and range over the joints."""
+    low, high = (_percent(end) for end in (shares.min(), shares.max()))
+    if low == high:
+        return low if len(shares) == 1 else f"{low} at every joint"
+    return f"median {_percent(shares.median())}, {low} to {high} over the joints"
 
 
 def _percent(share: float) -> str:

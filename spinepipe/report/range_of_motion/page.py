@@ -1,19 +1,13 @@
-"""The report of a range-of-motion study: one HTML file that fetches nothing."""
+"""The report of a range-of-motion study."""
 
-import base64
 from collections.abc import Iterator
-from importlib.resources import files
-
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.origin import origin
+from spinepipe.report.page.document import Document, Picture
 from spinepipe.report.page.results import Results
 from spinepipe.report.page.sortable import Sortable, sortable
 from spinepipe.report.range_of_motion.findings import findings
 from spinepipe.report.range_of_motion.panels import EVERY
-from spinepipe.report.words import count
 from spinepipe.studies import RangeOfMotion
 from spinepipe.tables import ROM_SUMMARY, ROM_VARIANCE, STIFFNESS_SETS, Table
 
@@ -22,43 +16,39 @@ QUESTION = (
     "where its joint frames are, or on the stiffness?"
 )
 TITLES = {"range_of_motion": "Range of motion", "rom_variance": "What motion hangs on"}
-READ = ("rom_summary", "rom_variance", "stiffness_sets")
+READ = ("rom_summary", "rom_variance", "stiffness_sets", "frames")
 """Tables whose rows the page needs; of the others it tells where they come from."""
+
+OWN_POSE = 0
+"""The pose with the cohort's own joint frames."""
 
 
 def range_of_motion_page(study: RangeOfMotion, cohort: Cohort, results: Results) -> str:
-    """The report as one HTML document; the same results, the same bytes."""
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    template = environment.from_string(_part("spinepipe.report.range_of_motion", "page.html"))
-    return template.render(
-        study=study,
-        cohort=cohort,
+    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
+    frames = results.table("frames")
+    whole = Document(
         question=QUESTION,
-        specimens=count(len(cohort.specimen_names), "specimen"),
         findings=findings(study, cohort, results),
-        pictures=[_picture(name, results) for name in results.pictures],
+        pictures=[
+            Picture.of(name, TITLES[name], svg, " ".join(results.captions[name].split()))
+            for name, svg in results.pictures.items()
+        ],
         tables=[table for table in _tables(cohort, results) if table.rows],
-        origin=origin(study, results.metadata),
-        style=Markup(_part("spinepipe.report.page", "page.css")),
-        script=Markup(_part("spinepipe.report.page", "page.js.html")),
+        metadata=results.metadata,
+        left_out=left_out(study),
+        poses=frames[frames["pose"] > OWN_POSE] if len(frames) else frames,
+        with_loads=study.virtual_tests is None,
     )
+    return whole.html(study, cohort)
 
 
-def _part(package: str, name: str) -> str:
-    return files(package).joinpath(name).read_text(encoding="utf-8")
-
-
-def _picture(name: str, results: Results) -> dict[str, str]:
-    """A figure inside the page: as an image of its own it shares no ids with the others."""
-    content = base64.b64encode(results.pictures[name].encode()).decode()
-    return {
-        "name": name,
-        "title": TITLES[name],
-        "address": f"data:image/svg+xml;base64,{content}",
-        "caption": " ".join(results.captions[name].split()),
-    }
+def left_out(study: RangeOfMotion) -> tuple[str, ...]:
+    """Draws that the settings leave out, each with the setting that does."""
+    parts = (
+        ("drawn joint frames", f"poses: {study.poses}", study.n_poses > 1),
+        ("drawn stiffness sets", "stiffness_sets: 1", study.stiffness_sets > 1),
+    )
+    return tuple(f"{part} ({setting})" for part, setting, drawn in parts if not drawn)
 
 
 def _tables(cohort: Cohort, results: Results) -> Iterator[Sortable]:
