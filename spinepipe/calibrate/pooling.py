@@ -27,7 +27,7 @@ FREE_ROUNDS, DAMPED_SHARE = 12, 0.3
 SETTLED = 0.05
 """Change of the logarithm of a spread that does not matter."""
 
-UNSETTLED = "the spreads do not settle, as where a specimen does not go with the others: see"
+UNSETTLED = "the spreads do not settle, as where a specimen does not go with the others"
 
 
 def pool(
@@ -59,13 +59,13 @@ def pool(
     dof = _degrees_of_freedom(problems[0])
     starts = starts or [np.zeros(len(dof))] * len(problems)
     members = [Member(p, x, noise) for p, x in zip(problems, starts, strict=True)]
-    hierarchy, iterations, settled = _travel(members, dof, None if noise is None else 1.0)
+    hierarchy, iterations, unsettled = _travel(members, dof, None if noise is None else 1.0)
     found = hierarchy.posterior()
     told = zip(found.x, found.covariance, found.effective_parameters.tolist(), strict=True)
     specimens = tuple(m.result(*all_of) for m, all_of in zip(members, told, strict=True))
     status, message = _verdict(specimens)
-    if not settled:
-        status, message = Status.NOT_CONVERGED, f"{UNSETTLED} {_worst(problems, specimens)}"
+    if unsettled:
+        status, message = Status.NOT_CONVERGED, f"{unsettled}: see {_worst(problems, specimens)}"
     return Pooled(
         specimens=specimens,
         spreads=_cohort_spreads(problems[0], dof, hierarchy),
@@ -114,15 +114,15 @@ def _degrees_of_freedom(problem: Problem) -> Indices:
 
 def _travel(
     members: Sequence[Member], dof: Indices, scatter: float | None
-) -> tuple[Hierarchy, int, bool]:
-    """The hierarchy where no specimen moves any more, after how many rounds, and if it settled."""
-    hierarchy, rounds, settled = None, 0, False
+) -> tuple[Hierarchy, int, str]:
+    """The hierarchy where no specimen moves any more, after how many rounds, and what ails it."""
+    hierarchy, rounds, settled, trouble = None, 0, False, ""
     while hierarchy is None or rounds < MOST_ROUNDS:
         designs, targets = zip(*[member.linearised() for member in members], strict=True)
         readings = condensed(designs, targets, len(dof))
         before = hierarchy.spreads if hierarchy else None
-        asked = estimated(readings, dof, scatter, before)
-        spreads = asked
+        estimate = estimated(readings, dof, scatter, before)
+        spreads, asked, trouble = estimate.spreads, estimate.spreads, estimate.trouble
         if before is not None:
             settled = change(before, asked) < SETTLED
             spreads = between(before, asked, 1.0 if rounds < FREE_ROUNDS else DAMPED_SHARE)
@@ -131,7 +131,7 @@ def _travel(
         rounds += 1
         if settled and all(member.at_rest for member in members):
             break
-    return hierarchy, rounds, settled
+    return hierarchy, rounds, trouble or ("" if settled else UNSETTLED)
 
 
 def _move(members: Sequence[Member], hierarchy: Hierarchy) -> None:

@@ -1,5 +1,7 @@
 """Spreads of a hierarchy by the largest marginal likelihood, kept off zero by a weak prior."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
@@ -22,9 +24,21 @@ SEEN = 1e-8
 """An unknown with less of the largest information in the cohort than this counts as not read."""
 
 
+STEEP = 1e-2
+"""Slope of the log density, by the logarithm of a spread, that speaks against a mode."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Spreads, and why they are not the mode that was asked for; empty where they are."""
+
+    spreads: Spreads
+    trouble: str
+
+
 def estimated(
     readings: LinearReadings, dof: Indices, scatter: float | None, start: Spreads | None = None
-) -> Spreads:
+) -> Estimate:
     """Spreads at the mode of marginal likelihood and prior; what cannot be told apart is dropped.
 
     Levels are told from the rest by two specimens, specimens by two levels. With less than that
@@ -54,7 +68,11 @@ def estimated(
     at = np.clip(np.log(np.where(sizes > 0.0, sizes, START)), *np.transpose(bounds))
     found = minimize(objective, at, jac=True, method="L-BFGS-B", bounds=bounds,
                      options={"ftol": 1e-12, "gtol": 1e-5, "maxiter": 500})  # fmt: skip
-    return _unpacked(found.x, told, scatter)
+    uphill = np.clip(found.x - found.jac, *np.transpose(bounds)) - found.x
+    # a line search that rounding ends is no trouble at the top
+    lost = not found.success and bool(np.abs(uphill).max() > STEEP)
+    trouble = f"the search for the most likely spreads ended early ({found.message})"
+    return Estimate(_unpacked(found.x, told, scatter), trouble if lost else "")
 
 
 def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from spinepipe.tables.schema import Column, Table
 
 NO_FIT = "no stiffness was found"
 LITERATURE = "taken from the literature or from other specimens, not fitted"
+CORRELATED = "readings zeroed at step 0 in the published cost, which takes them for independent"
 
 _STIFFNESS_UNIT = Column("unit", "text", "unit of the stiffness", allowed=("N/m", "N m/rad"))
 _MOTION_UNIT = Column("unit", "text", "unit of the motion", allowed=("mm", "deg"))
@@ -41,13 +42,15 @@ STIFFNESS = Table(
             "standard_error",
             "standard error of the stiffness, to first order; of a prediction for a new specimen "
             "its standard deviation",
-            "not fitted, at a bound, or not constrained by the data",
+            "not fitted, at a bound, not constrained by the data, or expected from one specimen",
         ),
-        _stiffness("low", "lower end of the 95 % interval (normal in the logarithm)",
+        _stiffness("low", "lower end of the 95 % interval, of the logarithm: Student's t for fits "
+                   "of one specimen and for new specimens, normal for specimens of a pooled fit",
                    "no standard error"),
         _stiffness("high", "upper end of the 95 % interval", "no standard error"),
         Column("identifiable", "flag",
-               "whether the data constrain this stiffness; where false do not believe it",
+               "whether the data constrain this stiffness; where false do not believe it. Of a "
+               "pooled fit: whether its own readings do, more than the cohort",
                null=LITERATURE),
         Column("at_bound", "text", "whether the fit ended at a bound",
                allowed=("no", "lower", "upper")),
@@ -58,7 +61,7 @@ STIFFNESS = Table(
 
 
 def _criterion(name: str, meaning: str) -> Column:
-    return Column(name, "number", meaning, null=f"{NO_FIT}, or too few readings")
+    return Column(name, "number", meaning, null=f"{NO_FIT}, too few readings, or {CORRELATED}")
 
 
 FITS = Table(
@@ -78,7 +81,8 @@ FITS = Table(
                "sum of squared errors in SDs of one reading, or in deg2 for the published cost",
                null=NO_FIT, low=0.0),
         Column("scatter", "number",
-               "root of cost over readings less unknowns: 1 where errors are as large as declared",
+               "root of cost over readings less unknowns inside their bounds (effective ones of a "
+               "pooled fit): 1 where errors are as large as declared",
                null=f"{NO_FIT}, or no more readings than unknowns", low=0.0),
         _criterion("log_likelihood", "logarithm of the likelihood, scatter estimated"),
         _criterion("aicc", "Akaike's criterion, corrected for few readings; less is better"),
@@ -148,7 +152,8 @@ POOLING = Table(
         Column("scatter", "number", "scatter of readings, see fits", null=NO_FIT, low=0.0),
         Column("effective_unknowns", "number", "unknowns that the data decide about, all "
                "coordinates and specimens", null=NO_FIT, low=0.0),
-        Column("log_likelihood", "number", "logarithm of the marginal likelihood", null=NO_FIT),
+        Column("log_likelihood", "number", "logarithm of the marginal likelihood",
+               null=f"{NO_FIT}, or {CORRELATED}"),
         Column("iterations", "integer", "iterations", low=0),
         status("fit"),
         MESSAGE,
@@ -169,9 +174,10 @@ SIGN_CHECKS = Table(
         Column("measured_over_expected", "number",
                "slope of the measured on the expected motion (published stiffness): 1 as "
                "expected, negative against the load", null="not measured, or no pose was found"),
-        Column("standard_error", "number", "standard error of the slope",
+        Column("standard_error", "number", "standard error of the slope, all cycles together",
                null="not measured, or too few readings", low=0.0),
-        Column("verdict", "text", "what it looks like",
+        Column("verdict", "text", "what it looks like; flipped: in all readings together, or in a "
+               "cycle that message names",
                allowed=("as_expected", "flipped", "undecided")),
         MESSAGE,
     ),

@@ -53,7 +53,8 @@ RANKING = Table(
                "fitted, left_out_specimen, left_out_case: root mean square error of all measured "
                "rotations of a specimen, mean over specimens; left_out_case: each load case by the "
                "fit to all others, else fits to all load cases; aicc, bic: sums over specimens, "
-               "fits to all load cases", allowed=CRITERIA),
+               "fits to all load cases, the spreads of a pooled fit counted once",
+               allowed=CRITERIA),
         REPRESENTATION,
         SOURCE,
         Column("rank", "integer", "1 is best", null="no result", low=1),
@@ -69,8 +70,8 @@ RANKING = Table(
                null="the best itself, no result, or fewer than two specimens", low=0.0),
         Column("p", "number",
                "Wilcoxon's signed rank test of the specimens' values against the best's, "
-               "uncorrected", null="the best itself, no result, or too few specimens", low=0.0,
-               high=1.0),
+               "uncorrected", null="the best itself, an information criterion, no result, or "
+               "too few specimens", low=0.0, high=1.0),
         Column("specimens", "integer", "specimens with a result in every representation, which "
                "alone are compared", low=0),
         MESSAGE,

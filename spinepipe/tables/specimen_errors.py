@@ -1,5 +1,7 @@
 """From the table ``errors``: one error, and one motion, per specimen."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 import pandas as pd
 
@@ -30,6 +32,25 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     by_specimen = known.groupby("specimen")["readings"]
     complete = by_specimen.size() == measured.reindex(squares.sum().index)
     return (squares.sum() / by_specimen.sum())[complete].map(np.sqrt)
+
+
+def measured_specimens(errors: pd.DataFrame) -> list[str]:
+    """Specimens with a measured rotation."""
+    return [str(name) for name in rotations(errors)["specimen"].unique()]
+
+
+def without_result(found: Mapping[str, pd.Series], specimens: Iterable[str]) -> str:
+    """Specimens that some candidates have no result of, and which, for a message.
+
+    Parameters
+    ----------
+    found : results by specimen of each candidate, without missing values.
+    """
+    named = (
+        (specimen, [name for name, values in found.items() if specimen not in values.dropna()])
+        for specimen in sorted(specimens)
+    )
+    return ", ".join(f"{one} ({', '.join(failed)})" for one, failed in named if failed)
 
 
 def largest_mean_motion(rows: pd.DataFrame, motion: str = "measured_peak") -> float | None:

@@ -8,11 +8,18 @@ import pandas as pd
 import pytest
 
 from spinepipe.jobs.cohort_stiffness.claims import Claim, above_zero
-from spinepipe.jobs.cohort_stiffness.error_findings import every_level, overprediction_percent
+from spinepipe.jobs.cohort_stiffness.error_findings import (
+    OWN_READINGS,
+    error_findings,
+    every_level,
+    overprediction_percent,
+)
 from spinepipe.jobs.cohort_stiffness.findings import finding_rows
 from spinepipe.jobs.cohort_stiffness.load_case_findings import (
+    adjusted_share,
     load_case_findings,
     loaded_ratios,
+    mean_excess,
     specific,
 )
 from spinepipe.jobs.cohort_stiffness.load_case_tests import nested_fits
@@ -24,7 +31,7 @@ from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.report.stage_errors import of_joint_fits, of_single_cases
 from spinepipe.statistics import mean_of
 from spinepipe.tables import FINDINGS, MAE, RANKING, STATISTICS, from_rows
-from spinepipe.tables.specimen_errors import specimen_rms
+from spinepipe.tables.specimen_errors import specimen_rms, without_result
 from spinepipe.units import ROTATIONS
 
 CLAIM = Claim("name", "It is so.", "a number", "deg")
@@ -187,7 +194,39 @@ def test_sums_are_ranked() -> None:
     # Differences 2 and 4, SD sqrt(2): the sum of two has SE 2.
     assert (worse["worse_than_best"], worse["p"]) == (6.0, None)
     assert worse["worse_standard_error"] == pytest.approx(2.0)
-    assert "2 of 2 pairs differ" in worse["message"]
+    assert "no p for information criteria" in worse["message"]
+
+
+def test_no_p_for_a_sum_however_clear_it_is() -> None:
+    found = {("a", "own"): series(*range(6)), ("b", "own"): series(*range(10, 16))}
+    assert [row["p"] for row in ranked(found, summed=True)] == [None, None]
+    assert ranked(found, summed=False)[1]["p"] == pytest.approx(2 / 64)
+
+
+def test_spreads_of_the_cohort_count_once_in_its_criteria() -> None:
+    """Two specimens of 50 readings; 5 of 6 spreads told: + 2 x 5, and + 5 ln 100."""
+    fits = pd.DataFrame(
+        fit("all", cost, 50) | {"specimen": specimen, "representation": name}
+        for name, costs in (("partially_pooled", (10.0, 20.0)), ("per_joint", (12.0, 22.0)))
+        for specimen, cost in zip("ab", costs, strict=True)
+    )
+    fits = pd.concat([fits, fits.assign(fitted_to="x"), fits.assign(fitted_to="y")])
+    pooling = pd.DataFrame(
+        {"fitted_to": label, "without": who, "coordinate": c, "between_levels": level,
+         "between_specimens": 0.2, "between_joints": 0.1}
+        for label in ("all", "x") for who in ("nobody", "a")
+        for c, level in (("extension", 0.1), ("right_bending", None))
+    )  # fmt: skip
+    errors = pd.DataFrame([seen("a", "L5S1", 1.0)])
+    table = pd.DataFrame(ranking_rows(errors, fits, pooling))
+    aicc = only(table, criterion="aicc", representation="partially_pooled")
+    bic = only(table, criterion="bic", representation="partially_pooled")
+    assert aicc["value"] == pytest.approx(40.0)
+    assert bic["value"] == pytest.approx(30.0 + 5 * 4.60517)
+    assert "5 spreads" in aicc["message"]
+    # The order turns: 30 against 34 without them. Differences 2 and 2, 3 more each.
+    assert (aicc["rank"], aicc["worse_than_best"]) == (2, pytest.approx(6.0))
+    assert only(table, criterion="aicc", representation="per_joint")["value"] == 34.0
 
 
 def test_only_specimens_with_all_results_are_compared() -> None:
@@ -198,7 +237,7 @@ def test_only_specimens_with_all_results_are_compared() -> None:
     }
     first, second, none = ranked(found, summed=False)
     assert (first["value"], first["specimens"]) == (1.5, 2)
-    assert "c" in first["message"]
+    assert "left out, without a result: c (b)" in first["message"]
     assert (second["value"], second["rank"]) == (3.0, 2)
     assert (none["value"], none["rank"], none["specimens"]) == (None, None, 0)
     assert none["message"]
@@ -235,7 +274,21 @@ def test_blocks_with_a_gap_are_left_out_and_counted() -> None:
     of = {"family": "between_specimens/per_specimen/fitted", "response": "loaded_error"}
     found = only(statistics_of(errors), test="Friedman", **of)
     assert (found["n"], found["statistic"]) == (2, pytest.approx(4.0))
-    assert "1 incomplete blocks left out" in found["message"]
+    assert "1 incomplete blocks of a coordinate left out" in found["message"]
+
+
+def test_coordinates_of_one_joint_are_one_block() -> None:
+    """Three coordinates that say the same are no three times as many blocks."""
+    errors = [
+        seen(specimen, joint, size * error, coordinate=c, loaded=c == "extension")
+        for joint, place in (("L4L5", (1.0, 2.0, 3.0)), ("L5S1", (2.0, 1.0, 3.0)))
+        for specimen, error in zip("abc", place, strict=True)
+        for size, c in zip((1.0, 50.0, -9.0), ROTATIONS, strict=True)
+    ]
+    of = {"family": "between_specimens/per_specimen/fitted", "response": "rotation_error"}
+    found = only(statistics_of(errors), test="Friedman", **of)
+    # Ranks 1 2 3 and 2 1 3: sums 3, 3 and 6, 12 / 24 x 54 - 24.
+    assert (found["n"], found["statistic"]) == (2, pytest.approx(3.0))
 
 
 def test_signed_ranks_within_a_specimen() -> None:
@@ -335,7 +388,7 @@ RATINGS = ((9, 2, 5, 8), (6, 1, 3, 2), (8, 4, 6, 8), (7, 1, 2, 6), (10, 5, 6, 9)
 
 
 def stiff(specimen: str, joint: str, log: float, **more: Any) -> Row:
-    row = {"specimen": specimen, "joint": joint, "coordinate": "extension", "source": "own"}
+    row: Row = {"specimen": specimen, "joint": joint, "coordinate": "extension", "source": "own"}
     row |= {"representation": "per_joint", "fitted_to": "all", "stiffness": np.exp(log)}
     row |= {"standard_error": 0.1 * np.exp(log), "identifiable": True, "at_bound": "no"}
     return row | more
@@ -378,10 +431,11 @@ def test_spreads_need_a_grid_with_something_left() -> None:
 
 @pytest.mark.parametrize(
     ("p", "effect", "holds"),
-    [(0.5, 0.01, "no"), (0.5, 0.3, "undecided"), (0.001, 0.01, "yes"), (0.0, 0.9, "yes")],
+    [(0.5, 0.09, "no"), (0.5, 0.11, "undecided"), (0.001, 0.01, "yes"), (0.0, 0.9, "yes")],
 )
 def test_f_tests_of_all_specimens_together(p: float, effect: float, holds: str) -> None:
-    rows = [{"p": p, "p_holm": p, "effect": effect, "message": ""}] * 3
+    test = {"p": p, "p_holm": p, "effect": effect, "statistic": 2.0, "message": ""}
+    rows = [test] * 3
     row = specific(CLAIM, pd.DataFrame(rows), 0.05)
     assert row["holds"] == holds
     assert row["value"] == (1.0 if p < 0.05 else 0.0)
@@ -392,9 +446,20 @@ def test_f_tests_of_all_specimens_together(p: float, effect: float, holds: str) 
         assert row["high"] == pytest.approx(1 - 0.025 ** (1 / 3))  # none of three
 
 
+def test_the_share_of_squares_is_adjusted_for_the_unknowns() -> None:
+    """30 of 10 - 1 degrees of freedom against 20 of 10 - 2: 1 - (20 / 8) / (30 / 9) = 1/4."""
+    rows = [fit("all", 30.0, 10), fit("x", 12.0, 5), fit("y", 8.0, 5)]
+    outcome = nested_fits(pd.DataFrame(rows))
+    row = {"effect": outcome.effect, "statistic": outcome.statistic}
+    assert adjusted_share(pd.DataFrame([row])) == pytest.approx(0.25)
+    gained_nothing = {"effect": 0.0, "statistic": 0.0}
+    assert adjusted_share(pd.DataFrame([row, gained_nothing])) == pytest.approx(0.125)
+
+
 def test_one_significant_specimen_leaves_load_cases_undecided() -> None:
     rows = [
-        {"p": p, "p_holm": min(1.0, 3 * p), "effect": 0.01, "message": ""} for p in (0.01, 1, 1)
+        {"p": p, "p_holm": min(1.0, 3 * p), "effect": 0.01, "statistic": 2.0, "message": ""}
+        for p in (0.01, 1, 1)
     ]
     row = specific(CLAIM, pd.DataFrame(rows), 0.05)
     # Fisher: x = -ln 0.01 = 4.605 of 6 degrees of freedom, 0.01 (1 + x + x^2 / 2).
@@ -423,10 +488,73 @@ def test_loaded_stiffness_against_that_of_the_other_load_cases() -> None:
     none = pd.DataFrame(columns=["family", "p", "message"])
     found = list(load_case_findings(pd.DataFrame(stiffness), errors, none, 0.05))
     row = found[-1]
-    # Weights 1 / 0.02 and 1 / 2: the mean of 0.6 and 1.6 is 0.6 + 1 / 101.
-    assert row["value"] == pytest.approx(np.exp(0.6 + 1 / 101))
+    # Weights of e^x: 1 / (0.02 e^2x) and 1 / (2 e^2x e^2), the second 1 / 738.9 of the first.
+    share = 1 / (1 + 100 * 7.389056)
+    ratios = [(1 - share) * r + share * 2.718282 * r for r in (1.648721, 1.822119, 2.013753)]
+    assert row["value"] == pytest.approx(sum(ratios) / 3)
     assert (row["finding"], row["holds"]) == ("loaded_stiffness_differs", "yes")
     assert [one["holds"] for one in found[:2]] == ["undecided", "undecided"]
+
+
+def test_noise_in_the_compliance_does_not_lean_to_one_side() -> None:
+    """Compliance 1.2 and 0.8 by other load cases, SD 0.2 each, and 1, known, by its own."""
+    rows = [{"specimen": "a", "ratio": np.log(value), "error": 0.2 / value} for value in (1.2, 0.8)]
+    # By logarithms 0.18 with weight 36 and -0.22 with weight 16 would make exp(0.06).
+    assert mean_excess(pd.DataFrame(rows)).to_dict() == pytest.approx({"a": 0.0})
+
+
+def missing_of(
+    better: tuple[float | None, ...], worse: tuple[float | None, ...]
+) -> tuple[Row, Row]:
+    """Level ratio against one stiffness, fitted to one load case, and against the literature."""
+    rows = [
+        seen(specimen, "L5S1", value, name, stage)
+        for name, stage, values in (
+            ("per_specimen", "fitted", better),
+            ("level_ratio", "fitted", worse),
+            ("literature", "literature", (4.0, 4.1, 4.2)),
+        )
+        for specimen, value in zip("abc", values, strict=True)
+    ]
+    table = pd.DataFrame(rows).astype({"rmse": float})
+    found = {row["finding"]: row for row in error_findings(table, 0.05)}
+    return found["wrong_level_ratio_worse_than_uniform"], found["optimised_beats_literature"]
+
+
+def test_a_side_that_fails_where_it_is_hard_does_not_win() -> None:
+    row, published = missing_of((1.0, 1.1, None), (2.0, 2.2, 2.3))
+    assert row["p"] < 0.05
+    assert row["holds"] == "undecided"
+    assert "left out, without a result: c (one stiffness per specimen)" in row["message"]
+    assert published["holds"] == "undecided"
+    row, published = missing_of((1.0, 1.1, 1.2), (2.0, 2.2, None))
+    assert row["holds"] == "yes"  # what fails is that said to be worse
+    assert "c (published ratio of levels, scaled)" in row["message"]
+    assert "without a result" not in published["message"]
+    row, _ = missing_of((3.0, 3.1, 3.2), (1.0, 1.2, None))
+    assert row["holds"] == "undecided"  # here it comes out better
+    row, _ = missing_of((3.0, 3.1, None), (1.0, 1.2, 1.1))
+    assert row["holds"] == "no"
+
+
+def test_one_load_case_leaves_none_out_and_is_no_failure() -> None:
+    found = {
+        row["finding"]: row
+        for row in error_findings(without_one_test()["errors"], significance=0.05)
+    }
+    assert "without a result" not in found["optimised_beats_literature_left_out_case"]["message"]
+
+
+def test_what_holds_by_construction_says_so() -> None:
+    row, published = missing_of((1.0, 1.1, 1.2), (2.0, 2.2, 2.3))
+    assert OWN_READINGS in published["message"]
+    assert OWN_READINGS not in row["message"]
+
+
+def test_specimens_without_a_result_are_named_with_what_failed() -> None:
+    found = {"x": series(1.0, 2.0), "y": series(1.0), "z": series(1.0, 2.0, 3.0)}
+    assert without_result(found, "abc") == "b (y), c (x, y)"
+    assert without_result(found, "a") == ""
 
 
 def test_too_much_motion_has_the_sign_of_the_motion() -> None:
@@ -598,7 +726,9 @@ def test_specimens_without_all_results_do_not_enter_the_ranking() -> None:
     ranking = pd.DataFrame(ranking_rows(frames["errors"], frames["fits"]))
     fitted = ranking[ranking["criterion"] == "fitted"]
     assert set(fitted["specimens"]) == {1}
-    assert fitted["message"].str.contains("a, b").all()
+    fits = "per_specimen, level_ratio, per_joint"
+    every = f"literature, literature_levels, {fits}"
+    assert fitted["message"].str.contains(f"a ({fits}), b ({every})", regex=False).all()
     assert set(ranking[ranking["criterion"] == "aicc"]["specimens"]) == {2}
 
 
@@ -660,7 +790,7 @@ def test_a_left_out_case_beside_one_read_in_translations_only() -> None:
     family = "between_specimens/per_joint/left_out_case"
     rows = found[(found["family"] == family) & (found["test"] == "Friedman")]
     assert set(rows["stratum"]) == {"flexion", "bend"}
-    assert (rows.loc[rows["response"] == "rotation_error", "n"] == 3 * len(JOINTS)).all()
+    assert (rows.loc[rows["response"] == "rotation_error", "n"] == len(JOINTS)).all()
 
 
 def test_of_two_load_cases_one_may_be_read_in_translations_only() -> None:
@@ -755,25 +885,39 @@ def test_a_test_that_drives_two_coordinates_has_two_rows_of_errors() -> None:
     assert peak["largest_motion_deg"].to_dict() == {"extension": 10.0, "right_bending": 20.0}
 
 
+SURE, UNSURE, BETTER = (2.0, 2.1, 2.2), (0.9, 1.1, 1.3), (0.5, 0.6, 0.7)
+"""Errors of three specimens against 1 deg: 1.1 +- 0.06, 0.1 +- 0.12, -0.4 +- 0.06 (SE)."""
+
+
 @pytest.mark.parametrize(
-    ("errors", "holds"),
-    [((2.0, 2.0), "yes"), ((2.0, 0.5), "no"), ((2.0, None), "undecided"), ((0.5, None), "no")],
+    ("second", "holds", "worse"),
+    [
+        (SURE, "yes", 2),
+        (BETTER, "no", 1),
+        (UNSURE, "undecided", 1),  # larger in the mean, but not surely
+        ((None, None, None), "undecided", 1),
+        ((2.0, 2.1, None), "yes", 2),  # what fails is that said to be worse
+        ((0.5, 0.6, None), "undecided", 1),
+    ],
 )
-def test_worse_at_every_level_needs_every_level(
-    errors: tuple[float, float | None], holds: str
+def test_worse_at_every_level_is_decided_level_by_level(
+    second: tuple[float | None, ...], holds: str, worse: int
 ) -> None:
     """One stiffness leaves 1 deg at both joints."""
     rows = [
-        seen(specimen, joint, value, name)
-        for specimen in "ab"
-        for name, values in (("per_specimen", (1.0, 1.0)), ("level_ratio", errors))
-        for joint, value in zip(("L4L5", "L5S1"), values, strict=True)
+        seen(specimen, joint, error, name)
+        for joint, errors in (("L4L5", SURE), ("L5S1", second))
+        for place, specimen in enumerate("abc")
+        for name, error in (("per_specimen", 1.0), ("level_ratio", errors[place]))
     ]
     table = pd.DataFrame(rows).astype({"rmse": float})
     ratio, uniform = (table[table["representation"] == n] for n in ("level_ratio", "per_specimen"))
-    row = every_level(ratio, uniform, table)
-    assert row["holds"] == holds
-    assert ("L5S1" in row["message"]) == (errors[1] != 2.0)
+    row = every_level(ratio, uniform, table, 0.05)
+    assert (row["holds"], row["value"]) == (holds, worse)
+    assert ("L5S1" in row["message"]) == (worse == 1)
+    assert ("c (published" in row["message"]) == (second[2] is None)
+    ratio = ratio.assign(rmse=None)
+    assert every_level(ratio, uniform, table, 0.05)["value"] is None
 
 
 def test_interval_of_a_mean_is_students() -> None:

@@ -29,6 +29,7 @@ from spinepipe import studies
 from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.cohort_stiffness import findings, literature, mae, pool, ranking, statistics
 from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, CohortLayout
+from spinepipe.jobs.cohort_stiffness.load_case_tests import load_case_specific
 from spinepipe.jobs.cohort_stiffness.predict import predicted
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
@@ -164,6 +165,15 @@ def test_a_level_without_readings_is_pooled_from_the_others(tmp_path: Path) -> N
     np.testing.assert_allclose(by_joint(own).loc["L4L5", "extension"], A[1, 0], rtol=0.2)
 
 
+def test_what_only_the_cohort_tells_is_not_identifiable(tmp_path: Path) -> None:
+    """Its standard error is small enough; but it is that of anybody's joint."""
+    found = without_a_test(tmp_path).pool()["stiffness"]
+    assert (found["standard_error"] < found["stiffness"]).all()
+    unread = (found["specimen"] == "a") & (found["coordinate"] == "extension")
+    assert (~found["identifiable"].astype(bool)).tolist() == unread.tolist()
+    assert found["message"].str.contains("readings do not decide").tolist() == unread.tolist()
+
+
 @pytest.mark.parametrize("cycles", ["after_first", "quietest", "all"])
 def test_one_cycle_is_used_whatever_is_asked(cycles: str, tmp_path: Path) -> None:
     project = Chains(TRUTH, study=f"cycles: {cycles}\n").write(tmp_path)
@@ -267,6 +277,61 @@ def test_one_reading_tells_no_sign(tmp_path: Path) -> None:
     assert set(found["verdict"]) == {"undecided"}
     assert set(found["message"]) == {"one reading does not tell how sure it is"}
     assert found["standard_error"].isna().all()
+
+
+def flexion_of_l5s1(residual: float, root: Path) -> pd.Series:
+    """Measured extension -1 times the expected (0, 1, 2), plus (0, 2, -1) times ``residual``."""
+    chains = Chains({"a": A}, ["flexion"], steps=3)
+    expected = -np.rad2deg(np.arange(3) / 51.0)
+    measured = -expected + residual * np.rad2deg(np.array([0.0, 2.0, -1.0]) / 51.0)
+    chains.motion.loc[chains.motion["joint"] == "L5S1", "extension_deg"] = measured
+    return chains.write(root).literature("a")["sign_checks"].set_index("joint").loc["L5S1"]
+
+
+@pytest.mark.parametrize(("errors", "verdict"), [(5.0, "undecided"), (25.0, "flipped")])
+def test_few_readings_need_more_than_three_standard_errors(
+    errors: float, verdict: str, tmp_path: Path
+) -> None:
+    """Of two degrees of freedom, 0.135 % lie beyond 19.2 (tables of Student's t)."""
+    row = flexion_of_l5s1(np.sqrt(2.0) / errors, tmp_path)
+    assert row["measured_over_expected"] / row["standard_error"] == pytest.approx(-errors, rel=1e-3)
+    assert row["verdict"] == verdict
+
+
+def flipped(chains: Chains, **where: object) -> Chains:
+    """Extension with the other sign where all of these columns have these values."""
+    here = pd.Series(True, index=chains.motion.index)
+    for column, value in where.items():
+        here &= chains.motion[column] == value
+    chains.motion.loc[here, "extension_deg"] *= -1.0
+    return chains
+
+
+def test_a_sign_flipped_in_one_cycle_is_not_averaged_away(tmp_path: Path) -> None:
+    chains = Chains({"a": A}, ["flexion"], cycles=3, noise_deg=0.01)
+    chains = flipped(chains, cycle=3, joint="L4L5")
+    rows = chains.write(tmp_path).literature("a")["sign_checks"].set_index("joint")
+    assert rows.loc["L4L5", "measured_over_expected"] == pytest.approx(0.0, abs=0.05)
+    assert rows["verdict"].to_dict() == {
+        "L5S1": "as_expected",
+        "L4L5": "flipped",
+        "L3L4": "as_expected",
+    }
+    assert "moves against the load in cycle 3: " in rows.loc["L4L5", "message"]
+
+
+def test_a_whole_test_that_is_flipped_may_be_its_moment(tmp_path: Path) -> None:
+    chains = flipped(Chains({"a": A}, noise_deg=0.01), test="flexion")
+    rows = chains.write(tmp_path).literature("a")["sign_checks"]
+    against = rows["verdict"] == "flipped"
+    assert set(rows.loc[against, "test"]) == {"flexion"}
+    assert against.sum() == 3
+    assert rows.loc[against, "message"].str.contains("in all readings together").all()
+    assert rows["message"].str.contains("loads.csv").tolist() == against.tolist()
+    one = flipped(Chains({"a": A}, noise_deg=0.01), test="flexion", joint="L4L5")
+    alone = one.write(tmp_path / "one").literature("a")["sign_checks"]
+    assert (alone["verdict"] == "flipped").sum() == 1
+    assert not alone["message"].str.contains("loads.csv").any()
 
 
 # --- small cohorts ------------------------------------------------------------------------------
@@ -515,6 +580,41 @@ def test_a_cohort_without_measurement_sd_is_fitted_at_the_published_cost(tmp_pat
     np.testing.assert_allclose(by_joint(found)[list(ROTATIONS)], A, rtol=1e-6)
 
 
+SHARED = "readings zeroed at step 0 share its error"
+PUBLISHED = "cost: published\n"
+LIKELIHOOD = ["log_likelihood", "aicc", "bic"]
+
+
+def test_correlated_readings_at_the_published_cost_have_no_likelihood(tmp_path: Path) -> None:
+    project = Chains(TRUTH, noise_deg=0.02, zeroed=True, study=PUBLISHED).write(tmp_path)
+    labels = (*TESTS, "all")
+    by = {"specimen": "a", "representation": "per_specimen"}
+    fits = pd.concat(project.fit("a", "per_specimen", label)["fits"].assign(fitted_to=label, **by)
+                     for label in labels)  # fmt: skip
+    pooled = project.pool()
+    for rows in (fits, pooled["fits"]):
+        assert rows[LIKELIHOOD].isna().all(axis=None)
+        assert rows["scatter"].notna().all()
+        assert rows["message"].str.contains(SHARED).all()
+    assert pooled["pooling"]["log_likelihood"].isna().all()
+    assert pooled["pooling"]["message"].str.contains(SHARED).all()
+    (tested,) = load_case_specific(fits)
+    assert tested.outcome.p is None
+    assert SHARED in tested.outcome.message
+    no_nan(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("zeroed", "study"), [(False, PUBLISHED), (True, f"{PUBLISHED}steps: peak\n"), (True, "")]
+)
+def test_independent_readings_have_a_likelihood(zeroed: bool, study: str, tmp_path: Path) -> None:
+    """Not zeroed, one reading of each cycle, or a cost that allows for what they share."""
+    project = Chains(TRUTH, noise_deg=0.02, zeroed=zeroed, study=study).write(tmp_path)
+    found = project.fit("a", "per_specimen")["fits"]
+    assert found[LIKELIHOOD].notna().all(axis=None)
+    assert found["message"].item() == ""
+
+
 def test_readings_under_no_load_are_fitted_to_nothing(tmp_path: Path) -> None:
     chains = Chains(TRUTH, ["flexion"])
     chains.loads["mz_nm"] = 0.0
@@ -676,9 +776,19 @@ def test_a_pooled_stiffness_at_a_bound_is_not_known(tmp_path: Path) -> None:
 
 
 def test_what_is_expected_of_a_newcomer_was_not_fitted(tmp_path: Path) -> None:
+    """Two others leave one degree of freedom: Student's t is 12.706 at 97.5 % (tables)."""
     rows = Chains(TRUTH, noise_deg=0.02).write(tmp_path).pool(without="a")["stiffness"]
     assert rows["identifiable"].isna().all()
     assert rows["standard_error"].notna().all()
+    reach = np.log(rows["high"] / rows["stiffness"]) / (rows["standard_error"] / rows["stiffness"])
+    np.testing.assert_allclose(reach, 12.706, rtol=1e-4)
+
+
+def test_one_other_specimen_gives_a_newcomer_no_interval(tmp_path: Path) -> None:
+    project = Chains({"a": A, "b": 0.8 * A}, noise_deg=0.02).write(tmp_path)
+    rows = project.pool(without="a")["stiffness"]
+    assert rows["stiffness"].notna().all()
+    assert rows[["low", "high"]].isna().all(axis=None)
 
 
 def test_cycles_that_differ_in_their_main_moment(tmp_path: Path) -> None:

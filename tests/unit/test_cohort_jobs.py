@@ -117,6 +117,15 @@ def test_too_few_readings_have_no_criteria(readings: int, known: int) -> None:
     assert sum(value is not None for value in criteria(2.0, readings, 1.0).values()) == known
 
 
+def test_an_unknown_at_a_bound_leaves_its_degree_of_freedom_to_the_scatter(tmp_path: Path) -> None:
+    """Stiffness may only rise by a thousandth, and would by far: nothing is fitted."""
+    study = "free: [extension]\nbound_factor: 1.001\n"
+    chains = Chains({"a": 2.0 * A}, ["flexion"], study=study, noise_deg=0.1)
+    (row,) = chains.write(tmp_path).fit("a", "per_specimen")["fits"].to_dict("records")
+    assert (row["readings"], row["unknowns"], row["status"]) == (12, 1, "converged_at_bound")
+    assert row["scatter"] == pytest.approx(np.sqrt(row["cost"] / 12))
+
+
 def test_an_interval_without_end_is_none() -> None:
     """Hardly a trace in the data: the upper end would run over all numbers."""
     assert interval(50.0, 1e4, 2.0) == {

@@ -72,9 +72,10 @@ def test_a_flipped_sign_is_told_before_all_else() -> None:
     assert told(Size())[0] == "18 of 18 measured joint motions go with the load."
     place = (signs["specimen"] == "b") & (signs["joint"] == "L3L4") & (signs["test"] == "flexion")
     signs.loc[place, ["measured_over_expected", "verdict"]] = [-0.93, "flipped"]
+    signs.loc[place, "message"] = "moves against the load in cycle 2"
     first, *others = told(Size(), sign_checks=signs)
     assert first.startswith("Look at this first: in 1 place the measured motion goes against")
-    assert "b L3L4 in flexion (flexion–extension, −0.93 times the expected motion)" in first
+    assert "b L3L4 in flexion (flexion–extension: moves against the load in cycle 2)" in first
     assert not any("go with the load" in sentence for sentence in others)
     signs.loc[signs["specimen"] == "a", "verdict"] = "undecided"
     assert "11 of 18 measured joint motions go with the load; 6 cannot be told." in told(

@@ -1,6 +1,7 @@
 """Partial pooling: statistics against other people's, mechanics against a plain optimiser."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,10 +9,20 @@ import pytest
 from example_effects import NOWHERE, JointCentreOffset, loaded, scoped, spine
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
+from scipy.stats import t as student_t
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Pooled, Problem, fit, pool, pooling
+from spinepipe.calibrate import (
+    Evaluator,
+    MeasuredCase,
+    Pooled,
+    Problem,
+    fit,
+    pool,
+    pooling,
+    spreads,
+)
 from spinepipe.calibrate.hierarchy import Hierarchy, LinearReadings, Spreads, condensed
 from spinepipe.calibrate.spreads import estimated, tellable
 from spinepipe.effects import Wrench
@@ -170,7 +181,7 @@ def test_estimates_are_the_mode_of_likelihood_and_prior() -> None:
     x = np.column_stack([drawn(rng, 4, 3, one_dof(0.4, 0.5, 0.3), m) for m in (0.3, -0.2)])
     designs = [3.0 * rng.normal(size=(n, 6)) for n in (20, 9, 5, 30)]
     targets = [d @ row + 0.2 * rng.normal(size=len(d)) for d, row in zip(designs, x, strict=True)]
-    best = estimated(condensed(designs, targets, 6), TWO_DOF, None)
+    best = estimated(condensed(designs, targets, 6), TWO_DOF, None).spreads
 
     def height(spreads: Spreads) -> float:
         """With Gamma(2, 2) on each spread: log spread - 2 spread."""
@@ -193,7 +204,7 @@ def test_what_cannot_be_told_apart_is_dropped(shape: tuple[int, int], told: list
     table = drawn(np.random.default_rng(6), *shape, one_dof(0.3, 0.3, 0.3), 0.2)
     readings, dof = known_exactly(table), np.zeros(shape[1], dtype=int)
     assert tellable(readings, dof)[:, 0].tolist() == told
-    found = estimated(readings, dof, 1.0)
+    found = estimated(readings, dof, 1.0).spreads
     assert [found.level[0] > 0, found.specimen[0] > 0, found.rest[0] > 0] == told
     assert found.rest[0] < 2.0
 
@@ -213,7 +224,7 @@ def test_true_spreads_come_back_and_newcomers_are_where_expected() -> None:
         designs = [rng.normal(size=(25, 10)) for _ in cohort]
         targets = [d @ x + 0.1 * rng.normal(size=25) for d, x in zip(designs, cohort, strict=True)]
         readings = condensed(designs, targets, 10)
-        found = estimated(readings, dof, None)
+        found = estimated(readings, dof, None).spreads
         variances.append([found.level[0], found.specimen[0], found.rest[0], found.scatter])
         expected = Hierarchy(readings, dof, found).posterior()
         away = newcomer - expected.common
@@ -222,6 +233,29 @@ def test_true_spreads_come_back_and_newcomers_are_where_expected() -> None:
     error = variances.std(axis=0, ddof=1) / np.sqrt(60)
     assert np.all(np.abs(variances.mean(axis=0) - [0.25, 0.25, 0.25, 0.01]) < 3.0 * error)
     assert abs(np.mean(off) - 1.0) < 3.0 * np.sqrt(2 / 600)
+
+
+def newcomers(seeds: int, n: int, j: int) -> Array:
+    """How many SDs a new specimen of j joints is off what n others lead one to expect."""
+    off = []
+    for seed in range(seeds):
+        rng, dof = np.random.default_rng(seed), np.zeros(j, dtype=int)
+        table = drawn(rng, n + 1, j, one_dof(0.1, 0.5, 0.15), 0.0)
+        readings = known_exactly(table[:n])
+        expected = Hierarchy(readings, dof, estimated(readings, dof, 1.0).spreads).posterior()
+        off.append((table[n] - expected.common) / np.sqrt(np.diag(expected.newcomer_covariance)))
+    return np.abs(off)
+
+
+def test_a_newcomer_to_five_needs_students_t() -> None:
+    """Normal intervals are too short, at 95 %, by more than chance; those of t are not."""
+    off = newcomers(120, 5, 6)
+    normal, student = (
+        np.mean(off < reach, axis=1) for reach in (norm.ppf(0.975), student_t(4).ppf(0.975))
+    )
+    error = normal.std(ddof=1) / np.sqrt(len(off))
+    assert normal.mean() < 0.95 - error
+    assert student.mean() > 0.95
 
 
 TRUTHS = np.random.default_rng(20).normal(0.1, 0.3, (3, 6))
@@ -448,11 +482,25 @@ def test_spreads_that_do_not_settle_are_said_to_and_the_worst_specimen_is_named(
     assert all(s.message.startswith("still moving") for s in found.specimens)
 
 
+def test_a_search_for_spreads_that_ends_early_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    def early(*known: Any, options: dict[str, Any], **given: Any) -> Any:
+        return minimize(*known, **given, options=options | {"maxiter": 1})
+
+    assert pool(cohort()).message == ""
+    monkeypatch.setattr(spreads, "minimize", early)
+    readings, dof = known_exactly(np.random.default_rng(3).normal(size=(4, 3))), np.zeros(3, int)
+    assert "LIMIT" in estimated(readings, dof, 1.0).trouble
+    monkeypatch.setattr(pooling, "MOST_ROUNDS", 1)
+    found = pool(cohort())
+    assert found.status is Status.NOT_CONVERGED
+    assert "the search for the most likely spreads ended early" in found.message
+
+
 def test_a_spread_that_could_not_be_told_before_starts_anew() -> None:
     table = drawn(np.random.default_rng(6), 5, 5, one_dof(0.3, 0.3, 0.3), 0.2)
     readings, dof = known_exactly(table), np.zeros(5, dtype=int)
-    found = estimated(readings, dof, 1.0, one_dof(0.0, 0.0, 0.4))
-    expected = estimated(readings, dof, 1.0)
+    found = estimated(readings, dof, 1.0, one_dof(0.0, 0.0, 0.4)).spreads
+    expected = estimated(readings, dof, 1.0).spreads
     for name in ("level", "specimen", "rest"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-3)
 

@@ -17,7 +17,8 @@ from spinepipe.statistics import Outcome, friedman, kruskal_wallis
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)
 GROUPS = {"specimens": "specimen", "levels": "joint"}
-BLOCK = ["specimen", "joint", "coordinate"]
+BLOCKS = {"specimen": "joint", "joint": "specimen"}
+"""In what each factor is seen again and again."""
 
 AS_PUBLISHED = "takes values of the same specimen and joint as independent, as published"
 
@@ -47,11 +48,16 @@ def _both(rows: pd.DataFrame, factor: str) -> Iterator[Outcome]:
     errors = known["peak_error"].astype(float).abs()
     groups = [part.to_numpy(float) for _, part in errors.groupby(known[factor], sort=False)]
     yield _noted(kruskal_wallis(groups), AS_PUBLISHED)
-    block = [name for name in BLOCK if name != factor]
-    grid = known.assign(error=errors).pivot(index=block, columns=factor, values="error")
+    block = BLOCKS[factor]
+    grid = known.assign(error=errors).pivot(
+        index=[block, "coordinate"], columns=factor, values="error"
+    )
     complete = grid.dropna()
     lost = len(grid) - len(complete)
-    yield _noted(friedman(complete.to_numpy(float)), f"{lost} incomplete blocks left out", lost > 0)
+    # The coordinates of one block hang together: they count as one, by the mean of their ranks.
+    ranks = complete.rank(axis=1).groupby(block, sort=False).mean()
+    note = f"{lost} incomplete blocks of a coordinate left out"
+    yield _noted(friedman(ranks.to_numpy(float)), note, lost > 0)
 
 
 def _noted(outcome: Outcome, note: str, when: bool = True) -> Outcome:

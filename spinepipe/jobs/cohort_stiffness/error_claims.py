@@ -33,12 +33,19 @@ class Errors:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The claim that one error is larger than another."""
+    """The claim that one error is larger than another.
+
+    Attributes
+    ----------
+    own_readings : whether only the smaller one is of stiffness fitted to the very readings by
+        which both are judged.
+    """
 
     finding: str
     statement: str
     larger: Errors
     smaller: Errors
+    own_readings: bool = False
 
     @property
     def claim(self) -> Claim:
@@ -70,7 +77,7 @@ PUBLISHED_FINDINGS = (
         "optimised_beats_literature",
         "One stiffness per specimen, fitted to a load case, describes that load case better than "
         "the published stiffness.",
-        *(PUBLISHED, UNIFORM),
+        *(PUBLISHED, UNIFORM, True),
     ),
     Comparison(
         "optimised_beats_literature_left_out_case",
@@ -87,13 +94,13 @@ PUBLISHED_FINDINGS = (
     Comparison(
         "optimised_beats_cross_validation",
         "A specimen's own stiffness describes it better than the median of the others.",
-        *(UNIFORM_OF_OTHERS, UNIFORM),
+        *(UNIFORM_OF_OTHERS, UNIFORM, True),
     ),
     Comparison(
         "optimised_level_ratio_beats_literature",
         "Scaling the published stiffness of the levels to a specimen describes it better than "
         "leaving it as published.",
-        *(PUBLISHED_LEVELS, RATIO),
+        *(PUBLISHED_LEVELS, RATIO, True),
     ),
     Comparison(
         "wrong_level_ratio_worse_than_uniform",

@@ -1,21 +1,34 @@
 """Findings about errors: which stiffness predicts better, and where errors are large."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.jobs.cohort_stiffness.claims import Claim, Row, above_zero, joined, listed, words
-from spinepipe.jobs.cohort_stiffness.error_claims import COMPARISONS, RATIO, UNIFORM, Errors
-from spinepipe.report.stage_errors import of_joint_fits, of_single_cases
+from spinepipe.jobs.cohort_stiffness.error_claims import (
+    COMPARISONS,
+    RATIO,
+    UNIFORM,
+    Comparison,
+    Errors,
+)
+from spinepipe.report.stage_errors import LEFT_OUT_CASE, of_joint_fits, of_single_cases
 from spinepipe.statistics import wilcoxon_signed_rank
-from spinepipe.tables.specimen_errors import rotations, specimen_rms
+from spinepipe.tables.specimen_errors import (
+    measured_specimens,
+    rotations,
+    specimen_rms,
+    without_result,
+)
+
+OWN_READINGS = "expected by construction: fitted to the readings it is judged by"
 
 EVERY_LEVEL = Claim(
     "wrong_level_ratio_worse_at_every_level",
     "The published ratio of levels, scaled to a specimen, describes every joint worse than one "
     "stiffness for all joints.",
-    "joints with the larger mean error over specimens",
+    "joints with the larger error, mean over specimens, t test joint by joint",
     "joints",
 )
 LOADED = Claim(
@@ -32,14 +45,8 @@ def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
     """Rows of the table ``findings`` that follow from those of ``errors``."""
     seen = rotations(errors)
     for comparison in COMPARISONS:
-        larger, smaller = (_of(seen, one) for one in (comparison.larger, comparison.smaller))
-        pair = specimen_pairs(larger, smaller, seen)
-        if pair.empty:
-            yield comparison.claim.unknown(_missing(comparison.larger, larger, smaller))
-        else:
-            difference = pair["larger"] - pair["smaller"]
-            yield above_zero(comparison.claim, difference, significance, _note(pair))
-    yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen)
+        yield compared(comparison, seen, significance)
+    yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)
     yield loaded_direction(_of(seen, UNIFORM), seen, significance)
     yield from overpredictions(seen, significance)
 
@@ -50,15 +57,57 @@ def _of(errors: pd.DataFrame, wanted: Errors) -> pd.DataFrame:
     return chosen[chosen["representation"] == wanted.representation]
 
 
-def specimen_pairs(
+def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) -> Row:
+    """The row of a comparison; specimens that a side cannot predict are named."""
+    larger, smaller = (_of(errors, one) for one in (comparison.larger, comparison.smaller))
+    results = _results(larger, smaller, errors)
+    pair = pd.DataFrame(results).dropna()
+    if pair.empty:
+        return comparison.claim.unknown(_missing(larger, smaller))
+    asked = _asked(comparison, errors)
+    sides = (comparison.larger.words, comparison.smaller.words)
+    lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
+    note = joined(_note(pair), OWN_READINGS if comparison.own_readings else "", lost)
+    return _against(comparison.claim, results, asked, significance, note)
+
+
+def _results(
     larger: pd.DataFrame, smaller: pd.DataFrame, errors: pd.DataFrame
-) -> pd.DataFrame:
-    """Both errors of each specimen that has both."""
-    named = {"larger": specimen_rms(larger, errors), "smaller": specimen_rms(smaller, errors)}
-    return pd.DataFrame(named).dropna()
+) -> dict[str, pd.Series]:
+    """Error by specimen of both sides."""
+    return {"larger": specimen_rms(larger, errors), "smaller": specimen_rms(smaller, errors)}
 
 
-def _missing(first: Errors, larger: pd.DataFrame, smaller: pd.DataFrame) -> str:
+def _asked(comparison: Comparison, errors: pd.DataFrame) -> list[str]:
+    """Specimens of which both sides should have a result: one load case leaves none out."""
+    cases = errors.groupby("specimen")["test"].nunique()
+    held_out = LEFT_OUT_CASE in (comparison.larger.stage, comparison.smaller.stage)
+    return list(cases.index[cases >= (2 if held_out else 1)])
+
+
+def _lost(found: Mapping[str, pd.Series], asked: Iterable[str]) -> str:
+    """Specimens left out, for a message."""
+    lost = without_result(found, asked)
+    return f"left out, without a result: {lost}" if lost else ""
+
+
+def _against(
+    claim: Claim,
+    results: Mapping[str, pd.Series],
+    asked: Iterable[str],
+    significance: float,
+    note: str = "",
+) -> Row:
+    """Undecided where the side that comes out better has failed: hard specimens may be lost."""
+    pair = pd.DataFrame(results).dropna()
+    row = above_zero(claim, pair["larger"] - pair["smaller"], significance, note)
+    if row["holds"] == "undecided":
+        return row
+    better = results["smaller" if row["holds"] == "yes" else "larger"]
+    return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
+
+
+def _missing(larger: pd.DataFrame, smaller: pd.DataFrame) -> str:
     if larger.empty and smaller.empty:
         return "neither was computed in this study"
     if larger.empty or smaller.empty:
@@ -74,32 +123,38 @@ def _note(pair: pd.DataFrame) -> str:
     return joined(means, "" if tested.p is None else f"Wilcoxon p {tested.p:.2g}")
 
 
-def every_level(ratio: pd.DataFrame, uniform: pd.DataFrame, errors: pd.DataFrame) -> Row:
-    """Yes where the ratio of levels is worse at all joints, no where it is not at one."""
-    worse: list[str] = []
-    better: list[str] = []
-    unknown: list[str] = []
+def every_level(
+    ratio: pd.DataFrame, uniform: pd.DataFrame, errors: pd.DataFrame, significance: float
+) -> Row:
+    """Decided where it is at every joint: yes where the ratio of levels is worse at all."""
+    of: dict[str, list[str]] = {"yes": [], "no": [], "undecided": []}
+    values = []
     for joint in errors["joint"].unique():
-        parts = [table[table["joint"] == joint] for table in (ratio, uniform, errors)]
-        pair = specimen_pairs(*parts)
-        above = pair["larger"].mean() > pair["smaller"].mean()
-        (unknown if pair.empty else worse if above else better).append(str(joint))
-    if not worse + better:
-        return EVERY_LEVEL.unknown("no specimen has all results of both")
-    lost = f"nothing to compare at: {listed(unknown)}" if unknown else ""
-    message = f"of {len(worse + better)} joints; not worse at: {listed(better)}; no test"
-    holds = "no" if better else "undecided" if unknown else "yes"
-    return EVERY_LEVEL.row(holds, joined(message, lost), float(len(worse)))
+        here = [table[table["joint"] == joint] for table in (ratio, uniform, errors)]
+        results = _results(*here)
+        row = _against(EVERY_LEVEL, results, measured_specimens(here[2]), significance)
+        of[row["holds"]].append(str(joint))
+        values.append(row["value"])
+    if not any(value is not None for value in values):
+        return EVERY_LEVEL.unknown(_missing(ratio, uniform))
+    told = f"better at: {listed(of['no'])}; undecided at: {listed(of['undecided'])}"
+    sides = {RATIO.words: specimen_rms(ratio, errors)}
+    sides |= {UNIFORM.words: specimen_rms(uniform, errors)}
+    lost = _lost(sides, measured_specimens(errors))
+    message = joined(f"of {len(values)} joints; {told}", lost)
+    holds = "undecided" if of["undecided"] else "no" if of["no"] else "yes"
+    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])))
 
 
 def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:
     """Error in the loaded direction against that in the others."""
-    pair = [
-        specimen_rms(fitted[fitted["loaded"] == loaded], errors[errors["loaded"] == loaded])
-        for loaded in (True, False)
-    ]
-    difference = (pair[0] - pair[1]).dropna()
-    return above_zero(LOADED, difference, significance)
+    pair, read = {}, []
+    for name, loaded in (("loaded", True), ("others", False)):
+        here = errors[errors["loaded"] == loaded]
+        pair[name] = specimen_rms(fitted[fitted["loaded"] == loaded], here)
+        read.append(set(measured_specimens(here)))
+    difference = (pair["loaded"] - pair["others"]).dropna()
+    return above_zero(LOADED, difference, significance, _lost(pair, set.intersection(*read)))
 
 
 def overpredictions(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
@@ -113,7 +168,9 @@ def overpredictions(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
             "over joints as a share of the mean measured motion; mean over specimens, t interval",
             "percent",
         )
-        yield above_zero(claim, overprediction_percent(rows), significance)
+        excess = overprediction_percent(rows)
+        lost = _lost({"published stiffness": excess}, measured_specimens(rows))
+        yield above_zero(claim, excess, significance, lost)
 
 
 def overprediction_percent(rows: pd.DataFrame) -> pd.Series:

@@ -7,7 +7,7 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.cohort_stiffness.criteria import criteria
+from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
@@ -108,13 +108,15 @@ def _record(problem: Problem, found: Fit) -> Row:
     cost = found.cost if found.status.usable else None
     effective = None if cost is None else float(unknowns)
     several = f"{found.n_optima} optima: the answer depends on the start"
-    notes = [found.message, several if found.n_optima > 1 else ""]
+    alone = independent(problem)
+    shared = "" if alone or cost is None else SHARED_ERROR
+    notes = [found.message, several if found.n_optima > 1 else "", shared]
     return {
         "readings": readings,
         "unknowns": unknowns,
         "effective_unknowns": effective,
         "cost": cost,
-        **criteria(cost, readings, effective),
+        **criteria(cost, readings, effective, found.uncertainty.degrees_of_freedom, alone),
         "iterations": found.iterations,
         "evaluations": found.evaluations,
         "n_optima": found.n_optima,

@@ -15,7 +15,7 @@ OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 
 COHORT_ANALYSES: dict[str, tuple[str, ...]] = {
     "mae": ("errors",),
-    "ranking": ("errors", "fits"),
+    "ranking": ("errors", "fits", "pooling"),
     "statistics": ("errors", "fits"),
     "findings": ("stiffness", "errors", "statistics", "pooling"),
     "against_gould_2024b": ("stiffness", "fits", "errors", "mae", "statistics"),

@@ -12,23 +12,26 @@ from spinepipe.statistics import mean_of
 from spinepipe.studies.fitted_to import label_of_others
 
 LITTLE = 0.05
-"""Share of the squared error below which what is not significant is called absent."""
+"""Adjusted share of the squared error below which what is not significant is called absent."""
 
 MARGIN = 1.1
 """A ratio whose whole interval lies within this factor of 1 is called no difference."""
 
-SHARE = "share of specimens with a significant F test (Holm) of separate against joint fits, exact"
+SHARE = (
+    "share of specimens with a significant F test (Holm) of separate against joint fits, exact "
+    "binomial interval; not this share decides but p, combined over specimens (Fisher)"
+)
 SPECIFIC = {
     "per_joint": Claim(
         "stiffness_is_load_case_specific",
         "With a stiffness for each joint, load cases ask for different stiffness.",
-        f"{SHARE} binomial interval; p combined over specimens (Fisher)",
+        SHARE,
         "",
     ),
     "per_specimen": Claim(
         "uniform_stiffness_is_load_case_specific",
         "With one stiffness for all joints, load cases ask for different stiffness.",
-        f"{SHARE} binomial interval; p combined over specimens (Fisher)",
+        SHARE,
         "",
     ),
 }
@@ -37,8 +40,8 @@ RATIO = Claim(
     "loaded_stiffness_differs",
     "A joint is stiffer, or softer, against the main moment than the other load cases tell.",
     "stiffness against the loaded coordinate, fitted to that load case, over that fitted to the "
-    "others; each joint its own; geometric mean over joints and load cases, weighted by precision, "
-    "then over specimens, t interval",
+    "others; each joint its own; mean over joints and load cases, weighted by precision, then over "
+    "specimens, t interval",
     "",
 )
 
@@ -67,15 +70,29 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
     tiny = float(np.finfo(float).tiny)  # Fisher takes the logarithm
     p = float(stats.combine_pvalues(known["p"].clip(lower=tiny).to_list()).pvalue)  # Fisher's
     ends = stats.binomtest(below, n).proportion_ci(0.95)
-    explained = float(known["effect"].mean())
+    explained = adjusted_share(known)
     absent = below == 0 and explained < LITTLE
     holds = "yes" if p < significance else "no" if absent else "undecided"
     found = (
-        f"{below} of {n} specimens; separate fits explain {100 * explained:.2g} % of the squares"
+        f"{below} of {n} specimens; p combined over specimens decides; separate fits explain "
+        f"{100 * explained:.2g} % of the squares, adjusted for their unknowns"
     )
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
     interval = float(ends.low), float(ends.high)
     return claim.row(holds, joined(found, lost, note), below / n, interval, p)
+
+
+def adjusted_share(tests: pd.DataFrame) -> float:
+    """Mean over specimens of adjusted partial R2, 1 - (1 - R2) df_small / df_large.
+
+    That is R2 (1 - 1 / F), of which chance alone makes 0; R2 is 0 where F is.
+
+    Parameters
+    ----------
+    tests : nested F tests, with R2 in ``effect`` and F in ``statistic``.
+    """
+    r2, f = tests["effect"].astype(float), tests["statistic"].astype(float)
+    return float((r2 * (1.0 - 1.0 / f.where(f > 0.0, 1.0))).mean())
 
 
 def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataFrame:
@@ -106,9 +123,7 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     """Yes where the mean differs from 1, no where all of the interval is near 1."""
     if ratios.empty:
         return RATIO.unknown("no joint has both stiffnesses, constrained by the data")
-    weight = ratios["error"] ** -2.0
-    sums = (ratios["ratio"] * weight).groupby(ratios["specimen"]).sum()
-    mean = mean_of((sums / weight.groupby(ratios["specimen"]).sum()).to_numpy(float))
+    mean = mean_of(mean_excess(ratios).to_numpy(float))
     assert mean.value is not None
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
     many = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
@@ -116,7 +131,21 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     holds = "undecided"
     if mean.p is not None and mean.p < significance:
         holds = "yes"
-    elif ends is not None and -np.log(MARGIN) < ends[0] and ends[1] < np.log(MARGIN):
+    elif ends is not None and 1.0 + ends[0] > 1.0 / MARGIN and 1.0 + ends[1] < MARGIN:
         holds = "no"
-    interval = None if ends is None else (float(np.exp(ends[0])), float(np.exp(ends[1])))
-    return RATIO.row(holds, joined(told(mean), many), float(np.exp(mean.value)), interval, mean.p)
+    interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
+    return RATIO.row(holds, joined(told(mean), many), 1.0 + mean.value, interval, mean.p)
+
+
+def mean_excess(ratios: pd.DataFrame) -> pd.Series:
+    """Mean by specimen of how far the ratio is above 1, weighted by its own standard error.
+
+    The ratio of stiffness is the other load cases' compliance over the loaded one's. Compliance
+    that other load cases tell is the uncertain one and linear in the readings, so noise makes
+    neither the ratio nor its weight lean to one side. A logarithm does: its error, and so its
+    weight, hangs on the value itself.
+    """
+    ratio = np.exp(ratios["ratio"])
+    weight = (ratio * ratios["error"]) ** -2.0
+    sums = ((ratio - 1.0) * weight).groupby(ratios["specimen"]).sum()
+    return sums / weight.groupby(ratios["specimen"]).sum()

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR
 from spinepipe.jobs.tested_rows import Tested
 from spinepipe.statistics import Ended, Outcome, f_test_nested
 from spinepipe.statistics.nested import NESTED
@@ -22,7 +23,7 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
         ["representation", "specimen"], sort=False
     ):
         family = f"{FAMILY}/{representation}"
-        outcome = nested_fits(rows)
+        outcome = _without(SHARED_ERROR) if _correlated(rows) else nested_fits(rows)
         yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
 
 
@@ -43,6 +44,12 @@ def nested_fits(rows: pd.DataFrame) -> Outcome:
     free = readings - int(single["unknowns"].sum())
     costs = float(joint["cost"].sum()), float(single["cost"].sum())
     return f_test_nested(costs[0], readings - unknowns, costs[1], free)
+
+
+def _correlated(rows: pd.DataFrame) -> bool:
+    """Whether a fit says that its sum of squares is not one of independent errors."""
+    notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
+    return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
 
 
 def _without(message: str) -> Outcome:

@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.jobs.cohort_stiffness.criteria import criteria
+from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
@@ -21,6 +21,10 @@ from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]
 NOBODY_FITTED = "no specimen has motion to fit"
+DECIDED = 0.5
+"""Share of a newcomer's variance below which a specimen's own readings decide."""
+
+NOT_DECIDED = "the specimen's readings do not decide: value and interval are the cohort's"
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,8 @@ class PooledRows:
         values = self._values(specimen)
         none = np.zeros((len(self.cohort.joint_names), 6), dtype=int)
         if values is None:
-            return self._rows(np.full(none.shape, np.nan), none + np.nan, none, specimen)
-        k, error, bound = values
-        return self._rows(k, error, bound, specimen)
+            return self._rows(np.full(none.shape, np.nan), none + np.nan, none, none, specimen)
+        return self._rows(*values, specimen)
 
     def errors(self, specimen: str) -> list[Row]:
         """Rows of table ``errors``: all tests of a fitted specimen, those fitted of a newcomer."""
@@ -74,12 +77,15 @@ class PooledRows:
             return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
         usable = status.usable
         cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
+        alone = independent(self.problems[specimen])
+        if usable and not alone:
+            ended["message"] = _joined(message, SHARED_ERROR)
         return {
             "readings": own.n_readings,
             "unknowns": len(own.x),
             "effective_unknowns": effective,
             "cost": cost,
-            **criteria(cost, own.n_readings, effective),
+            **criteria(cost, own.n_readings, effective, independent=alone),
             "iterations": self.found.iterations,
             "evaluations": own.evaluations,
             "n_optima": int(usable),
@@ -102,7 +108,7 @@ class PooledRows:
         row: Row = {
             "coordinate": name,
             "unit": STIFFNESS_UNITS[name],
-            "specimens": sum(bool(one.poses) for one in found.specimens) if found else 0,
+            "specimens": self._specimens(),
             "iterations": 0,
             "status": Status.REFUSED.value,
             "message": NOBODY_FITTED,
@@ -111,6 +117,7 @@ class PooledRows:
         if found is None or spread is None:
             return row
         start = float(start_stiffness(self.study, self.cohort, POOLED)[0, place])
+        alone = all(independent(problem) for problem in self.problems.values())
         return row | {
             "centre": start * float(np.exp(spread.mean)),
             "between_levels": spread.level or None,  # zero: not told from the rest
@@ -118,10 +125,10 @@ class PooledRows:
             "between_joints": spread.rest,
             "scatter": found.scatter,
             "effective_unknowns": found.effective_parameters,
-            "log_likelihood": found.log_likelihood,
+            "log_likelihood": found.log_likelihood if alone else None,
             "iterations": found.iterations,
             "status": found.status.value,
-            "message": found.message,
+            "message": _joined(found.message, "" if alone else SHARED_ERROR),
         }
 
     def _own(self, specimen: str) -> PooledSpecimen | None:
@@ -143,10 +150,11 @@ class PooledRows:
             return pool[0], _joined(own.message, f"pooled fit: {pool[1] or pool[0].value}")
         return own.status, own.message
 
-    def _values(self, specimen: str) -> tuple[Array, Array, Indices] | None:
-        """Stiffness, error of its logarithm and bounds reached (J, 6); None without a fit.
+    def _values(self, specimen: str) -> tuple[Array, Array, Indices, Indices] | None:
+        """Stiffness, error of its logarithm, bounds reached and what readings decide, (J, 6).
 
-        A newcomer has one where the pool has ended: it can be expected to be like the others.
+        None without a fit. A newcomer has one where the pool has ended: it can be expected to be
+        like the others.
         """
         if self.found is None or not self._ended(specimen)[0].usable:
             return None
@@ -157,23 +165,35 @@ class PooledRows:
         k = start_stiffness(self.study, self.cohort, POOLED)
         error = np.full(k.shape, np.inf)
         bound = np.zeros(k.shape, dtype=int)
+        decided = np.zeros(k.shape, dtype=int)
+        expected = DECIDED * np.diagonal(self.found.newcomer_covariance)
         for index, unknown in enumerate(free):
             at = unknown.rows[0], unknown.column
             k[at] *= np.exp(x[index])
             bound[at] = 0 if own is None else own.at_bound[index]
+            decided[at] = covariance[index, index] < expected[index]
             if not bound[at]:  # the covariance is not told of bounds
                 error[at] = np.sqrt(covariance[index, index])
-        return k, error, bound
+        return k, error, bound, decided
 
-    def _rows(self, k: Array, error: Array, bound: Indices, specimen: str) -> list[Row]:
+    def _rows(
+        self, k: Array, error: Array, bound: Indices, decided: Indices, specimen: str
+    ) -> list[Row]:
         status, message = self._ended(specimen)
-        fitted = specimen in self.problems or specimen in self.refusals
-        known = (error < self.study.identifiable_below) if fitted else None
-        rows = stiffness_rows(
-            self.cohort.joint_names, self.study.free, k, error, np.inf, known, bound
-        )
-        ended = {"specimen": specimen, "status": status.value, "message": message}
-        return [{**row, **ended} for row in rows]
+        joints, fitted = self.cohort.joint_names, specimen in {*self.problems, *self.refusals}
+        known = (error < self.study.identifiable_below) & (decided > 0) if fitted else None
+        freedom = np.inf if fitted else self._specimens() - 1.0
+        rows = stiffness_rows(joints, self.study.free, k, error, freedom, known, bound)
+        for row in rows:
+            at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
+            of_cohort = fitted and np.isfinite(error[at]) and not decided[at]
+            note = _joined(message, NOT_DECIDED if of_cohort else "")
+            row |= {"specimen": specimen, "status": status.value, "message": note}
+        return rows
+
+    def _specimens(self) -> int:
+        """How many specimens the spreads were estimated from."""
+        return sum(bool(one.poses) for one in self.found.specimens) if self.found else 0
 
 
 def _joined(*notes: str) -> str:

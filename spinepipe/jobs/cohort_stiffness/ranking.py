@@ -1,12 +1,14 @@
 """Job: which representation is best, by errors and by information criteria."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.cohort_stiffness.claims import joined
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.provenance import provenance
 from spinepipe.report.stage_errors import (
@@ -17,14 +19,16 @@ from spinepipe.report.stage_errors import (
 )
 from spinepipe.statistics import wilcoxon_signed_rank
 from spinepipe.studies import CohortStiffness
-from spinepipe.studies.fitted_to import POOLED
+from spinepipe.studies.fitted_to import NOBODY, POOLED
 from spinepipe.tables import RANKING, from_rows, read_frames, write
 from spinepipe.tables.cohort_stiffness_analyses import CRITERIA
 from spinepipe.tables.cohort_stiffness_columns import REPRESENTATIONS
-from spinepipe.tables.specimen_errors import specimen_rms
+from spinepipe.tables.specimen_errors import specimen_rms, without_result
 
 INFORMATION = ("aicc", "bic")
 NOT_FITTED = ("literature", "literature_levels")
+SPREADS = ("between_levels", "between_specimens", "between_joints")
+NO_P = "no p for information criteria: pooled specimens are not independent"
 NO_RESULT = "no specimen has a result"
 NONE_COMPLETE = "no specimen has a result in every representation"
 
@@ -37,13 +41,15 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``ranking.parquet``."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     frames = read_frames(tables)
-    rows = ranking_rows(frames["errors"], frames["fits"])
+    rows = ranking_rows(frames["errors"], frames["fits"], frames.get("pooling"))
     origin = provenance("cohort_stiffness.ranking", settings, cohort)
     write(from_rows(RANKING, rows), output, origin)
 
 
-def ranking_rows(errors: pd.DataFrame, fits: pd.DataFrame) -> list[Row]:
-    """Rows of the table ``ranking`` from those of ``errors`` and ``fits``."""
+def ranking_rows(
+    errors: pd.DataFrame, fits: pd.DataFrame, pooling: pd.DataFrame | None = None
+) -> list[Row]:
+    """Rows of the table ``ranking`` from those of ``errors``, ``fits`` and ``pooling``."""
     present = {*errors["representation"], *fits["representation"]}
     names = [name for name in REPRESENTATIONS if name in present]
     specimens = {*errors["specimen"], *fits["specimen"]}
@@ -51,11 +57,38 @@ def ranking_rows(errors: pd.DataFrame, fits: pd.DataFrame) -> list[Row]:
     for criterion in CRITERIA:
         if criterion in INFORMATION:
             found = _information(fits, criterion, [n for n in names if n not in NOT_FITTED])
+            count = estimated_spreads(fits, pooling)
+            order = ranked(found, True, specimens, _penalty(fits, criterion, count))
+            order = [_conditional(row, count) for row in order]
         else:
-            found = _errors(errors, criterion, names)
-        order = ranked(found, criterion in INFORMATION, specimens)
+            order = ranked(_errors(errors, criterion, names), False, specimens)
         rows += [{"criterion": criterion, **row} for row in order]
     return rows
+
+
+def estimated_spreads(fits: pd.DataFrame, pooling: pd.DataFrame | None) -> int:
+    """How many spreads the pooled fit to all load cases and specimens has estimated."""
+    if pooling is None:
+        return 0
+    here = (pooling["fitted_to"] == joint_label_of(fits)) & (pooling["without"] == NOBODY)
+    return int(pooling.loc[here, list(SPREADS)].notna().sum().sum())
+
+
+def _penalty(fits: pd.DataFrame, criterion: str, count: int) -> dict[Candidate, float]:
+    """What the spreads add to the cohort's criterion, which fits of specimens do not count."""
+    here = (fits["fitted_to"] == joint_label_of(fits)) & (fits["representation"] == POOLED)
+    readings = int(fits.loc[here, "readings"].sum())
+    if not count or not readings:
+        return {}
+    return {(POOLED, "own"): count * (2.0 if criterion == "aicc" else float(np.log(readings)))}
+
+
+def _conditional(row: Row, count: int) -> Row:
+    """The row of a pooled fit told of what its criterion is (Vaida and Blanchard 2005)."""
+    if row["representation"] != POOLED or row["value"] is None:
+        return row
+    note = f"conditional criterion; {count} spreads of the cohort counted once as unknowns"
+    return row | {"message": joined(note, row["message"])}
 
 
 def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Candidate, pd.Series]:
@@ -90,7 +123,10 @@ def _information(
 
 
 def ranked(
-    found: dict[Candidate, pd.Series], summed: bool, specimens: Iterable[str] = ()
+    found: dict[Candidate, pd.Series],
+    summed: bool,
+    specimens: Iterable[str] = (),
+    once: Mapping[Candidate, float] = MappingProxyType({}),
 ) -> list[Row]:
     """Candidates in order, over the specimens that have a value of all of them.
 
@@ -99,6 +135,7 @@ def ranked(
     found : value by specimen of each candidate; one without any value takes no part.
     summed : whether the criterion is the sum over specimens, else their mean.
     specimens : all there are; those without any value are told of too.
+    once : what counts once in a sum, not once per specimen; shared out evenly over them.
     """
     compared = [candidate for candidate, values in found.items() if len(values)]
     table = pd.DataFrame({candidate: found[candidate] for candidate in compared})
@@ -106,14 +143,16 @@ def ranked(
     none = [_row(one, summed, NO_RESULT) for one in found if one not in compared]
     if complete.empty:
         return [_row(one, summed, NONE_COMPLETE) for one in compared] + none
-    missing = sorted({*table.index, *specimens} - set(complete.index))
-    told = f"left out, without a result in every representation: {', '.join(missing)}"
-    values = {one: complete[one].to_numpy(float) for one in compared}
+    by_name = {candidate[0]: found[candidate] for candidate in compared}
+    lost = without_result(by_name, {*table.index, *specimens})
+    told = f"left out, without a result: {lost}" if lost else ""
+    share = {one: once.get(one, 0.0) / len(complete) for one in compared}
+    values = {one: complete[one].to_numpy(float) + share[one] for one in compared}
     best = min(compared, key=lambda one: values[one].mean())
     rows = []
     for one in sorted(compared, key=lambda one: values[one].mean()):
         ahead = sum(bool(other.mean() < values[one].mean()) for other in values.values())
-        row = _row(one, summed, told if missing else "")
+        row = _row(one, summed, told)
         row |= {"rank": 1 + ahead, "specimens": len(complete)}
         row |= dict(zip(("value", "standard_error"), _total(values[one], summed), strict=True))
         rows.append(row if one == best else row | _against(values[one], values[best], summed, row))
@@ -137,12 +176,13 @@ def _row(candidate: Candidate, summed: bool, message: str) -> Row:
 def _against(values: Array, best: Array, summed: bool, row: Row) -> Row:
     """How much worse than the best, paired specimen by specimen; values, best: (specimens,)."""
     worse, error = _total(values - best, summed)
+    # A mean of equal values may round to -1e-17.
+    told = {"worse_than_best": max(worse, 0.0), "worse_standard_error": error}
+    if summed:
+        return {**told, "message": joined(row["message"], NO_P)}
     tested = wilcoxon_signed_rank(values, best)
     without = "" if tested.p is not None else f"no p: {tested.message}"
-    message = "; ".join(part for part in (row["message"], without) if part)
-    # A mean of equal values may round to -1e-17.
-    told = {"worse_than_best": max(worse, 0.0), "worse_standard_error": error, "p": tested.p}
-    return {**told, "message": message}
+    return {**told, "p": tested.p, "message": joined(row["message"], without)}
 
 
 def _total(values: Array, summed: bool) -> tuple[float, float | None]:

@@ -8,7 +8,7 @@ import pandas as pd
 from spinepipe.report.cohort.named import NAME, case
 from spinepipe.report.page.results import Results
 from spinepipe.report.stage_errors import joint_label_of
-from spinepipe.report.words import AXIS, count, fixed, percent
+from spinepipe.report.words import AXIS, count, percent
 from spinepipe.statics.status import Status
 from spinepipe.studies import CohortStiffness
 
@@ -24,15 +24,14 @@ def signs(study: CohortStiffness, results: Results) -> Iterator[str]:
     if len(flipped):
         places = [
             f"{row['specimen']} {row['joint']} in {case(row['test']).lower()} "
-            f"({AXIS[row['coordinate']].lower()}, {fixed(row['measured_over_expected'])} times "
-            "the expected motion)"
+            f"({AXIS[row['coordinate']].lower()}: {row['message']})"
             for row in flipped.to_dict("records")
         ]
         where = "1 place" if len(flipped) == 1 else f"{len(flipped)} places"
         yield (
-            f"Look at this first: in {where} the measured motion goes against the load, so its "
-            f"sign is most likely flipped: {_some(places)}. Stiffness of these joints, and "
-            "whatever is compared with it, cannot be believed before motion.csv is put right."
+            f"Look at this first: in {where} the measured motion goes against the load: "
+            f"{_some(places)}. Stiffness of these joints, and whatever is compared with it, cannot "
+            "be believed before this is settled."
         )
     undecided = int((rows["verdict"] == "undecided").sum())
     if undecided or not len(flipped):
