@@ -13,7 +13,7 @@ from tests.validation.made_by import made_by
 
 ROOT = Path(__file__).resolve().parents[2]
 LAWS = ("linear", "stiffening")
-PHANTOMS = 5
+PHANTOMS = 3
 PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
 STUDY = "study: phantom\nkind: cohort_stiffness\ncohort: phantom\n"
 JOBS = ("fit", "pool", "literature", "left_out", "mae", "ranking", "statistics", "findings")
