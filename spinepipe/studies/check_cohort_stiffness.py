@@ -8,6 +8,7 @@ from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.cohort_stiffness import CohortStiffness
 from spinepipe.studies.fitted_to import ALL, ALL_BUT, NOBODY, NOTHING
+from spinepipe.studies.places import at, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 __all__ = ["check_cohort_stiffness"]
@@ -31,23 +32,15 @@ def check_cohort_stiffness(
     yield from _cost(document, study, cohort)
 
 
-def _at(document: Document, key: str) -> tuple[str, int | None, str]:
-    return document.file, document.line_of(key), key
-
-
 def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
     """Tests must exist, have names that can name files, and someone must have been measured."""
     if cohort.motion is None:
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: stiffness is fitted to motion"
         remedy = "choose another cohort, or a study of kind range_of_motion"
-        yield Problem(*_at(document, "cohort"), found, allowed, remedy)
+        yield Problem(*at(document, "cohort"), found, allowed, remedy)
         return
-    for index, name in enumerate(study.tests or ()):
-        if name not in cohort.tests:
-            remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
-            place = _at(document, f"tests.{index}")
-            yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
+    yield from unknown_tests(document, study.tests, cohort.tests)
     for name in study.tests or cohort.tests:
         reserved = name in (ALL, NOTHING) or name.startswith(ALL_BUT)
         if name in cohort.tests and (reserved or _UNFIT.search(name)):
@@ -84,14 +77,14 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
         if name in cohort.tests and name not in set(measured["test"]):
             found = f"test '{name}', which has no motion"
             allowed = f"tests with readings of {one_of(study.free)} of a specimen at least"
-            place = _at(document, f"tests.{index}")
+            place = at(document, f"tests.{index}")
             yield Problem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = f"readings of {one_of(study.free)} of every specimen in one test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield Problem(*_at(document, "tests"), found, allowed, remedy)
+            yield Problem(*at(document, "tests"), found, allowed, remedy)
 
 
 def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
@@ -99,7 +92,7 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
     given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
     for joint in given:
         if joint not in cohort.joint_names:
-            place = _at(document, f"level_stiffness.{joint}")
+            place = at(document, f"level_stiffness.{joint}")
             remedy = did_you_mean(joint, cohort.joint_names, "delete it or correct its name")
             yield Problem(*place, f"unknown joint '{joint}'", one_of(cohort.joint_names), remedy)
     if "level_ratio" not in study.representations:
@@ -109,7 +102,7 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
         found = f"no value for {', '.join(missing)}"
         allowed = "a value for every joint of the cohort, as level_ratio is among representations"
         remedy = "add them, or leave level_ratio out of representations"
-        yield Problem(*_at(document, "level_stiffness"), found, allowed, remedy)
+        yield Problem(*at(document, "level_stiffness"), found, allowed, remedy)
 
 
 def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
@@ -118,9 +111,9 @@ def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterato
         found = "null, and the cohort has none"
         allowed = "SDs of one reading, here or in cohort.yaml, for cost: measurement_sd"
         remedy = "fill them in, or choose cost: published"
-        yield Problem(*_at(document, "measurement_sd"), found, allowed, remedy)
+        yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
     others = [name for name in study.free if name not in ROTATIONS]
     if study.cost == "published" and others:
         allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
         remedy = "free rotations only, or choose cost: measurement_sd"
-        yield Problem(*_at(document, "free"), ", ".join(others), allowed, remedy)
+        yield Problem(*at(document, "free"), ", ".join(others), allowed, remedy)

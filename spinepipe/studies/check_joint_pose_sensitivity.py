@@ -10,8 +10,9 @@ from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import Draft
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, one_of
 from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
+from spinepipe.studies.places import at, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS
 
 __all__ = ["check_joint_pose_sensitivity"]
@@ -30,13 +31,9 @@ def check_joint_pose_sensitivity(
     yield from _loading(document, study, cohort)
     yield from _tests(document, study, cohort)
     if study.best_models > study.poses:
-        place = _at(document, "best_models")
+        place = at(document, "best_models")
         allowed = f"at most the number of poses, {study.poses}"
         yield Problem(*place, str(study.best_models), allowed, "take fewer, or more poses")
-
-
-def _at(document: Document, key: str) -> tuple[str, int | None, str]:
-    return document.file, document.line_of(key), key
 
 
 def _landmarks(
@@ -45,7 +42,7 @@ def _landmarks(
     if cohort.landmarks is None:
         allowed = "a cohort with landmarks.csv: the study samples landmarks"
         found = f"cohort '{cohort.name}', which has none"
-        yield Problem(*_at(document, "cohort"), found, allowed, "choose another cohort")
+        yield Problem(*at(document, "cohort"), found, allowed, "choose another cohort")
         return
     for problem in landmark_problems(_draft(cohort, cohort.landmarks), set()):
         place = (problem.file, None, problem.column)  # blank lines may have shifted the rows
@@ -57,7 +54,7 @@ def _landmarks(
         found = f"null, and {len(bare)} of {len(frame)} landmarks without sd_mm (first: {first})"
         allowed = "a number in mm, or an sd_mm for every landmark of a joint frame"
         remedy = "set landmark_sd_mm or fill the column"
-        yield Problem(*_at(document, "landmark_sd_mm"), found, allowed, remedy)
+        yield Problem(*at(document, "landmark_sd_mm"), found, allowed, remedy)
 
 
 def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
@@ -83,7 +80,7 @@ def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) ->
         if not missing:
             return
         lacking = f"no inertia in bodies.csv for {', '.join(missing[:5])}"
-    place = _at(document, "loading")
+    place = at(document, "loading")
     allowed = "equilibrium, or a cohort with masses and inertias of all moving vertebrae"
     yield Problem(*place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in")
 
@@ -93,26 +90,22 @@ def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> I
     if cohort.motion is None:
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: the study calibrates on motion"
-        yield Problem(*_at(document, "cohort"), found, allowed, "choose another cohort")
+        yield Problem(*at(document, "cohort"), found, allowed, "choose another cohort")
         return
-    for index, name in enumerate(study.tests or ()):
-        if name not in cohort.tests:
-            remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
-            place = _at(document, f"tests.{index}")
-            yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
+    yield from unknown_tests(document, study.tests, cohort.tests)
     chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
     measured = chosen[chosen[list(COORDINATE_COLUMNS)].notna().any(axis=1)]
     if measured.empty:
         tests = one_of(dict.fromkeys(cohort.motion["test"]))
         found = "no motion in any chosen test"
-        yield Problem(*_at(document, "tests"), found, tests, "choose a test with motion")
+        yield Problem(*at(document, "tests"), found, tests, "choose a test with motion")
         return
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = "motion of every specimen in one chosen test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield Problem(*_at(document, "tests"), found, allowed, remedy)
+            yield Problem(*at(document, "tests"), found, allowed, remedy)
     yield from _weights(document, study, measured)
 
 
@@ -123,6 +116,6 @@ def _weights(
     weights = study.calibration.weights.in_order()
     known = [c for c in COORDINATE_COLUMNS if measured[c].notna().any()]
     if not any(w > 0 for w, c in zip(weights, COORDINATE_COLUMNS, strict=True) if c in known):
-        place = _at(document, "calibration.weights")
+        place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
         yield Problem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.studies.places import at, unknown_tests
 from spinepipe.studies.range_of_motion import RangeOfMotion
 
 __all__ = ["check_range_of_motion"]
@@ -24,10 +25,6 @@ def check_range_of_motion(
     yield from _levels(document, study, cohort)
 
 
-def _at(document: Document, key: str) -> tuple[str, int | None, str]:
-    return document.file, document.line_of(key), key
-
-
 def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
     """Sampled frames need to know how uncertain they are."""
     if study.n_poses == 1 or study.pose_sd is not None:
@@ -37,11 +34,11 @@ def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator
     remedy = "set pose_sd, or set poses: 1"
     if cohort.motion is not None:
         found += f"cohort '{cohort.name}' has motion.csv: its measurement_sd is that of a reading"
-        yield Problem(*_at(document, "pose_sd"), found, allowed, remedy)
+        yield Problem(*at(document, "pose_sd"), found, allowed, remedy)
     elif cohort.measurement_sd is None:
         found += f"cohort '{cohort.name}' has no measurement_sd"
         remedy = "set pose_sd, give the cohort a measurement_sd, or set poses: 1"
-        yield Problem(*_at(document, "pose_sd"), found, allowed, remedy)
+        yield Problem(*at(document, "pose_sd"), found, allowed, remedy)
 
 
 def _tests(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
@@ -50,24 +47,20 @@ def _tests(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator
         if study.tests is not None:
             allowed = "null beside virtual_tests, which name their own tests"
             remedy = "name the tests in virtual_tests.tests, or set virtual_tests: null"
-            yield Problem(*_at(document, "tests"), ", ".join(study.tests), allowed, remedy)
+            yield Problem(*at(document, "tests"), ", ".join(study.tests), allowed, remedy)
         return
     if cohort.loads is None:
         found = f"null, and cohort '{cohort.name}' has no loads.csv"
         allowed = "virtual tests, or null with a cohort that has loads.csv"
         remedy = "set virtual_tests: {moment_nm: 7.5, tests: [flexion], steps: 10}"
-        yield Problem(*_at(document, "virtual_tests"), found, allowed, remedy)
+        yield Problem(*at(document, "virtual_tests"), found, allowed, remedy)
         return
-    for index, name in enumerate(study.tests or ()):
-        if name not in cohort.tests:
-            remedy = did_you_mean(name, cohort.tests, "delete it or add its loads")
-            place = _at(document, f"tests.{index}")
-            yield Problem(*place, f"unknown test '{name}'", one_of(cohort.tests), remedy)
+    yield from unknown_tests(document, study.tests, cohort.tests)
 
 
 def _levels(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
     for name in study.level_stiffness:
         if name not in cohort.joint_names:
             remedy = did_you_mean(name, cohort.joint_names, "delete it")
-            place = _at(document, f"level_stiffness.{name}")
+            place = at(document, f"level_stiffness.{name}")
             yield Problem(*place, f"unknown joint '{name}'", one_of(cohort.joint_names), remedy)
