@@ -1,5 +1,7 @@
 """Information criteria of a least-squares fit whose scatter is estimated."""
 
+from typing import Any
+
 import numpy as np
 
 from spinepipe.calibrate import Problem
@@ -52,3 +54,11 @@ def independent(problem: Problem) -> bool:
         return True
     read = [np.isfinite(c.measured[:, :, problem.weights > 0.0]) for c in problem.cases if c.zeroed]
     return all(bool((one.sum(axis=0) <= 1).all()) for one in read)
+
+
+def no_fit(status: str, message: str) -> dict[str, Any]:
+    """The row of the table ``fits`` where there is none."""
+    counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
+    empty = dict.fromkeys(("effective_unknowns", "cost"))
+    ended = {"status": status, "message": message}
+    return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}

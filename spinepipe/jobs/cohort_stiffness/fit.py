@@ -7,7 +7,7 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent
+from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent, no_fit
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
@@ -40,15 +40,13 @@ def run(
     problem, found, refusal = _fit(settings, cohort, specimen, representation, fitted_to, tests)
     if problem is None or found is None:
         k, rows = None, _no_stiffness(settings, cohort, refusal)
-        record = _no_fit(refusal)
+        record = no_fit(Status.REFUSED.value, refusal)
     else:
         k, rows = _stiffness(settings, cohort, problem, found)
         record = _record(problem, found)
     seen = [] if k is None else error_rows(cohort, specimen, tests, k)
-    within = {one.case.test for one in tests.fitted_to(fitted_to)}
     labelled = [
-        {**row, "source": "own", "stage": "fitted" if row["test"] in within else "left_out_case"}
-        for row in seen
+        {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
     ]
     origin = provenance("cohort_stiffness.fit", settings, cohort)
     write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, origin)
@@ -123,13 +121,6 @@ def _record(problem: Problem, found: Fit) -> Row:
         "status": found.status.value,
         "message": "; ".join(note for note in notes if note),
     }
-
-
-def _no_fit(refusal: str) -> Row:
-    counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
-    empty = dict.fromkeys(("effective_unknowns", "cost"))
-    row: Row = {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None)}
-    return row | {"status": Status.REFUSED.value, "message": refusal}
 
 
 def _no_stiffness(settings: CohortStiffness, cohort: Cohort, refusal: str) -> list[Row]:

@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent
+from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent, no_fit
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
@@ -59,12 +59,12 @@ class PooledRows:
         if values is None:
             return []
         tests = specimen_tests(self.study, self.cohort, specimen)
-        within = {one.case.test for one in tests.fitted_to(self.fitted_to)}
         found = error_rows(self.cohort, specimen, tests, values[0])
         rows = [{**row, "specimen": specimen} for row in found]
         if specimen not in self.problems:
-            return [{**r, "stage": "left_out_specimen"} for r in rows if r["test"] in within]
-        return [{**r, "stage": "fitted" if r["test"] in within else "left_out_case"} for r in rows]
+            within = [r for r in rows if tests.stage(r["test"], self.fitted_to) == "fitted"]
+            return [{**r, "stage": "left_out_specimen"} for r in within]
+        return [{**r, "stage": tests.stage(r["test"], self.fitted_to)} for r in rows]
 
     def record(self, specimen: str) -> Row:
         """The row of table ``fits`` of a fitted specimen."""
@@ -72,9 +72,7 @@ class PooledRows:
         status, message = self._ended(specimen)
         ended = {"specimen": specimen, "status": status.value, "message": message}
         if own is None or self.found is None:
-            counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
-            empty = dict.fromkeys(("effective_unknowns", "cost"))
-            return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
+            return {"specimen": specimen, **no_fit(status.value, message)}
         usable = status.usable
         cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
         alone = independent(self.problems[specimen])

@@ -64,6 +64,11 @@ class SpecimenTests:
             return ()  # nothing would be held out
         return tuple(one for one in self.tested if one.case.test != left_out)
 
+    def stage(self, test: str, label: str) -> str:
+        """``fitted`` where a fit to that label saw the test, else ``left_out_case``."""
+        within = {one.case.test for one in self.fitted_to(label)}
+        return "fitted" if test in within else "left_out_case"
+
     def why_none(self, label: str) -> str:
         """Why a label of ``fitted_to`` means no test of this specimen, in words."""
         left_out = label.removeprefix(ALL_BUT)
