@@ -1,6 +1,8 @@
 """Effects: named components of the model, one file each. See `contract` for the five kinds."""
 
-from spinepipe.effects import linear_bushing as _linear_bushing  # noqa: F401  (registers itself)
+from importlib import import_module
+from pkgutil import iter_modules
+
 from spinepipe.effects.contract import (
     Advance,
     AppliedLoad,
@@ -20,6 +22,7 @@ from spinepipe.effects.contract import (
     Wrench,
 )
 from spinepipe.effects.registry import create, register, registered
+from spinepipe.effects.trial import Spread, Trial
 
 __all__ = [
     "Advance",
@@ -37,8 +40,13 @@ __all__ = [
     "PathLaw",
     "Placement",
     "PlacementByParameter",
+    "Spread",
+    "Trial",
     "Wrench",
     "create",
     "register",
     "registered",
 ]
+
+for _file in iter_modules(__path__):  # each effect registers itself: a new one is one new file
+    import_module(f"{__name__}.{_file.name}")

@@ -42,6 +42,8 @@ class Parameter:
     default : value at which the effect is usually started.
     prior_scale : one prior SD; of the natural logarithm when ``logarithmic``.
     logarithmic : whether fits work with the logarithm (positive, spread over decades).
+    off : value of a strength at which the effect does nothing, to first order in which it acts;
+        None for parameters of shape, which say nothing while the strengths are off.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Parameter:
     prior_scale: float
     logarithmic: bool
     meaning: str
+    off: float | None = None
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ def code_digest(module: str) -> str:
 
     Comments, docstrings, layout and the version number do not count. The data files that lie
     beside an imported module (published values) do. Imports are followed where they are written,
-    also inside functions; a module loaded by a computed name is not seen.
+    also inside functions; of modules loaded by a computed name only those are seen that a package
+    takes in by going through its own folder.
 
     Parameters
     ----------
@@ -87,9 +88,18 @@ def _imports(module: str) -> frozenset[str]:
             base = _absolute(module, node)
             names.add(base)
             names.update(f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Name) and node.id == "__path__":
+            names.update(_modules_of(module))
     ours = {name for name in names if name.split(".")[0] == _PACKAGE}
     with_packages = ours | {parent for name in ours for parent in _parents(name)}
     return frozenset(name for name in with_packages if _source(name))
+
+
+def _modules_of(package: str) -> list[str]:
+    """The modules in the folder of a package."""
+    path = _source(package)
+    assert path is not None
+    return [f"{package}.{file.stem}" for file in sorted(path.parent.glob("*.py"))]
 
 
 def _parents(module: str) -> list[str]:
