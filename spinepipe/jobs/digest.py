@@ -99,7 +99,7 @@ def _modules_of(package: str) -> list[str]:
     """The modules in the folder of a package."""
     path = _source(package)
     assert path is not None
-    return [f"{package}.{file.stem}" for file in sorted(path.parent.glob("*.py"))]
+    return [f"{package}.{file.stem}" for file in sorted(path.parent.glob("[!_]*.py"))]
 
 
 def _parents(module: str) -> list[str]:
