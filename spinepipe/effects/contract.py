@@ -75,12 +75,19 @@ class JointResponse:
 
 @dataclass(frozen=True)
 class Advance:
-    """State after a load step and its derivatives: (J, S), (J, S, 6), (J, S, P), (J, S, S)."""
+    """State (J, S) after a load step and its derivatives.
+
+    Attributes
+    ----------
+    by_coordinate, by_parameter, by_state : (J, S, 6), (J, S, P), (J, S, S).
+    by_carried : (J, S, 6) derivative by the load of the laws before it, or None for none.
+    """
 
     state: Array
     by_coordinate: Array
     by_parameter: Array
     by_state: Array
+    by_carried: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -236,8 +243,10 @@ class PathLaw(Effect, Protocol):
     ) -> Array:
         """(J, 6, S) derivative of the load by the state."""
 
-    def advance(self, q: Array, parameters: Array, state: Array, seconds: float) -> Advance:
-        """State after the step that ended at q and took ``seconds``."""
+    def advance(
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+    ) -> Advance:
+        """State after a step of ``seconds`` that ended at q with the laws before it at carried."""
 
 
 @runtime_checkable

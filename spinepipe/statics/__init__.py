@@ -4,7 +4,7 @@ from spinepipe.statics.equilibrium import Equilibrium
 from spinepipe.statics.free import FreeParameter, declared, free_parameters, moved
 from spinepipe.statics.load_sensitivity import LoadSensitivity, by_load
 from spinepipe.statics.loading import Loading, Slots
-from spinepipe.statics.path import SolvedStep, follow
+from spinepipe.statics.path import SolvedStep, carried_over, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
 from spinepipe.statics.program import Course, Program
 from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
@@ -32,6 +32,7 @@ __all__ = [
     "by_joint_pose",
     "by_load",
     "by_parameters",
+    "carried_over",
     "declared",
     "follow",
     "free_parameters",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.statics.damped import approach
 from spinepipe.statics.holding import States
 from spinepipe.statics.linear import Factored, SingularTangent, factor
 from spinepipe.statics.loading import Loading
@@ -59,12 +60,17 @@ def solve(
 ) -> Equilibrium:
     """Equilibrium under ``loading_to``, starting from the one at ``start`` under ``loading_from``.
 
-    The full increment is tried first; if Newton does not contract or ends unstable, the load is
+    The full increment is tried first; if Newton does not contract or ends unstable, it is held back
+    across the corners of path laws where there are any; at last the load is
     continued in fractions that halve on failure and double on success.
     """
     direct = _newton(system, start, loading_to, states)
     if direct is not None and (verdict := _stability(system, direct)).stable:
         return _converged(direct, direct.iterations, verdict)
+    if system.paths and (near := approach(system, start, loading_to, states)) is not None:
+        held_back = _newton(system, near, loading_to, states)
+        if held_back is not None and (verdict := _stability(system, held_back)).stable:
+            return _converged(held_back, held_back.iterations, verdict)
     return _continue(system, start, loading_from, loading_to, states)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import JointLaw, JointResponse, PathLaw
+from spinepipe.effects import Advance, JointLaw, JointResponse, PathLaw
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.placement import Placed
 
@@ -76,6 +76,10 @@ class ActivePath:
         """(J, 6, S) derivative by the state of each joint in scope."""
         return self.effect.by_state(q, self.values, states.of[self.index], states.seconds, carried)
 
+    def advance(self, q: Array, carried: Array, states: States) -> Advance:
+        """State of the joints in scope after a step that ended at q (J, 6)."""
+        return self.effect.advance(q, self.values, states.of[self.index], states.seconds, carried)
+
 
 Law = ActiveLaw | ActivePath
 
@@ -104,6 +108,17 @@ def hold(placed: Placed, laws: Sequence[Law], states: States, moved: bool) -> Ho
     pulled = np.einsum("jka,jk->ja", first, load)
     stiff = np.einsum("jka,jkl,jlb->jab", first, tangent, first)
     return Holding(pulled, stiff + np.einsum("jk,jkab->jab", load, placed.by_coordinates))
+
+
+def states_after(q: Array, laws: Sequence[Law], states: States) -> dict[int, Advance]:
+    """States of the path laws after a step that ended where the laws see q (J, 6), by index."""
+    load, advances = np.zeros_like(q), {}
+    for law in laws:
+        j = law.joints
+        if isinstance(law, ActivePath):
+            advances[law.index] = law.advance(q[j], load[j], states)
+        load[j] += law.respond(q[j], load[j], states).load
+    return advances
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics.free import FreeParameter
+from spinepipe.statics.holding import ActivePath, Law
 from spinepipe.statics.path import SolvedStep
 from spinepipe.statics.system import System
 
@@ -67,27 +68,60 @@ def _advance(
     dq: Array,
     state_by_x: dict[int, Array],
 ) -> dict[int, Array]:
-    """Derivatives of the states after the step: by pose, by parameter and by earlier state."""
+    """Derivatives of the states after the step: by pose, parameter, earlier state and carried."""
     if not step.advances:
         return {}
     placed = system.placed(step.equilibrium.q, with_parameters=True)
     joints_by_x = np.einsum("jab,jbm->jam", placed.by_coordinate, dq.reshape(-1, 6, len(free)))
     joints_by_x += _placement_by_x(system, placed.by_parameter, free)
+    carried_by_x = _carried(system, step, free, placed.q, joints_by_x, state_by_x)
     following = {}
-    for law in system.laws:
-        if law.index in step.advances:
-            advance = step.advances[law.index]
-            following[law.index] = np.einsum(
-                "jsa,jam->jsm", advance.by_coordinate, joints_by_x[law.joints]
-            ) + np.einsum("jst,jtm->jsm", advance.by_state, state_by_x[law.index])
-            for column, parameter in enumerate(free):
-                if parameter.effect == law.index:
-                    rows = _joints_moved(parameter, law.per_joint)
-                    own = advance.by_parameter[rows, :, parameter.column]
-                    following[law.index][rows, :, column] += (
-                        own * parameter.derivative(law.values)[:, None]
-                    )
+    for law in system.paths:
+        after = step.advances[law.index]
+        by_x = np.einsum("jsa,jam->jsm", after.by_coordinate, joints_by_x[law.joints])
+        by_x += np.einsum("jst,jtm->jsm", after.by_state, state_by_x[law.index])
+        if after.by_carried is not None:
+            by_x += after.by_carried @ carried_by_x[law.index]
+        _add_own(by_x, after.by_parameter, law, free)
+        following[law.index] = by_x
     return following
+
+
+def _carried(
+    system: System,
+    step: SolvedStep,
+    free: Sequence[FreeParameter],
+    q: Array,
+    joints_by_x: Array,
+    state_by_x: dict[int, Array],
+) -> dict[int, Array]:
+    """(J, 6, m) derivative of what each path law is carried, where its state depends on that."""
+    readers = [i for i, after in step.advances.items() if after.by_carried is not None]
+    result: dict[int, Array] = {}
+    load, load_by_x = np.zeros_like(q), np.zeros_like(joints_by_x)
+    for law in system.laws if readers else ():
+        j, carried, carried_by_x = law.joints, load[law.joints], load_by_x[law.joints]
+        if law.index in readers:
+            result[law.index] = carried_by_x
+        response = law.respond(q[j], carried, step.states)
+        by_x = response.tangent @ joints_by_x[j]
+        if response.by_carried is not None:
+            by_x += response.by_carried @ carried_by_x
+        if isinstance(law, ActivePath):
+            by_x += law.by_state(q[j], carried, step.states) @ state_by_x[law.index]
+        _add_own(by_x, law.by_parameter(q[j], carried, step.states), law, free)
+        load[j] += response.load
+        load_by_x[j] += by_x
+    return result
+
+
+def _add_own(by_x: Array, by_parameter: Array, law: Law, free: Sequence[FreeParameter]) -> None:
+    """Add to (J, …, m) what a law's own unknowns do, from its derivative (J, …, P)."""
+    for column, parameter in enumerate(free):
+        if parameter.effect == law.index:
+            rows = _joints_moved(parameter, law.per_joint)
+            own = by_parameter[rows, :, parameter.column]
+            by_x[rows, :, column] += own * parameter.derivative(law.values)[:, None]
 
 
 def _placement_by_x(

@@ -241,7 +241,9 @@ class Relaxation:
         derivative[:, EXTENSION, 0] = -parameters[:, 0]
         return derivative
 
-    def advance(self, q: Array, parameters: Array, state: Array, seconds: float) -> Advance:
+    def advance(
+        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+    ) -> Advance:
         time = parameters[:, 1]
         kept, away = np.exp(-seconds / time), q[:, EXTENSION] - state[:, 0]
         by_coordinate, by_parameter = np.zeros((len(q), 1, 6)), np.zeros((len(q), 1, 2))

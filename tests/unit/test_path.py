@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 
-from spinepipe.effects import Wrench
-from spinepipe.model import LoadCase, LoadStep
-from spinepipe.statics import Chain, Slots, Status, System, follow
+from spinepipe.effects import Wrench, create
+from spinepipe.model import LoadCase, LoadStep, ScopedEffect
+from spinepipe.statics import Chain, Slots, Status, System, damped, follow
+from spinepipe.statics.damped import approach
 
 
 def test_guesses_change_the_way_but_not_the_pose() -> None:
@@ -33,9 +34,9 @@ def test_hopeless_guesses_fall_back_to_the_load_path() -> None:
         np.testing.assert_allclose(other.equilibrium.q, one.equilibrium.q, rtol=0, atol=1e-12)
 
 
-def tipping(n_steps: int = 4) -> System:
+def tipping(n_steps: int = 4, effects: tuple[ScopedEffect, ...] = ()) -> System:
     """The second step presses 500 times harder than the spine stands; the rest would stand."""
-    model = spine(2)
+    model = spine(2, effects=effects)
     top = model.bodies[1].com
     sizes = [30.0, 5e4, 30.0, 0.0][:n_steps]
     steps = [LoadStep(i, (Wrench(1, top, np.array([0.0, -size, 0.0]), NOWHERE),))
@@ -54,6 +55,27 @@ def test_steps_after_a_failure_say_so_and_keep_finite_numbers() -> None:
         assert not step.usable
         np.testing.assert_array_equal(step.equilibrium.q, fell.equilibrium.q)
     assert np.isfinite(fell.equilibrium.q).all()
+
+
+@pytest.mark.parametrize("effect", ["hysteresis", "creep"])
+def test_what_tips_over_does_so_with_path_effects_too(effect: str) -> None:
+    stood, *after = follow(tipping(effects=(scoped(create(effect), (0, 1)),)))
+    assert stood.usable
+    assert [step.equilibrium.status for step in after] == [Status.UNSTABLE] * 3
+    np.testing.assert_array_equal(after[2].equilibrium.q, after[0].equilibrium.q)
+
+
+def test_the_way_held_back_ends_where_newton_does_or_nowhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    system = tipping()
+    stood, fell, *_ = follow(system)
+    near = approach(system, np.zeros(12), stood.loading, stood.states)
+    np.testing.assert_allclose(near, stood.equilibrium.q, rtol=0, atol=1e-10)
+    assert approach(system, stood.equilibrium.q, fell.loading, fell.states) is None
+    assert approach(system, np.full(12, np.nan), stood.loading, stood.states) is None
+    monkeypatch.setattr(damped, "MOST_STEPS", 1)
+    assert approach(system, np.zeros(12), stood.loading, stood.states) is None
 
 
 def test_unloading_without_path_effects_returns_to_where_it_was() -> None:

@@ -1,0 +1,1 @@
+"""Discrepancy: where simulation and measurement disagree, and which effect the model lacks."""

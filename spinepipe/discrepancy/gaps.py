@@ -1,0 +1,116 @@
+"""How large a discrepancy is, in noise SD: gap and rms residual, of all readings or of some."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import ncx2
+
+from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.effects.contract import Array
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Size of a discrepancy in noise SD.
+
+    Attributes
+    ----------
+    gap : sqrt(max(0, chi2 / dof - 1)). low, high : its 95 % interval. rms : sqrt(chi2 / dof).
+    """
+
+    chi2: float
+    dof: float
+    readings: int
+
+    @property
+    def rms(self) -> float:
+        """1 where only noise is left."""
+        return float(np.sqrt(self.chi2 / self.dof)) if self.dof > 0.0 else 0.0
+
+    @property
+    def gap(self) -> float:
+        """0 where only noise is left."""
+        return self._of(self.chi2 - self.dof)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the gap: of the noncentrality that chi2 allows."""
+        return self._of(self._noncentrality(0.975)), self._of(self._noncentrality(0.025))
+
+    @property
+    def excess(self) -> float:
+        """chi2 beyond what noise makes."""
+        return self.chi2 - self.dof
+
+    def _of(self, excess: float) -> float:
+        return float(np.sqrt(max(0.0, excess / self.dof))) if self.dof > 0.0 else 0.0
+
+    def _noncentrality(self, share: float) -> float:
+        """Noncentrality at which chi2 or less has that probability, by bisection."""
+        if self.dof <= 0.0 or ncx2.cdf(self.chi2, self.dof, 1e-12) <= share:
+            return 0.0
+        low, high = 0.0, 2.0 * self.chi2 + 100.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (
+                (middle, high) if ncx2.cdf(self.chi2, self.dof, middle) > share else (low, middle)
+            )
+        return low
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """What a fit leaves of a specimen's readings, in noise SD, with what each counts.
+
+    Attributes
+    ----------
+    residual, freedom : per test (T, J, 6), NaN where nothing was read.
+    """
+
+    residual: tuple[Array, ...]
+    freedom: tuple[Array, ...]
+
+
+def left_over(grounds: Grounds, fit: JointFit) -> dict[str, LeftOver]:
+    """What a fit leaves of every reading, nuisances at their most likely values."""
+    unknowns = len(fit.x)
+    total = sum(float(w.freedom.sum()) for w in grounds.setting.whitenings.values())
+    found = {}
+    for name, one in grounds.readings.items():
+        white = grounds.setting.whitenings[name]
+        errors = [
+            np.nan_to_num(seen - test.mean)
+            for seen, test in zip(fit.predicted[name], one.tests, strict=True)
+        ]
+        residual = white.left_over(grounds.plain[name].noise_only(errors))
+        freedom = white.freedom * (1.0 - unknowns / total)
+        found[name] = LeftOver(_spread(residual, white.used), _spread(freedom, white.used))
+    return found
+
+
+def whole_gap(grounds: Grounds, fit: JointFit) -> Gap:
+    """The gap over all readings."""
+    left = left_over(grounds, fit).values()
+    return gap_of([one.residual for one in left], [one.freedom for one in left])
+
+
+def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]) -> Gap:
+    """The gap over given readings; NaN counts nothing."""
+    r = np.concatenate([test.ravel() for one in residuals for test in one])
+    f = np.concatenate([test.ravel() for one in freedoms for test in one])
+    there = np.isfinite(r)
+    return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
+
+
+def _spread(values: Array, used: tuple[NDArray[np.bool_], ...]) -> tuple[Array, ...]:
+    """(N,) values back to (T, J, 6) per test."""
+    found, at = [], 0
+    for one in used:
+        array = np.full(one.shape, np.nan)
+        count = int(one.sum())
+        array[one] = values[at : at + count]
+        at += count
+        found.append(array)
+    return tuple(found)

@@ -1,0 +1,93 @@
+"""The grounds a search stands on: readings, noise, and the base fitted with nuisances allowed for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from spinepipe.discrepancy.hypothesis import Hypothesis, Supposed, hypothesis
+from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
+from spinepipe.discrepancy.noise import Noise
+from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.discrepancy.readings import SpecimenReadings
+from spinepipe.discrepancy.tasks import Run
+from spinepipe.discrepancy.whitening import Whitening, whitening, with_nuisances
+from spinepipe.model import SpineModel
+from spinepipe.statics import FreeParameter
+
+
+@dataclass(frozen=True)
+class Start:
+    """Models where fits start, their free base parameters, and the factor they may move by."""
+
+    models: Mapping[str, SpineModel]
+    base: Mapping[str, tuple[FreeParameter, ...]]
+    bound: float
+
+
+@dataclass(frozen=True)
+class Grounds:
+    """What every round of a search shares.
+
+    Attributes
+    ----------
+    plain : whitening without nuisances. setting : with them, linearised at the first base fit.
+    fit : the base, and effects named so far, in that setting.
+    """
+
+    readings: Mapping[str, SpecimenReadings]
+    noise: Noise
+    priors: NuisancePriors
+    start: Start
+    tests: tuple[str, ...]
+    plain: Mapping[str, Whitening]
+    setting: Setting
+    fit: JointFit
+
+    def suppose(self, supposed: Sequence[Supposed]) -> Hypothesis:
+        """The base as started from, with these effects."""
+        start = self.start
+        return hypothesis(start.models, start.base, supposed, self.tests, start.bound)
+
+    def at(self, fit: JointFit) -> "Grounds":
+        """The same where another fit stands; nuisances stay as they move the base's readings."""
+        return replace(self, fit=fit)
+
+
+class NoBase(RuntimeError):
+    """The base model cannot be fitted: nothing can be said of what it lacks."""
+
+
+def laid(
+    readings: Sequence[SpecimenReadings],
+    noise: Noise,
+    priors: NuisancePriors,
+    start: Start,
+    run: Run,
+) -> Grounds:
+    """Fit the base, first with noise alone, then with nuisances where they then stand.
+
+    Raises
+    ------
+    NoBase
+        When the base has no fit.
+    """
+    by_name = {one.specimen: one for one in readings}
+    plain = {name: whitening(one.tests, noise) for name, one in by_name.items()}
+    tests = tuple(dict.fromkeys(case.test for one in readings for case in one.cases))
+    setting = Setting(by_name, plain, noise.zeroed)
+    models = hypothesis(start.models, start.base, (), tests, start.bound)
+    first = run(joint_fit, models, setting)
+    if not first.usable:
+        raise NoBase(first.status)
+    whitenings = {
+        name: with_nuisances(
+            plain[name], nuisance_signatures(first.models[name], one.cases, noise.zeroed, priors)
+        )
+        for name, one in by_name.items()
+    }
+    setting = Setting(by_name, whitenings, noise.zeroed)
+    again = hypothesis(first.models, start.base, (), tests, start.bound)
+    second = run(joint_fit, again, setting)
+    if not second.usable:
+        raise NoBase(second.status)
+    start = replace(start, models=second.models)
+    return Grounds(by_name, noise, priors, start, tests, plain, setting, second)

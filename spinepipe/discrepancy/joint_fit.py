@@ -1,0 +1,194 @@
+"""Fits of a hypothesis to all specimens at once, in whitened readings; weak priors, bounds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from spinepipe.discrepancy.hypothesis import Hypothesis
+from spinepipe.discrepancy.prediction import NoEquilibrium, Predicted, Simulated
+from spinepipe.discrepancy.readings import SpecimenReadings
+from spinepipe.discrepancy.whitening import Whitening
+from spinepipe.effects.contract import Array
+from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.statics import moved
+
+MOST_EVALUATIONS = 40
+INSIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What fits of one study share.
+
+    Attributes
+    ----------
+    readings, whitenings : by specimen.
+    """
+
+    readings: Mapping[str, SpecimenReadings]
+    whitenings: Mapping[str, Whitening]
+    zeroed: bool
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Where a fit ended.
+
+    Attributes
+    ----------
+    x : (m,) unknowns, moves from the hypothesis' start. models : by specimen, with fitted values.
+    chi2 : sum of squared whitened residuals. residuals, jacobians : by specimen, whitened (N,) and
+        (N, own unknowns). predicted : by specimen, per test (T, J, 6).
+    at_bound : (m,) bool. status : empty where all went well, else why not.
+    """
+
+    hypothesis: Hypothesis
+    x: Array
+    models: Mapping[str, SpineModel]
+    chi2: float
+    residuals: Mapping[str, Array]
+    jacobians: Mapping[str, Array]
+    predicted: Mapping[str, tuple[Array, ...]]
+    at_bound: NDArray[np.bool_]
+    status: str
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is a fit at all."""
+        return bool(self.residuals)
+
+    def whole_jacobian(self) -> Array:
+        """(N, m) of all specimens, in their order."""
+        numbers = self.hypothesis.members
+        blocks = []
+        for name, jacobian in self.jacobians.items():
+            block = np.zeros((len(jacobian), len(self.x)))
+            np.add.at(block.T, np.array(numbers[name].numbers), jacobian.T)
+            blocks.append(block)
+        return np.concatenate(blocks)
+
+    def whole_residual(self) -> Array:
+        """(N,) of all specimens, in their order."""
+        return np.concatenate(list(self.residuals.values()))
+
+
+class _Points:
+    """Evaluates a hypothesis; the last point is kept."""
+
+    def __init__(self, hypothesis: Hypothesis, setting: Setting) -> None:
+        self.hypothesis, self.setting = hypothesis, setting
+        self.simulated = {
+            name: Simulated(member.model, setting.readings[name].cases, setting.zeroed, member.free)
+            for name, member in hypothesis.members.items()
+        }
+        self.sd = np.array([u.sd for u in hypothesis.unknowns])
+        self.mean = np.array([u.mean for u in hypothesis.unknowns])
+        self.known: dict[
+            bytes, tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]
+        ] = {}
+        self.trouble = ""
+
+    def at(
+        self, x: Array
+    ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]] | None:
+        key = x.tobytes()
+        if key not in self.known:
+            try:
+                found = self._evaluated(x)
+            except (NoEquilibrium, RefusedModel) as trouble:
+                self.trouble = str(trouble)
+                return None
+            self.known = {key: found}
+        return self.known[key]
+
+    def _evaluated(
+        self, x: Array
+    ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]:
+        residuals, jacobians, predictions = {}, {}, {}
+        for name, member in self.hypothesis.members.items():
+            predicted = self.simulated[name].at(x[list(member.numbers)])
+            white = self.setting.whitenings[name]
+            measured = [test.mean for test in self.setting.readings[name].tests]
+            errors = [
+                np.nan_to_num(seen - mean)
+                for seen, mean in zip(predicted.readings, measured, strict=True)
+            ]
+            residuals[name], jacobians[name] = white(errors), white(predicted.by_x)
+            predictions[name] = predicted
+        return residuals, jacobians, predictions
+
+    def compressed(self, x: Array) -> tuple[Array, Array] | None:
+        """Residual and Jacobian of the same cost, a few rows per specimen, priors behind."""
+        found = self.at(x)
+        if found is None:
+            return None
+        rows, targets = [], []
+        for name, member in self.hypothesis.members.items():
+            own = np.column_stack([found[1][name], found[0][name]])
+            triangle = np.linalg.qr(own, mode="r")
+            block = np.zeros((len(triangle), len(x)))
+            np.add.at(block.T, np.array(member.numbers), triangle[:, :-1].T)
+            rows.append(block)
+            targets.append(triangle[:, -1])
+        rows.append(np.diag(1.0 / self.sd))
+        targets.append((x - self.mean) / self.sd)
+        return np.concatenate(targets), np.concatenate(rows)
+
+
+def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
+    """The hypothesis at its most likely point; weak priors on what no reading tells."""
+    points = _Points(hypothesis, setting)
+    low = np.array([u.low for u in hypothesis.unknowns])
+    high = np.array([u.high for u in hypothesis.unknowns])
+    start = np.clip(np.zeros(len(low)), low + INSIDE, high - INSIDE)
+    if points.compressed(start) is None:
+        return _nowhere(hypothesis, start, points.trouble)
+    size = len(points.compressed(start)[0])  # type: ignore[index]
+
+    def residual(x: Array) -> Array:
+        found = points.compressed(x)
+        return np.full(size, np.nan) if found is None else found[0]
+
+    def jacobian(x: Array) -> Array:
+        found = points.compressed(x)
+        assert found is not None
+        return found[1]
+
+    result = least_squares(
+        residual,
+        start,
+        jac=jacobian,
+        bounds=(low, high),
+        method="dogbox",
+        x_scale=np.array([min(u.sd, 1.0) for u in hypothesis.unknowns]),
+        ftol=1e-7,
+        xtol=1e-6,
+        gtol=1e-10,
+        max_nfev=MOST_EVALUATIONS,
+    )
+    status = "" if result.success else f"no optimum within {MOST_EVALUATIONS} evaluations"
+    return _ended(points, result.x, (result.x - low < 1e-6) | (high - result.x < 1e-6), status)
+
+
+def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
+    found = points.at(x)
+    assert found is not None
+    residuals, jacobians, predicted = found
+    models = {
+        name: moved(member.model, member.free, x[list(member.numbers)])
+        for name, member in points.hypothesis.members.items()
+    }
+    chi2 = float(sum(r @ r for r in residuals.values()))
+    readings = {name: one.readings for name, one in predicted.items()}
+    return JointFit(
+        points.hypothesis, x, models, chi2, residuals, jacobians, readings, at_bound, status
+    )
+
+
+def _nowhere(hypothesis: Hypothesis, x: Array, why: str) -> JointFit:
+    models = {name: member.model for name, member in hypothesis.members.items()}
+    nothing = np.zeros(len(x), dtype=bool)
+    return JointFit(hypothesis, x, models, np.inf, {}, {}, {}, nothing, why)

@@ -1,0 +1,169 @@
+"""Noise of the readings, from what repeats of a test do not share: SD, serial correlation, outliers.
+
+A reading's error has one SD for all readings of a coordinate and the correlation rho^|t - u| between
+load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import helmert
+
+from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
+from spinepipe.effects.contract import Array
+
+FAR = 5.0
+"""Deviations from the median of the cycles beyond this many SDs are outliers."""
+
+MAD_PER_SD = 0.67449
+CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
+FEWEST = 30
+"""Independent differences between cycles from which an SD is taken for known."""
+
+DECLARED_DOUBT = 1.2
+"""Without repeats readings count as this much noisier than declared: a doubt kept on purpose."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Errors of single readings.
+
+    Attributes
+    ----------
+    sd : (6,) m and rad, before zeroing; NaN for coordinates that were not read.
+    correlation : of neighbouring steps. source : ``repeats`` or ``declared``.
+    differences : independent differences between cycles behind it, per coordinate (6,).
+    outliers : readings left out.
+    """
+
+    sd: Array
+    correlation: float
+    source: str
+    differences: NDArray[np.int64]
+    outliers: int
+    zeroed: bool
+
+    def correlations(self, steps: int) -> Array:
+        """(T, T) covariance of the readings of one cycle in units of SD squared, zeroed or not."""
+        lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps)))
+        serial: Array = self.correlation**lag
+        if not self.zeroed:
+            return serial
+        left: Array = np.eye(steps) - np.eye(steps)[0]
+        return left @ serial @ left.T
+
+
+def without_outliers(
+    specimens: Sequence[SpecimenReadings],
+) -> tuple[tuple[SpecimenReadings, ...], int]:
+    """The readings without those far from what the other cycles say, and how many were dropped."""
+    spread = _typical_deviation(specimens)
+    dropped, kept = 0, []
+    for specimen in specimens:
+        tests = []
+        for test in specimen.tests:
+            far = np.abs(_deviations(test)) > FAR * spread
+            dropped += int(far.sum())
+            tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
+        kept.append(replace(specimen, tests=tuple(tests)))
+    return tuple(kept), dropped
+
+
+def _deviations(test: Repeats) -> Array:
+    """(C, T, J, 6) deviations from the median of the cycles, NaN with fewer than three."""
+    enough = test.count >= 3
+    cycles = np.where(enough, test.cycles, 0.0)
+    return np.where(enough, cycles - np.nanmedian(cycles, axis=0), np.nan)
+
+
+def _typical_deviation(specimens: Sequence[SpecimenReadings]) -> Array:
+    """(6,) robust SD of the deviations from the median of the cycles."""
+    found = [_deviations(test).reshape(-1, 6) for one in specimens for test in one.tests]
+    stacked = np.concatenate([np.zeros((0, 6)), *found])
+    sizes = np.full(6, np.inf)
+    for coordinate in range(6):
+        values = stacked[np.isfinite(stacked[:, coordinate]), coordinate]
+        values = values[values != 0.0]  # the median itself
+        if len(values) >= FEWEST:
+            sizes[coordinate] = np.median(np.abs(values)) / MAD_PER_SD
+    return np.where(sizes > 0.0, sizes, np.inf)
+
+
+def estimated_noise(
+    specimens: Sequence[SpecimenReadings], declared: Array | None, zeroed: bool, outliers: int
+) -> Noise | None:
+    """Noise from the repeats; where these are too few, as ``declared`` (6,) and doubted.
+
+    None when neither is there.
+    """
+    contrasts = _contrasts(specimens)
+    counts = np.array([sum(len(c) * c.shape[1] for c in contrasts[k]) for k in range(6)])
+    read = np.array([_is_read(specimens, k) for k in range(6)])
+    if np.all(counts[read] >= FEWEST):
+        sd, correlation = _most_likely(contrasts, zeroed)
+        return Noise(np.where(read, sd, np.nan), correlation, "repeats", counts, outliers, zeroed)
+    if declared is None:
+        return None
+    sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
+    return Noise(sd, 0.0, "declared", counts, outliers, zeroed)
+
+
+def _is_read(specimens: Sequence[SpecimenReadings], coordinate: int) -> bool:
+    return any(test.count[..., coordinate].any() for one in specimens for test in one.tests)
+
+
+def _contrasts(specimens: Sequence[SpecimenReadings]) -> list[list[Array]]:
+    """Per coordinate a list of (K, T) orthonormal differences between complete cycles."""
+    found: list[list[Array]] = [[] for _ in range(6)]
+    for specimen in specimens:
+        for test in specimen.tests:
+            for contrasts, coordinate in _contrasts_of(test):
+                found[coordinate].append(contrasts)
+    return found
+
+
+def _contrasts_of(test: Repeats) -> list[tuple[Array, int]]:
+    used = test.count.any(axis=(1, 2))  # steps that were read
+    found = []
+    for joint, coordinate in np.argwhere(test.count.any(axis=0)):
+        cycles = test.cycles[:, used, joint, coordinate]
+        whole = cycles[np.isfinite(cycles).all(axis=1)]
+        if len(whole) >= 2:
+            found.append((helmert(len(whole)) @ whole, int(coordinate)))
+    return found
+
+
+def _most_likely(contrasts: Sequence[Sequence[Array]], zeroed: bool) -> tuple[Array, float]:
+    """SDs (6,) and the correlation of largest likelihood; the SD has its own at each correlation."""
+    by_steps: list[dict[int, Array]] = []
+    for of_coordinate in contrasts:
+        lengths = {rows.shape[1] for rows in of_coordinate}
+        by_steps.append(
+            {n: np.concatenate([r for r in of_coordinate if r.shape[1] == n]) for n in lengths}
+        )
+    best, sd, correlation = -np.inf, np.full(6, np.nan), 0.0
+    for rho in CORRELATIONS:
+        total, sizes = 0.0, np.full(6, np.nan)
+        for coordinate, groups in enumerate(by_steps):
+            if groups:
+                likelihood, sizes[coordinate] = _profile(groups, float(rho), zeroed)
+                total += likelihood
+        if total > best:
+            best, sd, correlation = total, sizes, float(rho)
+    return sd, correlation
+
+
+def _profile(groups: dict[int, Array], rho: float, zeroed: bool) -> tuple[float, float]:
+    """Log likelihood and SD of one coordinate at a correlation."""
+    squares, count, logdet = 0.0, 0, 0.0
+    for steps, rows in groups.items():
+        noise = Noise(np.ones(6), rho, "", np.zeros(6, dtype=np.int64), 0, zeroed)
+        full = noise.correlations(steps + 1)[1:, 1:] if zeroed else noise.correlations(steps)
+        factor = np.linalg.cholesky(full)
+        squares += float(np.sum(np.linalg.solve(factor, rows.T) ** 2))
+        logdet += len(rows) * 2.0 * float(np.log(np.diagonal(factor)).sum())
+        count += rows.size
+    variance = max(squares / count, np.finfo(float).tiny)
+    return -0.5 * (count * np.log(variance) + logdet), float(np.sqrt(variance))

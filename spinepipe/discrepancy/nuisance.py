@@ -1,0 +1,86 @@
+"""Nuisances: small imperfections that every cohort has, and that must not pose as physics.
+
+Each is an effect of the library whose strengths have a prior around off. They enter linearised at
+the fitted base: a nuisance adds ``J S J'`` to the covariance of the readings.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from spinepipe.discrepancy.forms import Variant
+from spinepipe.discrepancy.signatures import EVERY_TEST, Column, signatures
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase, SpineModel
+from spinepipe.units import ROTATIONS
+
+
+@dataclass(frozen=True)
+class NuisancePriors:
+    """One prior SD of each imperfection, SI; zero leaves it out."""
+
+    joint_centre: float = 2e-3
+    law_axes: float = float(np.deg2rad(2.0))
+    registration: float = float(np.deg2rad(1.0))
+    load_axis: float = float(np.deg2rad(1.0))
+    load_gain: float = 0.02
+    off_diagonal: float = 1.0
+    rotation_order: float = 0.5
+
+
+def nuisance_columns(priors: NuisancePriors, joints: int, tests: Sequence[str]) -> list[Column]:
+    """The nuisances of a specimen as columns, each scaled to its prior SD."""
+    every, each_test = (EVERY_TEST,), tuple(dict.fromkeys(tests))
+    blocks = [
+        (Variant("joint_centre_offset", ()), priors.joint_centre, every),
+        (Variant("axes_tilt", ()), priors.law_axes, every),
+        (Variant("marker_bias", (("form", "tilt"),)), priors.registration, every),
+        (Variant("load_misalignment", ()), priors.load_axis, each_test),
+        (Variant("load_gain", ()), priors.load_gain, each_test),
+        (Variant("rotation_order", ()), priors.rotation_order, every),
+        *(
+            (Variant("bending_rotation_coupling", (("pair", pair),)), priors.off_diagonal, every)
+            for pair in combinations(ROTATIONS, 2)
+        ),
+    ]
+    return [
+        column
+        for variant, sd, places in blocks
+        if sd > 0.0
+        for column in _columns(variant, sd, joints, places)
+    ]
+
+
+def _columns(variant: Variant, sd: float, joints: int, places: Sequence[str]) -> list[Column]:
+    effect = variant.create()
+    rows = list(range(joints)) if effect.per_joint else [None]
+    shapes = (0.0,) * len(variant.shapes)
+    return [
+        Column(variant, shapes, strength, joint, test, sd)
+        for strength in variant.strengths
+        for joint in rows
+        for test in places
+    ]
+
+
+def nuisance_signatures(
+    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, priors: NuisancePriors
+) -> tuple[Array, ...]:
+    """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
+    columns = nuisance_columns(priors, model.n_joints, [case.test for case in cases])
+    return signatures(model, cases, zeroed, columns)
+
+
+def as_si(settings: Mapping[str, float]) -> NuisancePriors:
+    """Priors from a study's settings (mm, deg)."""
+    return NuisancePriors(
+        joint_centre=settings["joint_centre_mm"] / 1000.0,
+        law_axes=float(np.deg2rad(settings["law_axes_deg"])),
+        registration=float(np.deg2rad(settings["registration_deg"])),
+        load_axis=float(np.deg2rad(settings["load_axis_deg"])),
+        load_gain=settings["load_gain"],
+        off_diagonal=settings["off_diagonal_nm_per_rad"],
+        rotation_order=settings["rotation_order"],
+    )

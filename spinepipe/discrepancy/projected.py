@@ -1,0 +1,124 @@
+"""The linearised problem of a cohort: signatures with base, nuisances and named effects taken out.
+
+What specimens have of their own is projected out of each specimen; what they share (strengths and
+shapes of named effects) couples them and is taken out of the sums.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.effects.contract import Array
+
+SEEN = 1e-8
+"""Directions of a Jacobian with less than this share of its largest singular value are none."""
+
+UNSEEN = 1e-6
+"""A signature with less of its square left than this is nothing but what was taken out."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What is taken out of a specimen's whitened readings.
+
+    Attributes
+    ----------
+    own : (N, p) orthonormal, the specimen's own unknowns.
+    shared : (N, a) the shared unknowns' columns, without what ``own`` holds of them.
+    residual : (N,) measured less predicted, without what ``own`` holds of it.
+    """
+
+    own: Array
+    shared: Array
+    residual: Array
+
+    def out_of(self, columns: Array) -> Array:
+        """(N, m) columns without the specimen's own directions."""
+        result: Array = columns - self.own @ (self.own.T @ columns)
+        return result
+
+
+def taken_out(fit: JointFit) -> dict[str, Taken]:
+    """What a fit takes out of each specimen."""
+    owners: dict[int, set[str]] = {}
+    for name, member in fit.hypothesis.members.items():
+        for number in member.numbers:
+            owners.setdefault(number, set()).add(name)
+    common = sorted(number for number, names in owners.items() if len(names) > 1)
+    return {
+        name: _taken(fit, name, np.array(member.numbers), common)
+        for name, member in fit.hypothesis.members.items()
+    }
+
+
+def _taken(fit: JointFit, name: str, numbers: Array, common: Sequence[int]) -> Taken:
+    jacobian = fit.jacobians[name]
+    is_common = np.isin(numbers, common)
+    own = _basis(jacobian[:, ~is_common])
+    shared = np.zeros((len(jacobian), len(common)))
+    places = [common.index(number) for number in numbers[is_common]]
+    np.add.at(shared.T, places, jacobian[:, is_common].T)
+    shared -= own @ (own.T @ shared)
+    residual = -fit.residuals[name]  # measured less predicted: what a signature is to make
+    return Taken(own, shared, residual - own @ (own.T @ residual))
+
+
+def _basis(columns: Array) -> Array:
+    """(N, p) orthonormal basis of columns."""
+    if not columns.shape[1]:
+        return np.zeros((len(columns), 0))
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    left, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    seen: Array = left[:, sizes > SEEN * max(sizes.max(initial=0.0), SEEN)]
+    return seen
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Products of signatures, by specimen; M columns, D draws with the data as the first.
+
+    Attributes
+    ----------
+    gram : (M, M) F'F. moments : (M, D + 1) F'r of the data and of draws of the null.
+    raw : (M,) squared norms before anything was taken out.
+    shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) sum of A'A over all specimens.
+    moments_shared : (a, D + 1) sum of A'r.
+    """
+
+    gram: Mapping[str, Array]
+    moments: Mapping[str, Array]
+    raw: Mapping[str, Array]
+    shared: Mapping[str, Array]
+    gram_shared: Array
+    moments_shared: Array
+
+
+def linearised(
+    taken: Mapping[str, Taken],
+    signatures: Mapping[str, Array],
+    raw: Mapping[str, Array],
+    draws: int,
+    rng: np.random.Generator,
+) -> Linearised:
+    """Products that all evidence is made of.
+
+    Parameters
+    ----------
+    signatures : (N, M) whitened, by specimen. raw : (M,) their squared norms in noise SDs alone.
+    """
+    gram, moments, shared = {}, {}, {}
+    a = next(iter(taken.values())).shared.shape[1]
+    gram_shared, moments_shared = np.zeros((a, a)), np.zeros((a, draws + 1))
+    for name, out in taken.items():
+        left = out.out_of(signatures[name])
+        noise = rng.standard_normal((len(left), draws))
+        errors = np.column_stack([out.residual, noise])
+        gram[name], moments[name] = left.T @ left, left.T @ errors
+        gone = np.diagonal(gram[name]) < UNSEEN * raw[name]
+        gram[name][gone], gram[name][:, gone], moments[name][gone] = 0.0, 0.0, 0.0
+        shared[name] = np.where(gone[:, None], 0.0, left.T @ out.shared)
+        gram_shared += out.shared.T @ out.shared
+        moments_shared += out.shared.T @ errors
+    return Linearised(gram, moments, dict(raw), shared, gram_shared, moments_shared)

@@ -1,0 +1,104 @@
+"""The tests of one specimen as a search sees them: one load history each, its repeats together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.model import LoadCase
+from spinepipe.units import COORDINATES
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """All cycles of a test that had the same loads.
+
+    Attributes
+    ----------
+    case : the loads; its cycle is that of the first.
+    cycles : (C, T, J, 6) m and rad; NaN where nothing was read, in step 0 too where it was zeroed.
+    """
+
+    case: LoadCase
+    cycles: Array
+
+    @cached_property
+    def count(self) -> NDArray[np.int64]:
+        """(T, J, 6) number of readings."""
+        return np.isfinite(self.cycles).sum(axis=0)
+
+    @cached_property
+    def mean(self) -> Array:
+        """(T, J, 6) mean over the cycles, NaN where nothing was read."""
+        with np.errstate(invalid="ignore"):
+            total: Array = np.nansum(self.cycles, axis=0) / self.count
+        return total
+
+
+@dataclass(frozen=True)
+class SpecimenReadings:
+    """A specimen: its joint frames in the neutral pose and its tests."""
+
+    specimen: str
+    frames: tuple[Pose, ...]
+    tests: tuple[Repeats, ...]
+
+    @property
+    def cases(self) -> tuple[LoadCase, ...]:
+        """The load histories."""
+        return tuple(test.case for test in self.tests)
+
+
+def specimen_readings(
+    cohort: Cohort, specimen: str, tests: Sequence[str], coordinates: Sequence[str]
+) -> SpecimenReadings:
+    """Readings of a specimen in these tests and coordinates; tests without any are left out."""
+    cases = load_cases(cohort, specimen, tests, np.zeros(3))
+    motions = measured_motion(cohort, specimen, cases)
+    read = [
+        (case, _read(motion.q, coordinates, cohort.zeroed_at_step_0))
+        for case, motion in zip(cases, motions, strict=True)
+    ]
+    read = [(case, q) for case, q in read if np.isfinite(q).any()]
+    return SpecimenReadings(specimen, joint_frames(cohort, specimen), _grouped(read))
+
+
+def _read(q: Array, coordinates: Sequence[str], zeroed: bool) -> Array:
+    """(T, J, 6) what was read: no other coordinates, and no zeros that zeroing made."""
+    chosen = np.array([name in coordinates for name in COORDINATES])
+    readings = np.where(chosen, q, np.nan)
+    if zeroed:
+        readings[0] = np.nan
+    return readings
+
+
+def _grouped(read: Sequence[tuple[LoadCase, Array]]) -> tuple[Repeats, ...]:
+    """Cycles of equal loads together, in order of first appearance."""
+    groups: dict[tuple[object, ...], list[tuple[LoadCase, Array]]] = {}
+    for case, q in read:
+        groups.setdefault(_loads(case), []).append((case, q))
+    return tuple(
+        Repeats(cycles[0][0], np.stack([q for _, q in cycles])) for cycles in groups.values()
+    )
+
+
+def _loads(case: LoadCase) -> tuple[object, ...]:
+    """The same for cycles of one test with the same loads at the same times."""
+    steps = tuple(
+        (
+            step.step,
+            step.time,
+            *(
+                (w.body, w.point.tobytes(), w.force.tobytes(), w.moment.tobytes())
+                for w in step.wrenches
+            ),
+        )
+        for step in case.steps
+    )
+    return (case.test, *steps)

@@ -1,0 +1,194 @@
+"""Nonlinear refits of the forms that lead the screen, with their evidence by Laplace's method."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from spinepipe.discrepancy.evidence import SIZES
+from spinepipe.discrepancy.forms import Form, Trials
+from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Supposed
+from spinepipe.discrepancy.joint_fit import JointFit, joint_fit
+from spinepipe.discrepancy.screen import Screen, Screened, Tried
+from spinepipe.discrepancy.tasks import Run
+from spinepipe.effects import Parameter, Spread
+from spinepipe.effects.contract import Array
+
+SMALLEST_START = 0.02
+"""Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
+
+MOST_EFFECTS, MOST_FORMS = 4, 3
+"""Effects that lead the screen, and forms of each, that are refitted."""
+
+SCREEN_SHARE, SCREEN_MARGIN = 0.6, 6.0
+"""The screen is linear: an effect may trail the leader by this share of its evidence and more."""
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A form beside those of the fit before, refitted with all unknowns.
+
+    Attributes
+    ----------
+    log_evidence : against the fit before, the form's share of its effect taken off.
+    gain : drop of chi2.
+    """
+
+    form: Form
+    fit: JointFit
+    log_evidence: float
+    gain: float
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.form.name
+
+
+def refits(
+    grounds: Grounds, screen: Screen, trials: Sequence[Trials], run: Run
+) -> tuple[Refit, ...]:
+    """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
+    by_name = {one.effect: one for one in trials}
+    found = [
+        refit(grounds, started(tried), by_name[tried.form.name], run) for tried in leading(screen)
+    ]
+    usable = [one for one in found if one.fit.usable]
+    return tuple(sorted(usable, key=lambda one: -one.log_evidence))
+
+
+def leading(screen: Screen) -> Iterator[Tried]:
+    """Forms worth a refit."""
+    best = screen.effects[0].log_evidence
+    least = max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
+    for one in screen.effects[:MOST_EFFECTS]:
+        if one.log_evidence > least:
+            yield from _forms(one)
+
+
+def _forms(one: Screened) -> list[Tried]:
+    """The best forms, and of the best variant the one whose values are the same everywhere."""
+    near = [t for t in one.forms if t.log_evidence > one.forms[0].log_evidence - SCREEN_MARGIN]
+    best = one.forms[0]
+    chosen = near[:MOST_FORMS]
+    simple = [
+        t for t in one.forms
+        if t.form.variant == best.form.variant and t.form.spread is Spread.SHARED
+    ]  # fmt: skip
+    if simple and simple[0] not in chosen:
+        chosen = [*chosen[: MOST_FORMS - 1], simple[0]]
+    return chosen
+
+
+def started(tried: Tried) -> Supposed:
+    """The form with the typical strengths and the shapes that the screen suggests."""
+    variant = tried.form.variant
+    parameters = variant.create().parameters
+    values = variant.off(tried.sds)
+    for column in variant.strengths:
+        of_column = [e for e, c in zip(tried.estimate, tried.strengths, strict=True) if c == column]
+        values[column] = _value(parameters[column], float(np.mean(of_column)))
+    return Supposed(tried.form, values)
+
+
+def _value(p: Parameter, sds: float) -> float:
+    """A strength that many prior SDs from off, a little at least, inside its bounds."""
+    assert p.off is not None
+    side = 1.0 if p.low >= p.off else -1.0 if p.high <= p.off else float(np.sign(sds) or 1.0)
+    away = side * max(abs(sds), SMALLEST_START) * p.prior_scale
+    value = p.off * np.exp(away) if p.logarithmic else p.off + away
+    margin = 1e-3 * (p.high - p.low)
+    return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
+
+
+def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
+    """One more form beside those of the grounds' fit."""
+    before = grounds.fit
+    supposed = (*standing(before), one)
+    fit = run(joint_fit, grounds.suppose(supposed), grounds.setting)
+    if not fit.usable:
+        return Refit(one.form, fit, -np.inf, -np.inf)
+    gain = before.chi2 - fit.chi2
+    log_evidence = laplace(fit, len(supposed) - 1, gain) + trials.log_share(one.form)
+    return Refit(one.form, fit, log_evidence, gain)
+
+
+def standing(fit: JointFit) -> tuple[Supposed, ...]:
+    """The effects of a fit, to start from again where it ended (places that differ: their mean)."""
+    found = []
+    for number, one in enumerate(fit.hypothesis.supposed):
+        parameters = one.form.variant.create().parameters
+        start = one.start.copy()
+        for column, parameter in enumerate(parameters):
+            moves = [
+                x
+                for x, u in zip(fit.x, fit.hypothesis.unknowns, strict=True)
+                if (u.supposed, u.column) == (number, column)
+            ]
+            if moves:
+                move = float(np.mean(moves))
+                value = (
+                    start[column] * np.exp(move) if parameter.logarithmic else start[column] + move
+                )
+                start[column] = np.clip(value, parameter.low, parameter.high)
+        found.append(replace(one, start=start))
+    return tuple(found)
+
+
+def laplace(fit: JointFit, number: int, gain: float) -> float:
+    """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
+
+    The likelihood is taken for normal around the fit; strengths are N(off, t^2), averaged over the
+    sizes t of the screen, shapes as their priors.
+    """
+    unknowns = fit.hypothesis.unknowns
+    own = np.array([u.supposed == number for u in unknowns])
+    curvature = curvature_of(fit, own)
+    chosen = [u for u in unknowns if u.supposed == number]
+    away = fit.x[own] - np.array([u.mean for u in chosen])
+    is_strength = np.array([u.is_strength for u in chosen])
+    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
+    sides = _sides(fit, chosen)
+    found = []
+    for size in SIZES:
+        sd = np.where(is_strength, size, 1.0) * declared
+        spread = np.eye(len(sd)) + curvature * sd**2
+        _, logdet = np.linalg.slogdet(spread)
+        fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
+        posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
+        inside = sides * away / np.sqrt(np.diagonal(posterior))
+        half = np.where(sides != 0.0, np.log(2.0) + log_ndtr(inside), 0.0)
+        found.append(-0.5 * (logdet + fit_to_prior) + float(half.sum()))
+    return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
+
+
+def curvature_of(fit: JointFit, own: Array) -> Array:
+    """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
+    jacobian = fit.whole_jacobian()
+    priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
+    others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
+    mine = np.vstack([jacobian[:, own], np.zeros((int((~own).sum()), int(own.sum())))])
+    basis, _ = np.linalg.qr(others)
+    left = mine - basis @ (basis.T @ mine)
+    result: Array = left.T @ left
+    return result
+
+
+def _sides(fit: JointFit, unknowns: Sequence[object]) -> Array:
+    """(k,) the side of off that bounds allow a strength, 0 for both and for shapes."""
+    sides = []
+    for u in unknowns:
+        p = _parameter(fit, u)
+        if p.off is None:
+            sides.append(0.0)
+        else:
+            sides.append(1.0 if p.low >= p.off else -1.0 if p.high <= p.off else 0.0)
+    return np.array(sides)
+
+
+def _parameter(fit: JointFit, u: object) -> Parameter:
+    number, column = u.supposed, u.column  # type: ignore[attr-defined]
+    found: Parameter = fit.hypothesis.supposed[number].form.variant.create().parameters[column]
+    return found

@@ -1,0 +1,227 @@
+"""The search: effects enter while they are evident, stand against rivals, and leave if they can.
+
+The order of events and what decides: a screen of all effects in the linearised problem; nonlinear
+refits of those that lead; the best enters if its evidence exceeds what the null would show and it
+closes a real share of the gap; then again beside it. At the end each effect is taken away once and
+all others are tried in its place.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from spinepipe.discrepancy.forms import Trials
+from spinepipe.discrepancy.gaps import Gap, whole_gap
+from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.hypothesis import Supposed
+from spinepipe.discrepancy.joint_fit import JointFit, joint_fit
+from spinepipe.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
+from spinepipe.discrepancy.refit import Refit, refit, refits, standing
+from spinepipe.discrepancy.rounds import look
+from spinepipe.discrepancy.screen import Screen, exceeded
+from spinepipe.discrepancy.tasks import Run
+
+REAL_SHARE = 0.03
+"""Of the base's excess chi2: a further effect that closes less is not worth a name."""
+
+MOST_FORMS_NAMED = 6
+MOST_SWAPS = 3
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a search may do. ``draws`` of the null; ``margin`` of log evidence over a rival."""
+
+    trials: tuple[Trials, ...]
+    coordinates: tuple[str, ...]
+    false_alarm: float
+    draws: int
+    margin: float
+    most_effects: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of a named one, and by how much evidence it is behind."""
+
+    name: str
+    margin: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A form that stands in the final model: its evidence beside the others, and its rivals."""
+
+    supposed: Supposed
+    log_evidence: float
+    gain: float
+    rivals: tuple[Rival, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.supposed.form.name
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One look at the effects, with the refits that followed."""
+
+    name: str
+    screen: Screen
+    refits: tuple[Refit, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    base, final : the grounds with the base alone and with what stands. standing : what stands.
+    lack_of_base, lack : the generic basis beside the base, and beside the final model.
+    generic_threshold : evidence of the generic basis that the null seldom exceeds.
+    """
+
+    base: Grounds
+    final: Grounds
+    standing: tuple[Standing, ...]
+    stages: tuple[Stage, ...]
+    lack_of_base: LackOfFit
+    lack: LackOfFit
+    generic_threshold: float
+    base_gap: Gap
+    final_gap: Gap
+
+
+@dataclass
+class _Log:
+    stages: list[Stage] = field(default_factory=list)
+
+
+def search(base: Grounds, rules: Rules, run: Run) -> Found:
+    """Effects that the base lacks."""
+    log = _Log()
+    base_gap = whole_gap(base, base.fit)
+    current, entered = _forward(base, base, rules, run, log, base_gap)
+    standing_now: tuple[Standing, ...] = ()
+    for _ in range(MOST_SWAPS):
+        current, standing_now, changed = _examined(base, current, entered, rules, run, log)
+        if not changed:
+            break
+        current, entered = _forward(base, current, rules, run, log, base_gap)
+    lack_of_base = run(lack_of_fit, base, rules.coordinates, rules.draws, rules.seed)
+    lack = lack_of_base
+    if standing_now:
+        lack = run(lack_of_fit, current, rules.coordinates, rules.draws, rules.seed)
+    return Found(
+        base,
+        current,
+        standing_now,
+        tuple(log.stages),
+        lack_of_base,
+        lack,
+        exceeded(lack.null, rules.false_alarm),
+        base_gap,
+        whole_gap(current, current.fit),
+    )
+
+
+def _look(grounds: Grounds, rules: Rules, run: Run) -> Screen:
+    return run(look, grounds, rules.trials, rules.draws, rules.false_alarm, rules.seed)
+
+
+def _forward(
+    base: Grounds, current: Grounds, rules: Rules, run: Run, log: _Log, base_gap: Gap
+) -> tuple[Grounds, Refit | None]:
+    """Let effects enter; the grounds that are left, and the last that entered."""
+    last: Refit | None = None
+    while len(current.fit.hypothesis.supposed) < MOST_FORMS_NAMED:
+        screen = _look(current, rules, run)
+        number = len(current.fit.hypothesis.supposed) + 1
+        if screen.effects[0].log_evidence <= screen.threshold:
+            log.stages.append(Stage(f"round {number}", screen))
+            break
+        tried = refits(current, screen, rules.trials, run)
+        log.stages.append(Stage(f"round {number}", screen, tried))
+        best = _admitted(current, tried, screen, rules, base_gap)
+        if best is None:
+            break
+        current, last = current.at(best.fit), best
+    return current, last
+
+
+def _admitted(
+    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, base_gap: Gap
+) -> Refit | None:
+    """The best refit, if it may enter."""
+    supposed = current.fit.hypothesis.supposed
+    names = {one.form.name for one in supposed}
+    for one in tried:
+        if one.log_evidence <= screen.threshold:
+            return None
+        if supposed and one.gain < REAL_SHARE * base_gap.excess:
+            continue
+        if one.name in names or len(names) < rules.most_effects:
+            return one
+    return None
+
+
+def _examined(
+    base: Grounds,
+    current: Grounds,
+    entered: Refit | None,
+    rules: Rules,
+    run: Run,
+    log: _Log,
+) -> tuple[Grounds, tuple[Standing, ...], bool]:
+    """Each effect against its rivals; whether one left or gave way to a better one."""
+    stood: list[Standing] = []
+    supposed = standing(current.fit)
+    for number, one in enumerate(supposed):
+        others = tuple(other for k, other in enumerate(supposed) if k != number)
+        without = _without(base, others, run)
+        screen = _look(without, rules, run) if others else log.stages[0].screen
+        tried = refits(without, screen, rules.trials, run) if others else log.stages[0].refits
+        own = _own(without, one, tried, rules, run)
+        log.stages.append(Stage(f"in the place of {one.form.name}", screen, tried))
+        if own.log_evidence <= screen.threshold:
+            return without, (), True
+        best = max(tried, key=lambda other: other.log_evidence, default=own)
+        if best.name != one.form.name and best.log_evidence > own.log_evidence:
+            return without.at(best.fit), (), True
+        rivals = _rivals(own, tried, screen)
+        stood.append(Standing(one, own.log_evidence, own.gain, rivals))
+    return current, tuple(stood), False
+
+
+def _without(base: Grounds, others: Sequence[Supposed], run: Run) -> Grounds:
+    """Grounds with the other effects alone."""
+    if not others:
+        return base
+    fit: JointFit = run(joint_fit, base.suppose(others), base.setting)
+    return base.at(fit)
+
+
+def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], rules: Rules, run: Run) -> Refit:
+    """The effect itself beside the others: as tried already, or refitted from where it stands."""
+    same = [other for other in tried if other.form == one.form]
+    if same:
+        return same[0]
+    trials = next(t for t in rules.trials if t.effect == one.form.name)
+    return refit(without, one, trials, run)
+
+
+def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, ...]:
+    """Other effects by their evidence: of the best refit, else of the screen."""
+    evidence = {one.effect: one.log_evidence for one in screen.effects}
+    refitted: dict[str, float] = {}
+    for other in tried:
+        refitted[other.name] = max(refitted.get(other.name, -1e300), other.log_evidence)
+    evidence |= refitted
+    evidence.pop(own.name)
+    ranked = sorted(evidence.items(), key=lambda item: -item[1])
+    return tuple(Rival(name, own.log_evidence - value) for name, value in ranked)
+
+
+__all__ = ["Found", "Rival", "Rules", "Stage", "Standing", "search"]

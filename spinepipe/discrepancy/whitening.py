@@ -1,0 +1,122 @@
+"""Whitening: readings of a specimen as numbers of SD one, independent, nuisances taken out.
+
+The covariance of the readings is that of the noise plus ``U U'``, the nuisances' share. With V the
+noise covariance and V^-1/2 U = P S Q', the inverse root of the whole is
+(I + P ((1 + S^2)^-1/2 - I) P') V^-1/2.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.discrepancy.noise import Noise
+from spinepipe.discrepancy.readings import Repeats
+from spinepipe.effects.contract import Array
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Makes residuals of one specimen, or their derivatives, independent with SD one.
+
+    Attributes
+    ----------
+    used : per test (T, J, 6), which readings there are.
+    roots : per test (J, 6, T, T), inverse root of the noise covariance on the steps that are used.
+    directions : (N, k) orthonormal directions in which nuisances move the readings.
+    shrink : (k,) factor less one by which these are shortened.
+    """
+
+    used: tuple[NDArray[np.bool_], ...]
+    roots: tuple[Array, ...]
+    directions: Array
+    shrink: Array
+
+    @property
+    def count(self) -> int:
+        """N, number of readings."""
+        return sum(int(used.sum()) for used in self.used)
+
+    def noise_only(self, rows: Sequence[Array]) -> Array:
+        """(N,) or (N, m) of rows (T, J, 6) or (T, J, 6, m) per test: noise has SD one."""
+        return np.concatenate(
+            [
+                _applied(root, used, array)
+                for root, used, array in zip(self.roots, self.used, rows, strict=True)
+            ]
+        )
+
+    def __call__(self, rows: Sequence[Array]) -> Array:
+        """(N,) or (N, m): noise and nuisances together have SD one."""
+        return self.shortened(self.noise_only(rows))
+
+    def shortened(self, white: Array) -> Array:
+        """Noise-whitened rows (N, ...) with the nuisances' share taken out."""
+        inside = self.directions.T @ white
+        shrink = self.shrink if white.ndim == 1 else self.shrink[:, None]
+        result: Array = white + self.directions @ (shrink * inside)
+        return result
+
+    def left_over(self, white: Array) -> Array:
+        """(N,) of noise-whitened residuals (N,) with nuisances at their most likely values."""
+        result: Array = self.shortened(self.shortened(white))
+        return result
+
+    @property
+    def freedom(self) -> Array:
+        """(N,) degrees of freedom that each reading keeps beside the nuisances."""
+        taken = 1.0 - (1.0 + self.shrink) ** 2
+        result: Array = 1.0 - self.directions**2 @ taken
+        return result
+
+
+def whitening(tests: Sequence[Repeats], noise: Noise) -> Whitening:
+    """Whitening for the mean over the cycles, without nuisances."""
+    used = tuple(test.count > 0 for test in tests)
+    roots = tuple(_roots(test, noise) for test in tests)
+    count = sum(int(one.sum()) for one in used)
+    return Whitening(used, roots, np.zeros((count, 0)), np.zeros(0))
+
+
+def with_nuisances(plain: Whitening, moved: Sequence[Array]) -> Whitening:
+    """The whitening with nuisances; ``moved`` (T, J, 6, k) per test by one prior SD of each."""
+    directions, sizes, _ = np.linalg.svd(plain.noise_only(moved), full_matrices=False)
+    seen = sizes > 1e-3
+    shrink = 1.0 / np.sqrt(1.0 + sizes[seen] ** 2) - 1.0
+    return Whitening(plain.used, plain.roots, directions[:, seen], shrink)
+
+
+def _roots(test: Repeats, noise: Noise) -> Array:
+    steps, joints = test.count.shape[:2]
+    serial = noise.correlations(steps)
+    roots = np.zeros((joints, 6, steps, steps))
+    known: dict[bytes, Array] = {}
+    for joint in range(joints):
+        for coordinate in range(6):
+            count = test.count[:, joint, coordinate]
+            key = count.tobytes()
+            if key not in known:
+                known[key] = _inverse_root(serial, count)
+            if count.any():
+                roots[joint, coordinate] = known[key] / noise.sd[coordinate]
+    return roots
+
+
+def _inverse_root(serial: Array, count: NDArray[np.int64]) -> Array:
+    """(T, T) inverse root of the covariance of means over ``count`` (T,) cycles; 0 where none."""
+    used = np.flatnonzero(count)
+    root = np.zeros_like(serial)
+    if len(used):
+        shrunk = 1.0 / np.sqrt(count[used])
+        factor = np.linalg.cholesky(serial[np.ix_(used, used)] * np.outer(shrunk, shrunk))
+        root[np.ix_(used, used)] = np.linalg.inv(factor)
+    return root
+
+
+def _applied(root: Array, used: NDArray[np.bool_], rows: Array) -> Array:
+    """(N, ...) rows of one test whitened over its load steps."""
+    flat = rows.reshape(*rows.shape[:3], -1)
+    there = np.where(used[..., None], flat, 0.0).transpose(1, 2, 0, 3)
+    white = (root @ there).transpose(2, 0, 1, 3)[used]
+    return white[:, 0] if rows.ndim == 3 else white

@@ -1,0 +1,80 @@
+"""Laws that scale what a joint already has: they add a share of the load of the laws before them.
+
+``load_i = share(q_i, parameters) carried_i`` on some of the six coordinates. Such a strength is
+dimensionless or per newton, so joints of different stiffness can share it.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects.contract import Array, JointResponse
+from spinepipe.units import COORDINATES, ROTATIONS
+
+ALL_ROTATIONS = "rotations"
+"""Name of the three rotations together, where a law takes it for a coordinate."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of the carried load on C coordinates and its derivatives.
+
+    Attributes
+    ----------
+    value, by_q : (J, C) share, and its derivative by the coordinate it belongs to.
+    by_parameter : (J, C, P)
+    """
+
+    value: Array
+    by_q: Array
+    by_parameter: Array
+
+
+class CarriedShare(ABC):
+    """A joint law that adds ``share * carried`` on the coordinates at ``columns``."""
+
+    @property
+    @abstractmethod
+    def columns(self) -> list[int]:
+        """Which of the six coordinates are scaled."""
+
+    @abstractmethod
+    def share(self, q: Array, parameters: Array) -> Share:
+        """Share at the scaled coordinates q (J, C)."""
+
+    def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:
+        """Load (J, 6), tangent at fixed carried load and derivative by it, both (J, 6, 6)."""
+        at = self.columns
+        share = self.share(q[:, at], parameters)
+        load, (tangent, by_carried) = np.zeros_like(q), np.zeros((2, *q.shape, 6))
+        load[:, at] = share.value * carried[:, at]
+        tangent[:, at, at] = share.by_q * carried[:, at]
+        by_carried[:, at, at] = share.value
+        return JointResponse(load, tangent, by_carried)
+
+    def by_parameter(self, q: Array, parameters: Array, carried: Array) -> Array:
+        """(J, 6, P) derivative of the load at fixed q and carried load."""
+        at = self.columns
+        share = self.share(q[:, at], parameters)
+        derivative = np.zeros((*q.shape, share.by_parameter.shape[2]))
+        derivative[:, at] = share.by_parameter * carried[:, at, None]
+        return derivative
+
+
+def columns_of(coordinate: str) -> list[int]:
+    """Places of a coordinate, or of the three rotations, among the six."""
+    names = ROTATIONS if coordinate == ALL_ROTATIONS else (coordinate,)
+    return [COORDINATES.index(name) for name in names]
+
+
+def require(effect: str, option: str, given: str, allowed: tuple[str, ...]) -> None:
+    """Refuse an option that is not among those allowed.
+
+    Raises
+    ------
+    ValueError
+        With what was given and what is allowed.
+    """
+    if given not in allowed:
+        raise ValueError(f"{effect}: {option} {given!r} is not one of {', '.join(allowed)}")

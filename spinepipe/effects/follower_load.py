@@ -1,0 +1,92 @@
+"""Follower load: compression along the spine, carried by a cable, that the model leaves out."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from spinepipe.effects.contract import (
+    AppliedLoad,
+    Array,
+    Indices,
+    Kind,
+    Motion,
+    Parameter,
+    Wrench,
+)
+from spinepipe.effects.registry import register
+from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.vertebra_points import nothing_applied, upper_ends
+
+
+@register("follower_load")
+@dataclass(frozen=True)
+class FollowerLoad:
+    """A cable under tension ``force`` from the top vertebra to ground; off at 0.
+
+    Each vertebra guides it at the origin of the joint above (the top one 30 mm above its joint),
+    ground at that of the lowest joint. It spans the joints in scope: at each it pulls the guide of
+    the upper vertebra towards that of the lower one, and the lower one back. Without translation
+    it passes through every joint's centre, as a follower load is meant to (Patwardhan 2003,
+    doi 10.1016/S0736-0266(02)00202-4).
+    """
+
+    name: ClassVar[str] = "follower_load"
+    kind: ClassVar[Kind] = Kind.LOAD
+    per_joint: ClassVar[bool] = False
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="force",
+            unit="N",
+            low=0.0,
+            high=2000.0,
+            default=100.0,
+            prior_scale=100.0,
+            logarithmic=False,
+            meaning="tension of the cable, which compresses the joints",
+            off=0.0,
+        ),
+    )
+    trial: ClassVar[Trial] = Trial(
+        variants=({},),
+        spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
+        told_by="measured translations: a compression through the joints' centres turns nothing",
+    )
+
+    def apply(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
+    ) -> AppliedLoad:
+        """Load of the cable and its tangent."""
+        one = _of_1_n(motion, joints)
+        return AppliedLoad(parameters[0, 0] * one.load, parameters[0, 0] * one.tangent)
+
+    def by_parameter(
+        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
+    ) -> Array:
+        """(n, 1, 1): the load is linear in the tension."""
+        return _of_1_n(motion, joints).load[:, None, None]
+
+
+def _of_1_n(motion: Motion, joints: Indices) -> AppliedLoad:
+    load, tangent = nothing_applied(motion)
+    guides = np.vstack([motion.joint_origins[0], upper_ends(motion)])
+    for joint in joints.tolist():
+        pull = _segment(motion, joint, guides[joint + 1], guides[joint])
+        load, tangent = load + pull.load, tangent + pull.tangent
+    return AppliedLoad(load, tangent)
+
+
+def _segment(motion: Motion, body: int, upper: Array, lower: Array) -> AppliedLoad:
+    """Unit tension between guides of a vertebra and the one below (or ground, which is still)."""
+    line = motion.displacement(body - 1).apply(lower) - motion.displacement(body).apply(upper)
+    length = float(np.linalg.norm(line))
+    along = line / length
+    pull = motion.wrench(body, upper, along, np.zeros(3))
+    load, tangent = pull.load, pull.tangent
+    closing = motion.velocities(body, upper)
+    if body > 0:
+        back = motion.wrench(body - 1, lower, -along, np.zeros(3))
+        load, tangent = load + back.load, tangent + back.tangent
+        closing = closing - motion.velocities(body - 1, lower)
+    across = closing - np.outer(closing @ along, along)
+    return AppliedLoad(load, tangent - across @ across.T / length)  # the line turns with the pose

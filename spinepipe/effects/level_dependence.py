@@ -1,0 +1,57 @@
+"""Level dependence: levels differ in stiffness where the model gives all of them the same."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from spinepipe.effects.carried_share import (
+    ALL_ROTATIONS,
+    CarriedShare,
+    Share,
+    columns_of,
+    require,
+)
+from spinepipe.effects.contract import Array, Kind, Parameter
+from spinepipe.effects.registry import register
+from spinepipe.effects.trial import Spread, Trial
+from spinepipe.units import COORDINATES, ROTATIONS
+
+
+@register("level_dependence")
+@dataclass(frozen=True)
+class LevelDependence(CarriedShare):
+    """Multiplies the carried load of one coordinate, or of all rotations, by ``ratio``; 1 is off.
+
+    Levels T12L1 to L5S1 of Gould 2024b (Table 2) differ by a factor of two to six: the logarithm
+    has an SD of 0.45 in extension, 0.7 in bending and 0.4 in rotation.
+    """
+
+    coordinate: str = "extension"
+    name: ClassVar[str] = "level_dependence"
+    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    per_joint: ClassVar[bool] = True
+    trial: ClassVar[Trial] = Trial(
+        variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
+        spreads=(Spread.BY_JOINT,),
+        told_by="motion of every level, with a base that gives all levels the same stiffness",
+    )
+
+    def __post_init__(self) -> None:
+        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The ratio alone."""
+        meaning = f"stiffness of this level in {self.coordinate} over the model's"
+        return (Parameter("ratio", "1", 0.01, 100.0, 1.3, 0.5, True, meaning, off=1.0),)
+
+    @property
+    def columns(self) -> list[int]:
+        """The one coordinate, or the three rotations."""
+        return columns_of(self.coordinate)
+
+    def share(self, q: Array, parameters: Array) -> Share:
+        """``ratio - 1``, wherever the joint is."""
+        value = np.broadcast_to(parameters - 1.0, q.shape)
+        return Share(value, np.zeros_like(q), np.ones((*q.shape, 1)))

@@ -1,0 +1,57 @@
+"""Local laxity: one joint has lost part of its stiffness."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from spinepipe.effects.carried_share import (
+    ALL_ROTATIONS,
+    CarriedShare,
+    Share,
+    columns_of,
+    require,
+)
+from spinepipe.effects.contract import Array, Kind, Parameter
+from spinepipe.effects.registry import register
+from spinepipe.effects.trial import Spread, Trial
+from spinepipe.units import COORDINATES, ROTATIONS
+
+
+@register("local_laxity")
+@dataclass(frozen=True)
+class LocalLaxity(CarriedShare):
+    """Takes ``fraction`` of the carried load of one coordinate, or of all rotations; 0 is off.
+
+    A cut ligament or a degenerate disc of one joint of one specimen, of any size up to the loss
+    of nearly all resistance.
+    """
+
+    coordinate: str = "extension"
+    name: ClassVar[str] = "local_laxity"
+    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    per_joint: ClassVar[bool] = True
+    trial: ClassVar[Trial] = Trial(
+        variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
+        spreads=(Spread.ONE,),
+        told_by="motion of every level of several specimens, with a base that shares stiffness",
+    )
+
+    def __post_init__(self) -> None:
+        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The fraction alone."""
+        meaning = f"part of the stiffness in {self.coordinate} that is lost"
+        return (Parameter("fraction", "1", 0.0, 0.95, 0.3, 0.3, False, meaning, off=0.0),)
+
+    @property
+    def columns(self) -> list[int]:
+        """The one coordinate, or the three rotations."""
+        return columns_of(self.coordinate)
+
+    def share(self, q: Array, parameters: Array) -> Share:
+        """``-fraction``, wherever the joint is."""
+        value = np.broadcast_to(-parameters, q.shape)
+        return Share(value, np.zeros_like(q), -np.ones((*q.shape, 1)))

@@ -1,0 +1,101 @@
+"""The angle of one joint at which a joint law, as published, balances a moment."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spinepipe.effects import Wrench, create
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.statics import Chain, System, follow
+
+# One upright weightless joint with a spring k under a moment M about its axis of extension
+
+K, UP, TURN = 50.0, 1e6, 290.0
+
+
+def angle(
+    moment: float,
+    name: str,
+    options: dict[str, Any],
+    *values: float,
+    compression: float = 0.0,
+) -> Array:
+    """(6,) coordinates of the one joint with a law."""
+    springs = ScopedEffect(create("linear_bushing"), (0,), np.array([[1e5, UP, 1e5, K, K, TURN]]))
+    law = ScopedEffect(create(name, options), (0,), np.array([values]))
+    model = SpineModel(
+        "one", ("J0",), (Pose(np.eye(3), np.zeros(3)),),
+        (Body("V0", 0.1, np.array([0.0, 0.02, 0.0]), 1e-4 * np.eye(3)),),
+        np.zeros(3), np.array([[1e3] * 3 + [2.0] * 3]), (springs, law),
+    )  # fmt: skip
+    force, turning = np.array([0.0, -compression, 0.0]), np.array([0.0, 0.0, moment])
+    wrenches = (Wrench(0, np.zeros(3), force, turning),)
+    case = LoadCase("test", 1, (LoadStep(0, wrenches),))
+    found = follow(System(Chain(model), model, case))[-1].equilibrium
+    assert found.status.usable, found.message
+    return found.q
+
+
+@pytest.mark.parametrize("moment", [-7.5, 1.0, 7.5])
+class TestOneJoint:
+    """The angle at which the published law balances the moment."""
+
+    def test_exponential(self, moment: float) -> None:
+        found = angle(moment, "nonlinear_stiffening", {"shape": "exponential"}, 10.0)
+        expected = np.sign(moment) * np.log1p(10.0 * abs(moment) / K) / 10.0
+        # rounding |q| over 1e-4 rad moves it by some 1e-8 rad
+        assert found[3] == pytest.approx(expected, abs=5e-8)
+
+    def test_tangent(self, moment: float) -> None:
+        found = angle(moment, "nonlinear_stiffening", {"shape": "tangent"}, 75.0)
+        root = np.sqrt(75.0)
+        assert found[3] == pytest.approx(np.arctan(moment * root / K) / root, abs=1e-14)
+
+    def test_cubic(self, moment: float) -> None:
+        found = angle(moment, "nonlinear_stiffening", {"shape": "cubic"}, 50.0)
+        roots = np.roots([K * 50.0, 0.0, K, -moment])
+        (expected,) = roots[np.abs(roots.imag) < 1e-9].real
+        assert found[3] == pytest.approx(expected, abs=1e-14)
+
+    def test_neutral_zone(self, moment: float) -> None:
+        found = angle(moment, "neutral_zone", {}, 0.4, 0.06)
+        inside = moment / (0.4 * K)
+        outside = np.sign(moment) * (abs(moment) / K + 0.6 * 0.06)
+        expected = inside if abs(inside) < 0.054 else outside
+        assert found[3] == pytest.approx(expected, abs=1e-14)
+
+    def test_asymmetry(self, moment: float) -> None:
+        found = angle(moment, "flexion_extension_asymmetry", {}, 0.2)
+        expected = moment / (K * (1.2 if moment > 0 else 0.8))
+        # tanh of 0.017 / 0.0017 is 1 - 4e-9
+        assert found[3] == pytest.approx(expected, abs=1e-10)
+
+    @pytest.mark.parametrize(("side", "way"), [("positive", 1.0), ("negative", -1.0)])
+    def test_stop(self, moment: float, side: str, way: float) -> None:
+        found = angle(moment, "facet_contact", {"side": side}, 100.0, 0.05)
+        free, stopped = moment / K, (moment + way * 100.0 * 0.05) / (K + 100.0)
+        expected = stopped if way * free > 0.05 else free
+        assert found[3] == pytest.approx(expected, abs=1e-14)
+
+    def test_level_and_laxity(self, moment: float) -> None:
+        stiff, lax = (angle(moment, n, {}, v)[3] for n, v in (("level_dependence", 1.3),
+                                                             ("local_laxity", 0.3)))  # fmt: skip
+        assert stiff == pytest.approx(moment / (1.3 * K), abs=1e-14)
+        assert lax == pytest.approx(moment / (0.7 * K), abs=1e-14)
+
+    def test_coupling(self, moment: float) -> None:
+        found = angle(
+            moment, "bending_rotation_coupling", {"pair": ("anterior", "extension")}, 900.0
+        )
+        expected = np.linalg.solve([[1e5, 900.0], [900.0, K]], [0.0, moment])
+        np.testing.assert_allclose(found[[0, 3]], expected, rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("compression", [400.0, -200.0])
+    def test_preload(self, moment: float, compression: float) -> None:
+        """A force through the joint's origin stays there, so it compresses and does not turn."""
+        found = angle(moment, "preload_stiffening", {}, 1e-3, compression=compression)
+        assert found[1] == pytest.approx(-compression / UP, abs=1e-14)
+        assert found[3] == pytest.approx(moment / (K * (1.0 + 1e-3 * compression)), abs=1e-14)

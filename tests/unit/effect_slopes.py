@@ -1,0 +1,134 @@
+"""Derivatives that effects state, against differences: of their own values, of solved motion."""
+
+from collections.abc import Callable
+
+import numpy as np
+from example_effects import loaded, slope, spine
+
+from spinepipe.effects import GeometryEffect
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.statics import (
+    Chain,
+    FreeParameter,
+    System,
+    by_parameters,
+    declared,
+    follow,
+    free_parameters,
+    moved,
+    observe,
+    observed_by_parameters,
+)
+
+STEP = 1e-3
+"""m and rad: fourth-order differences over it are good to 1e-12 of smooth functions of order 1."""
+
+
+def system_with(*effects: ScopedEffect, case: LoadCase | None = None) -> System:
+    """Three tilted joints under gravity and three load steps, with effects."""
+    model = spine(3, effects=effects)
+    return System(Chain(model), model, case or loaded(model))
+
+
+def fresh(system: System) -> System:
+    """The system on a chain loaded anew: loading another model leaves earlier ones stale."""
+    return System(Chain(system.model), system.model, system.case)
+
+
+def poses(n: int = 4) -> Array:
+    """(n, 6) motions of some mm and up to half a radian, and the neutral pose."""
+    rng = np.random.default_rng(3)
+    moves = np.hstack([rng.uniform(-5e-3, 5e-3, (n, 3)), rng.uniform(-0.5, 0.5, (n, 3))])
+    return np.vstack([moves, np.zeros(6)])
+
+
+def slopes(function: Callable[[Array], Array], at: Array) -> Array:
+    """(…, K) derivatives by each column of ``at`` (J, K), which all rows move along together."""
+    directions = np.eye(at.shape[1])
+    each = [slope(lambda h, along=d: function(at + h * along), STEP) for d in directions]
+    return np.stack(each, axis=-1)
+
+
+def assert_placement_derivatives(effect: GeometryEffect, q: Array, values: Array) -> None:
+    """First and second derivatives by q, and both placements' derivatives by the parameters."""
+    placed, by_parameter = effect.place(q, values), effect.by_parameter(q, values)
+    for found, expected in (
+        (placed.by_coordinate, slopes(lambda at: effect.place(at, values).q, q)),
+        (placed.by_coordinates, slopes(lambda at: effect.place(at, values).by_coordinate, q)),
+        (by_parameter.q, slopes(lambda at: effect.place(q, at).q, values)),
+        (by_parameter.by_coordinate, slopes(lambda at: effect.place(q, at).by_coordinate, values)),
+    ):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def assert_tangent(system: System) -> None:
+    """The tangent is the slope of the residual at a bent pose, under the second step's load."""
+    q = np.tile([1e-3] * 3 + [0.15] * 3, 3) * np.random.default_rng(1).normal(size=18)
+    system = fresh(system)
+    loading = system.slots.loading(system.case.steps[1].wrenches)
+    states = system.initial_states()
+    tangent = system.balance(q, loading, states).tangent
+    for column, size in enumerate(np.tile([1e-4] * 3 + [1e-3] * 3, 3)):
+        along = size * np.eye(18)[column]
+        expected = slope(lambda h, a=along: system.balance(q + h * a, loading, states).residual, 1)
+        # fourth-order differences: 1e-12 of loads up to 1e3, over a step of 1e-4 m or 1e-3 rad
+        np.testing.assert_allclose(tangent[:, column], expected / size, rtol=1e-7, atol=1e-4)
+
+
+def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
+    """All parameters of all effects but the springs', joint by joint."""
+    return tuple(
+        unknown
+        for number, here in enumerate(model.effects)
+        if number
+        for unknown in free_parameters(
+            model, number, [p.name for p in here.effect.parameters], "per_joint"
+        )
+    )
+
+
+def reported(system: System, free: tuple[FreeParameter, ...] = (), x: Array | None = None) -> Array:
+    """(T, J, 6) solved afresh and reported, with the unknowns moved by x."""
+    other = fresh(system).with_model(moved(system.model, free, np.zeros(0) if x is None else x))
+    steps = follow(other)
+    assert all(step.usable for step in steps)
+    return np.stack([observe(other, step.equilibrium.q) for step in steps])
+
+
+def reported_by_parameters(system: System, free: tuple[FreeParameter, ...]) -> Array:
+    """(T, J, 6, m) sensitivities of what is reported."""
+    system = fresh(system)
+    solved = follow(system)
+    each = zip(solved, by_parameters(system, solved, free), strict=True)
+    return np.stack(
+        [observed_by_parameters(system, step.equilibrium.q, dq, free) for step, dq in each]
+    )
+
+
+def assert_sensitivities(system: System) -> None:
+    """Sensitivities to every parameter are slopes of motion solved afresh."""
+    free = unknowns(system.model)
+    found = reported_by_parameters(system, free)
+    for column, unknown in enumerate(free):
+        along = declared(system.model, unknown).prior_scale * np.eye(len(free))[column]
+        expected = _slope_within(system, free, unknown, along)
+        # poses are solved to 1e-13 rad; what is left is the difference's own error
+        scale = np.abs(expected).max()
+        assert scale > 0.0
+        np.testing.assert_allclose(found @ along, expected, rtol=0, atol=1e-6 * scale)
+
+
+def _slope_within(
+    system: System, free: tuple[FreeParameter, ...], unknown: FreeParameter, along: Array
+) -> Array:
+    """(T, J, 6) slope of reported motion, one-sided for a value that may not become smaller."""
+
+    def motion(h: float) -> Array:
+        return reported(system, free, h * along)
+
+    values = system.model.effects[unknown.effect].values[list(unknown.rows), unknown.column]
+    if values.min() > declared(system.model, unknown).low:
+        return slope(motion, 0.04)
+    weights = (-25.0, 48.0, -36.0, 16.0, -3.0)  # forward difference of fourth order
+    return sum(w * motion(0.02 * k) for k, w in enumerate(weights)) / (12.0 * 0.02)

@@ -1,0 +1,178 @@
+"""Joint laws: derivatives against differences, what off means, and what is symmetric."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from example_effects import slope
+from joint_law_cases import (
+    EVERY,
+    ON_TRANSLATIONS,
+    VARIANTS,
+    defaults,
+    law_of,
+    off,
+    title,
+)
+
+from spinepipe.effects import JointLaw, Parameter, create
+from spinepipe.effects.contract import Array
+from spinepipe.units import COORDINATES
+
+
+def anywhere(n: int) -> tuple[Array, Array]:
+    """Coordinates up to some degrees and millimetres, and loads unrelated to them."""
+    rng = np.random.default_rng(3)
+    sizes = np.array([1e-3] * 3 + [0.12] * 3)
+    return sizes * rng.normal(size=(n, 6)), rng.normal(0.0, [300.0] * 3 + [8.0] * 3, (n, 6))
+
+
+def places(law: JointLaw) -> tuple[Array, Array, Array]:
+    """Coordinates, loads and values at random, and at and around each corner of the law."""
+    around = np.array([0.0, 1e-5, 3e-4, 0.93, 0.97, 1.0, 1.04, 1.2])
+    corners = np.concatenate([around * c for c in (*corners_of(law), -corners_of(law)[0])])
+    q, carried = anywhere(40 + len(corners))
+    sizes = np.array([1e-3] * 3 + [0.05] * 3)
+    unit = sizes if len(corners_of(law)) == 1 else np.ones(6)
+    q[40:] = corners[:, None] * unit
+    values = defaults(law, len(q)) * np.random.default_rng(4).uniform(0.7, 1.0, (len(q), 1))
+    values[40:] = defaults(law)
+    return q, carried, values
+
+
+def corners_of(law: JointLaw) -> tuple[float, ...]:
+    """Where a law at its defaults has a rounded corner or goes on straight; 1 for none."""
+    first, last = law.parameters[0].default, law.parameters[-1].default
+    shape = getattr(law, "shape", None)
+    if shape == "exponential":
+        return 10.0 / first, -10.0 / first
+    if shape == "tangent":
+        return 1.4 / np.sqrt(first), -1.4 / np.sqrt(first)
+    return (last, -last) if len(law.parameters) == 2 else (1.0,)
+
+
+STEP = np.array([1e-9] * 3 + [1e-7] * 3)
+"""m and rad; far below the narrowest rounding, so that no corner is stepped over."""
+
+
+@EVERY
+def test_tangent_is_the_slope_by_the_coordinates(variant) -> None:
+    law = law_of(variant)
+    q, carried, values = places(law)
+    found = law.respond(q, values, carried).tangent
+    for at, (along, step) in enumerate(zip(np.eye(6), STEP, strict=True)):
+
+        def load(h: float, along: Array = along) -> Array:
+            return law.respond(q + h * along, values, carried).load
+
+        close(found[:, :, at], slope(load, step))
+
+
+@EVERY
+def test_by_carried_is_the_slope_by_the_carried_load(variant) -> None:
+    law = law_of(variant)
+    q, carried, values = places(law)
+    found = law.respond(q, values, carried).by_carried
+    found = np.zeros((*q.shape, 6)) if found is None else found
+    for at, along in enumerate(np.eye(6)):
+
+        def load(h: float, along: Array = along) -> Array:
+            return law.respond(q, values, carried + h * along).load
+
+        close(found[:, :, at], slope(load, 1.0))
+
+
+@pytest.mark.parametrize("where", [defaults, off])
+@EVERY
+def test_by_parameter_is_the_slope_by_the_parameters(variant, where: Callable) -> None:
+    law = law_of(variant)
+    q, carried, values = places(law)
+    values = values if where is defaults else where(law, len(q))
+    found = law.by_parameter(q, values, carried)
+    directions = np.eye(len(law.parameters))
+    for at, (along, parameter) in enumerate(zip(directions, law.parameters, strict=True)):
+
+        def load(h: float, along: Array = along) -> Array:
+            return law.respond(q, values + h * along, carried).load
+
+        close(found[:, :, at], slope(load, 1e-6 * parameter.prior_scale * scale(parameter)))
+
+
+def scale(parameter: Parameter) -> float:
+    return parameter.default if parameter.logarithmic else 1.0
+
+
+def close(found: Array, expected: Array) -> None:
+    """Equal to what differences resolve: 1e-16 of a load over a relative step of 1e-6 or more."""
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-7 * size)
+
+
+@pytest.mark.parametrize("shape", ["exponential", "tangent"])
+def test_laws_near_zero_are_as_exact_as_elsewhere(shape: str) -> None:
+    """The laws again in extended precision, where differences of nearly equal numbers matter."""
+    law = law_of(("nonlinear_stiffening", {"shape": shape}))
+    v = np.array([1e-6, 3e-4, 9.9e-4, 1.01e-3, 0.02, 0.5], np.longdouble)
+    if shape == "exponential":
+        share, by_v, size = np.expm1(v) / v - 1, (np.exp(v) - np.expm1(v) / v) / v, 0.1
+    else:
+        x, size = np.sqrt(v), 0.01
+        share, by_v = np.tan(x) / x - 1, (1 / np.cos(x) ** 2 - np.tan(x) / x) / (2 * v)
+    q, carried = np.zeros((6, 6)), np.ones((6, 6))
+    q[:, 3] = 0.1
+    if shape == "exponential":
+        q[:, 3] = np.sqrt(0.1**2 - 1e-4**2)  # rounded to 0.1
+    values = v.astype(float)[:, None] / size
+    found = law.respond(q, values, carried).load[:, 3]
+    np.testing.assert_allclose(found, share.astype(float), rtol=0, atol=4e-16)
+    slopes = law.by_parameter(q, values, carried)[:, 3, 0] / size
+    np.testing.assert_allclose(slopes, by_v.astype(float), rtol=5e-13, atol=0)
+
+
+# Off, and what is symmetric
+
+
+@EVERY
+def test_off_is_exactly_nothing_but_says_what_it_would_do(variant) -> None:
+    law = law_of(variant)
+    q, carried = anywhere(30)
+    response = law.respond(q, off(law, 30), carried)
+    np.testing.assert_array_equal(response.load, 0.0)
+    np.testing.assert_array_equal(response.tangent, 0.0)
+    if response.by_carried is not None:
+        np.testing.assert_array_equal(response.by_carried, 0.0)
+    signature = law.by_parameter(q, off(law, 30), carried)
+    strengths = [p.off is not None for p in law.parameters]
+    assert sum(strengths) == 1
+    np.testing.assert_array_equal(signature[:, :, ~np.array(strengths)], 0.0)
+    touched = np.abs(signature[:, :, strengths]).max(axis=(1, 2)) > 0.0
+    # a stop to one side is met by some of the joints, all else by all
+    assert touched.any() if variant[0] == "facet_contact" else touched.all()
+
+
+@pytest.mark.parametrize("variant", [
+    v for v in (*VARIANTS, *ON_TRANSLATIONS)
+    if v[0] not in ("facet_contact", "preload_stiffening")
+], ids=title)  # fmt: skip
+def test_the_mirrored_joint_has_the_mirrored_law(variant) -> None:
+    law = law_of(variant)
+    q, carried = anywhere(30)
+    here, there = (law.respond(s * q, defaults(law, 30), s * carried) for s in (1.0, -1.0))
+    parity = 1.0 if variant[0] == "flexion_extension_asymmetry" else -1.0
+    np.testing.assert_array_equal(there.load, parity * here.load)
+    np.testing.assert_array_equal(there.tangent, -parity * here.tangent)
+
+
+@pytest.mark.parametrize("coordinate", COORDINATES)
+def test_the_two_stops_mirror_each_other(coordinate: str) -> None:
+    q, carried = anywhere(30)
+    one, other = (
+        create("facet_contact", {"coordinate": coordinate, "side": side})
+        for side in ("positive", "negative")
+    )
+    values = defaults(one, 30)
+    here, there = one.respond(q, values, carried), other.respond(-q, values, carried)
+    assert here.load.any()
+    assert (here.load >= 0.0).all()
+    np.testing.assert_array_equal(there.load, -here.load)
+    np.testing.assert_array_equal(there.tangent, here.tangent)

@@ -1,0 +1,277 @@
+"""Hysteresis and creep: closed forms of one joint, derivatives along a path, corners passed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from example_effects import (
+    POINTS,
+    CubicStiffening,
+    FollowerLoad,
+    JointCentreOffset,
+    Laxity,
+    Relaxation,
+    loaded,
+    scoped,
+    slope,
+    spine,
+)
+from path_effect_cases import (
+    EXTENSION_SPRING,
+    angles,
+    branches,
+    creeping,
+    friction,
+    one_joint,
+    turning,
+)
+from scipy.integrate import simpson
+
+from spinepipe.effects import create
+from spinepipe.effects.contract import Array
+from spinepipe.statics import (
+    Chain,
+    FreeParameter,
+    System,
+    by_parameters,
+    declared,
+    follow,
+    free_parameters,
+    moved,
+)
+
+EVERYWHERE = (0, 1, 2)
+MIXED = (
+    scoped(CubicStiffening(), EVERYWHERE),
+    friction(3),
+    scoped(Relaxation(), (1, 2)),
+    creeping(3),
+    creeping(3, 0.2, 1.0, "left_rotation"),
+    scoped(Laxity(), EVERYWHERE, (0.1,)),
+    creeping(2, 0.15, 5.0),  # carried by all before it, other creep included
+    scoped(JointCentreOffset(), (0, 2), (0.008, -0.006), (-0.01, 0.004)),
+    scoped(FollowerLoad(2, POINTS[2]), EVERYWHERE),
+)
+PATHS = {
+    "hysteresis": (friction(3),),
+    "creep": (creeping(3),),
+    "creep of what hysteresis carries": (friction(3, coordinate="right_bending"),
+                                         creeping(3, coordinate="right_bending")),
+    "mixed": MIXED,
+}  # fmt: skip
+OFF = {"hysteresis": (friction(3, 0.0),), "creep": (creeping(3, 0.0),)}
+
+
+def unknowns(system: System, strengths_only: bool = False) -> tuple[FreeParameter, ...]:
+    """All parameters of all effects but the springs', joint by joint."""
+    return tuple(
+        unknown
+        for number, here in enumerate(system.model.effects)
+        if number
+        for unknown in free_parameters(
+            system.model,
+            number,
+            [p.name for p in here.effect.parameters if p.off is not None or not strengths_only],
+            "per_joint",
+        )
+    )
+
+
+def poses(system: System, free: tuple[FreeParameter, ...], x: Array) -> Array:
+    """(T, n) solved afresh with the unknowns moved by x."""
+    solved = follow(system.with_model(moved(system.model, free, x)))
+    assert all(step.usable for step in solved)
+    return np.stack([step.equilibrium.q for step in solved])
+
+
+def system_of(effects, steps: int = 6) -> System:
+    """Three tilted joints under gravity; loads grow, fall and turn back, 2 s a step."""
+    model = spine(3, effects=effects)
+    return System(Chain(model), model, loaded(model, steps))
+
+
+@pytest.mark.parametrize("effects", PATHS.values(), ids=PATHS)
+def test_sensitivities_along_a_path_are_slopes_of_solved_motion(effects) -> None:
+    system = system_of(effects)
+    free = unknowns(system)
+    found = np.stack(by_parameters(system, follow(system), free))
+    sizes = np.array(
+        [0.2 if u.logarithmic else 0.3 * declared(system.model, u).prior_scale for u in free]
+    )
+    for mixture in np.random.default_rng(3).choice([-1.0, 1.0], (3, len(free))) * sizes:
+
+        def motion(h: float, along: Array = mixture) -> Array:
+            return poses(system, free, h * along)
+
+        expected = slope(motion, 0.02)
+        scale = np.abs(expected).max()
+        # fourth-order differences across a law whose curvature jumps at the start of a step
+        np.testing.assert_allclose(found @ mixture, expected, rtol=0, atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize("effects", OFF.values(), ids=OFF)
+def test_a_strength_that_is_off_shows_how_it_would_act(effects) -> None:
+    plain = np.stack([step.equilibrium.q for step in follow(system_of(()))])
+    system = system_of(effects)
+    free = unknowns(system, strengths_only=True)
+    solved = follow(system)
+    found = np.stack(by_parameters(system, solved, free))
+    still = np.stack([step.equilibrium.q for step in solved])
+    np.testing.assert_allclose(still, plain, rtol=0, atol=1e-13)
+    for column, unknown in enumerate(np.eye(len(free))):
+        at = [poses(system, free, h * unknown) for h in 0.004 * np.arange(5)]
+        expected = np.tensordot([-25.0, 48.0, -36.0, 16.0, -3.0], at, 1) / (12.0 * 0.004)
+        scale = np.abs(expected).max()
+        assert scale > 0.0
+        np.testing.assert_allclose(found[..., column], expected, rtol=0, atol=1e-5 * scale)
+
+
+def test_parameters_of_shape_say_nothing_while_the_strength_is_off() -> None:
+    system = system_of((*OFF["hysteresis"], *OFF["creep"]))
+    shapes = [u for u in unknowns(system) if declared(system.model, u).off is None]
+    assert len(shapes) == 6
+    for by_x in by_parameters(system, follow(system), shapes):
+        assert not by_x.any()
+
+
+def test_a_step_without_a_change_of_load_changes_neither_pose_nor_derivative() -> None:
+    model = spine(3, effects=(friction(3, 1.0),))
+    system = System(Chain(model), model, turning(model, [2.0, 2.0, 1.0, 1.0, 1.0]))
+    free = unknowns(system)
+    cold = follow(system)
+    warm = follow(system, [step.equilibrium.q + 1e-3 for step in cold])
+    for solved in (cold, warm):
+        dq = by_parameters(system, solved, free)
+        for step, held in ((0, 1), (2, 3), (3, 4)):
+            np.testing.assert_allclose(
+                solved[held].equilibrium.q, solved[step].equilibrium.q, rtol=0, atol=1e-11
+            )
+            # the tangent is that of Newton's last but one pose: 1e-9 rad of 1e-4 yield angles
+            scale = np.abs(dq[step]).max()
+            np.testing.assert_allclose(dq[held], dq[step], rtol=0, atol=1e-3 * scale)
+
+
+def test_a_cycle_of_friction_takes_the_work_of_the_closed_form() -> None:
+    """Between -A and A the steady branches start from h = -+tanh(A / y): area 4 m (A - y tanh)."""
+    moment, yield_deg, largest = 0.8, 1.5, np.deg2rad(3.0)
+    y = np.deg2rad(yield_deg)
+    up = largest * np.linspace(-1.0, 1.0, 41)
+    start = np.tanh(largest / y)
+    rising = 1.0 - (1.0 + start) * np.exp(-(up + largest) / y)
+    # three rounds between the same two moments forget how the first one began: exp(-12)
+    there = np.array([EXTENSION_SPRING * largest + moment * start])
+    rounds = np.concatenate([there, -there] * 3)
+    one_way = EXTENSION_SPRING * up + moment * rising
+    model = one_joint(friction(1, moment, yield_deg))
+    found = angles(model, np.concatenate([rounds, one_way[1:], -one_way[1:]]))
+    q = found[5:]
+    # rounding of the corner: a share of 1e-4 yield angles in steps of 0.1
+    np.testing.assert_allclose(q, [*up, *-up[1:]], rtol=0, atol=1e-3 * moment / EXTENSION_SPRING)
+    loads = np.concatenate([one_way, -one_way[1:]])
+    work = simpson(loads[:41], x=q[:41]) + simpson(loads[40:], x=q[40:])
+    assert work == pytest.approx(4.0 * moment * (largest - y * start), rel=1e-3)
+
+
+@pytest.mark.parametrize("gravity", [False, True])
+def test_six_joints_go_through_loading_unloading_and_loading_again(gravity: bool) -> None:
+    effects = tuple(friction(6, coordinate=c) for c in ("extension", "right_bending"))
+    model = spine(6, gravity, effects)
+    solved = follow(System(Chain(model), model, turning(model, branches(7.5, 20))))
+    assert all(step.usable for step in solved)
+    assert max(step.equilibrium.iterations for step in solved) <= 8
+    q = np.stack([step.equilibrium.q.reshape(-1, 6)[:, 3] for step in solved])
+    loading, unloading, reloading = q[10], q[30], q[90]
+    # at 3.75 N m friction has changed sides: 0.5 N m each way on springs of 41 or 36 N m/rad
+    assert (unloading - loading > 0.5 * 2 * 0.5 / 41.0).all()
+    assert (unloading - reloading > 0.8 * 2 * 0.5 / 41.0).all()
+
+
+@pytest.mark.parametrize(("moment", "yield_deg", "steps"), [(0.5, 0.05, 3), (2.0, 0.1, 1),
+                                                            (5.0, 1.0, 3)])  # fmt: skip
+def test_corners_much_sharper_than_a_step_are_passed(moment, yield_deg, steps) -> None:
+    coordinates = ("extension", "right_bending", "left_rotation")
+    effects = tuple(friction(6, moment, yield_deg, c) for c in coordinates)
+    model = spine(6, effects=effects)
+    direction = np.array([0.3, 0.4, 0.85])
+    system = System(Chain(model), model, turning(model, branches(7.5, steps), direction))
+    for step in follow(system):
+        assert step.usable
+        left = system.residual(step.equilibrium.q, step.loading, step.states)
+        assert np.abs(left).max() < 1e-6
+        assert all(np.abs(after.state[:, 1]).max() < 1.01 for after in step.advances.values())
+
+
+def drift(fraction: float, per_time: float) -> tuple[Array, Array]:
+    """Found and exact extension while 2 N m are held for five time constants of 60 s.
+
+    k q = M + f z and dz/dt = (k q - z) / T give
+    q = M / k (1 + f / (1 - f) (1 - exp(-(1 - f) t / T))).
+    """
+    times = np.arange(0.0, 5.0 + 1e-9, per_time) * 60.0
+    found = angles(one_joint(creeping(1, fraction, 60.0)), np.full(len(times), 2.0), times)
+    kept = 1.0 - fraction
+    exact = 1.0 + fraction / kept * (1.0 - np.exp(-kept * times / 60.0))
+    return found, 2.0 / EXTENSION_SPRING * exact
+
+
+@pytest.mark.parametrize("fraction", [0.2, 0.5, 0.9])
+def test_a_held_load_creeps_by_the_closed_form(fraction: float) -> None:
+    errors = []
+    for per_time in (0.05, 0.1, 0.5, 1.0):
+        found, exact = drift(fraction, per_time)
+        in_the_end = 2.0 / EXTENSION_SPRING * fraction / (1.0 - fraction)
+        errors.append(np.abs(found - exact).max() / in_the_end)
+        assert found[0] == pytest.approx(exact[0], rel=1e-13)
+    assert errors[0] < 2e-5
+    assert errors[1] == pytest.approx(4.0 * errors[0], rel=0.1)  # falls with the square
+    assert errors[2] < 2e-3
+    assert errors[3] < 1e-2
+
+
+def test_one_long_step_ends_at_the_long_term_stiffness() -> None:
+    found = angles(one_joint(creeping(1, 0.5, 1.0)), np.full(2, 2.0), np.array([0.0, 1e9]))
+    assert found[1] == pytest.approx(2.0 / (0.5 * EXTENSION_SPRING), rel=1e-8)
+
+
+def test_where_no_time_is_recorded_nothing_creeps() -> None:
+    model = spine(3, effects=(creeping(3),))
+    with_creep, without = (
+        follow(System(Chain(m), m, turning(m, [2.0, 2.0, -1.0]))) for m in (model, spine(3))
+    )
+    for one, other in zip(with_creep, without, strict=True):
+        np.testing.assert_allclose(one.equilibrium.q, other.equilibrium.q, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("effect", ["hysteresis", "creep"])
+def test_each_cycle_starts_without_a_memory(effect: str) -> None:
+    model = spine(3, effects=PATHS[effect])
+    chain, once = Chain(model), loaded(model, 3)
+    first = follow(System(chain, model, once))
+    again = follow(System(chain, model, replace(once, cycle=2)))
+    on = follow(System(chain, model, loaded(model, 6)))[3:]
+    for one, other, later in zip(first, again, on, strict=True):
+        np.testing.assert_array_equal(other.equilibrium.q, one.equilibrium.q)
+        assert np.abs(later.equilibrium.q - one.equilibrium.q).max() > np.deg2rad(0.05)
+
+
+@pytest.mark.parametrize("seconds", [1e-7, 1e-3, 0.0299, 0.0301, 2.0, 300.0])
+def test_the_lag_has_its_derivative_by_time_at_any_length_of_step(seconds: float) -> None:
+    effect, state = create("creep"), np.array([[0.7, 1.9]])
+    carried = np.full((1, 6), 2.5)
+    log_time = np.log(3.0)
+
+    def lagged(h: float) -> Array:
+        parameters = np.array([[0.3, np.exp(log_time + h)]])
+        return effect.advance(carried, parameters, state, seconds, carried).state
+
+    at = np.array([[0.3, 3.0]])
+    found = 3.0 * effect.advance(carried, at, state, seconds, carried).by_parameter[0, :, 1]
+    np.testing.assert_allclose(found, slope(lagged, 1e-2)[0], rtol=1e-7, atol=3e-14)
+
+
+def test_options_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"coordinate 'anterior'; allowed: \('extension'"):
+        create("hysteresis", {"coordinate": "anterior"})
+    with pytest.raises(ValueError, match=r"coordinate 'twist'; allowed: \('anterior'"):
+        create("creep", {"coordinate": "twist"})
+    assert create("creep", {"coordinate": "superior"}).coordinate == "superior"
