@@ -37,6 +37,7 @@ include: "workflow/rules/joint_pose_sensitivity.smk"
 include: "workflow/rules/identification.smk"
 include: "workflow/rules/range_of_motion.smk"
 include: "workflow/rules/cohort_stiffness.smk"
+include: "workflow/rules/discrepancy.smk"
 
 
 rule all:

@@ -105,7 +105,7 @@ def _loads(u: Array, at: int, rotations: Sequence[str]) -> Array:
 
 def _motion(solved: Sequence[SolvedStep], loads: Array, at: int) -> Array:
     """(T, J, 6, K x J) motion by each term's load at each joint alone, terms first."""
-    steps, joints, count = loads.shape
+    _, joints, count = loads.shape
     moved = []
     for step, load in zip(solved, loads, strict=True):
         unit = np.zeros((6 * joints, joints))

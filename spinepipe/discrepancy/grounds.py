@@ -1,4 +1,4 @@
-"""The grounds a search stands on: readings, noise, and the base fitted with nuisances allowed for."""
+"""The grounds a search stands on: readings, noise, and the base fitted nuisances allowed for."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

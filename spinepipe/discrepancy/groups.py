@@ -68,7 +68,7 @@ class Index:
         by_specimen = spread in (Spread.BY_SPECIMEN, Spread.EACH)
         by_joint = spread in (Spread.BY_JOINT, Spread.EACH)
         wanted = tests if spread is Spread.BY_TEST else (EVERY_TEST,)
-        found = []
+        found: list[tuple[int, tuple[object, ...]]] = []
         for (variant, at, test, joint, strength), numbers in self._at.items():
             if (variant, at) != (form.variant, sds) or test not in wanted:
                 continue
@@ -111,10 +111,11 @@ def summed(
     for specimen, columns, owners in places:
         onto = np.zeros((count, len(columns)))
         onto[owners, np.arange(len(columns))] = 1.0
-        gram += onto @ problem.gram[specimen][np.ix_(columns, columns)] @ onto.T
-        moments += onto @ problem.moments[specimen][columns]
-        coupled += onto @ problem.shared[specimen][columns]
-        raw += onto @ problem.raw[specimen][columns]
+        part = problem.of[specimen]
+        gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
+        moments += onto @ part.moments[columns]
+        coupled += onto @ part.shared[columns]
+        raw += onto @ part.raw[columns]
     if coupled.shape[1]:
         gain = coupled @ np.linalg.pinv(problem.gram_shared, rcond=1e-10, hermitian=True)
         gram = gram - gain @ coupled.T

@@ -149,7 +149,7 @@ def _unknowns(
             place: list[str] = []
             if is_strength and spread in (Spread.BY_SPECIMEN, Spread.EACH, Spread.ONE):
                 place.append(specimen)
-            if is_strength and own_rows or one.form.joint is not None:
+            if (is_strength and own_rows) or one.form.joint is not None:
                 place.append(model.joints[scoped.joints[rows[0]]])
             if spread is Spread.BY_TEST and is_strength:
                 place.append(scoped.tests[0])
@@ -171,7 +171,10 @@ def _unknown(
     limits = declared(model, free)
     start = float(model.effects[index].values[rows[0], column])
     centre = limits.default if limits.off is None else limits.off
-    move = (lambda value: np.log(value / start)) if limits.logarithmic else (lambda v: v - start)
+
+    def move(value: float) -> float:
+        return float(np.log(value / start)) if limits.logarithmic else value - start
+
     low = move(limits.low) if limits.low > 0.0 or not limits.logarithmic else -np.inf
     width = 1.0 if limits.off is None else STRENGTH_SDS
     label = "|".join([str(number), variant.effect, parameter.name, *place])
@@ -181,9 +184,9 @@ def _unknown(
         column,
         place,
         limits.off is not None,
-        float(low),
-        float(move(limits.high)),
-        float(move(centre)),
+        low,
+        move(limits.high),
+        move(centre),
         width * limits.prior_scale,
     )
     return free, unknown

@@ -128,7 +128,7 @@ class _Points:
         rows, targets = [], []
         for name, member in self.hypothesis.members.items():
             own = np.column_stack([found[1][name], found[0][name]])
-            triangle = np.linalg.qr(own, mode="r")
+            triangle = np.linalg.qr(own).R
             block = np.zeros((len(triangle), len(x)))
             np.add.at(block.T, np.array(member.numbers), triangle[:, :-1].T)
             rows.append(block)

@@ -10,7 +10,14 @@ from scipy.special import logsumexp
 from spinepipe.discrepancy.evidence import Group
 from spinepipe.discrepancy.generic import FAMILIES, Term, generic_columns
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.projected import Linearised, linearised, taken_out
+from spinepipe.discrepancy.projected import (
+    Linearised,
+    Products,
+    drawn,
+    linearised,
+    products,
+    taken_out,
+)
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.units import ROTATIONS
@@ -72,17 +79,18 @@ def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: 
 def _problem(
     grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int
 ) -> tuple[tuple[Term, ...], Linearised]:
-    white, raw = {}, {}
+    parts: dict[str, Products] = {}
     terms: tuple[Term, ...] = ()
-    for name, one in grounds.readings.items():
+    taken = taken_out(grounds.fit)
+    for number, (name, one) in enumerate(grounds.readings.items()):
         model = grounds.fit.models[name]
         found = generic_columns(model, one.cases, grounds.noise.zeroed, coordinates)
         plain = grounds.plain[name].noise_only(found.moved)
-        raw[name] = np.sum(plain**2, axis=0)
-        white[name] = grounds.setting.whitenings[name].shortened(plain)
+        white = grounds.setting.whitenings[name].shortened(plain)
+        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
+        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
         terms = found.terms
-    rng = np.random.default_rng(seed)
-    return terms, linearised(taken_out(grounds.fit), white, raw, draws, rng)
+    return terms, linearised(parts)
 
 
 def _part(
@@ -97,14 +105,14 @@ def _part(
     onto = np.zeros((len(order), len(chosen)))
     onto[[order[key] for key in keys], np.arange(len(chosen))] = 1.0
     grams, moments = [], []
-    for name in problem.gram:
-        grams.append(onto @ problem.gram[name][np.ix_(chosen, chosen)] @ onto.T)
-        moments.append(onto @ problem.moments[name][chosen])
-    coupled = [onto @ problem.shared[name][chosen] for name in problem.gram]
+    for part in problem.of.values():
+        grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)
+        moments.append(onto @ part.moments[chosen])
+    coupled = [onto @ part.shared[chosen] for part in problem.of.values()]
     if spread is Spread.EACH:
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:
-        gram, moment, shared = sum(grams), sum(moments), sum(coupled)
+        gram, moment, shared = _added(grams), _added(moments), _added(coupled)
     if shared.shape[1]:
         gain = shared @ np.linalg.pinv(problem.gram_shared, rcond=1e-10, hermitian=True)
         gram, moment = gram - gain @ shared.T, moment - gain @ problem.moments_shared
@@ -112,3 +120,8 @@ def _part(
     estimate = group.estimate(moment[:, 0])
     explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)
     return _Part(family, coordinate, spread, group.log_evidence(moment), explained)
+
+
+def _added(arrays: Sequence[Array]) -> Array:
+    total: Array = np.sum(arrays, axis=0)
+    return total

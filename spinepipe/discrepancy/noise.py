@@ -1,7 +1,7 @@
-"""Noise of the readings, from what repeats of a test do not share: SD, serial correlation, outliers.
+"""Noise of the readings, from what repeats of a test do not share: SD, correlation, outliers.
 
-A reading's error has one SD for all readings of a coordinate and the correlation rho^|t - u| between
-load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
+A reading's error has one SD for all readings of a coordinate and the correlation rho^|t - u|
+between load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
 """
 
 from collections.abc import Sequence
@@ -136,7 +136,7 @@ def _contrasts_of(test: Repeats) -> list[tuple[Array, int]]:
 
 
 def _most_likely(contrasts: Sequence[Sequence[Array]], zeroed: bool) -> tuple[Array, float]:
-    """SDs (6,) and the correlation of largest likelihood; the SD has its own at each correlation."""
+    """SDs (6,) and the correlation of largest likelihood; SDs are fitted at each correlation."""
     by_steps: list[dict[int, Array]] = []
     for of_coordinate in contrasts:
         lengths = {rows.shape[1] for rows in of_coordinate}

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.discrepancy.forms import Variant
+from spinepipe.discrepancy.prediction import Solved
 from spinepipe.discrepancy.signatures import EVERY_TEST, Column, signatures
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
@@ -70,7 +71,7 @@ def nuisance_signatures(
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
     columns = nuisance_columns(priors, model.n_joints, [case.test for case in cases])
-    return signatures(model, cases, zeroed, columns)
+    return signatures(Solved(model, cases, zeroed), columns)
 
 
 def as_si(settings: Mapping[str, float]) -> NuisancePriors:

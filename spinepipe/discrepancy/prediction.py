@@ -89,38 +89,43 @@ class Simulated:
         return stacked - stacked[0] if self.zeroed else stacked
 
 
-def switched_on(
-    lean: SpineModel,
-    full: SpineModel,
-    cases: Sequence[LoadCase],
-    zeroed: bool,
-    free: Sequence[FreeParameter],
-) -> tuple[Array, ...]:
-    """(T, J, 6, m) derivatives of each test's readings by unknowns of a model's idle effects.
+class Solved:
+    """A specimen's tests solved under one model, for derivatives by effects that it lacks.
 
-    Parameters
-    ----------
-    lean : the model at work. full : the same with further effects behind, all of them off.
-    free : unknowns of ``full``.
-
-    Raises
-    ------
-    NoEquilibrium
-        When a load step has no stable pose.
+    Good for as long as no other model is loaded into the process's engine.
     """
-    chain = Chain(lean)
-    found = []
-    for case in cases:
-        solved = solved_steps(System(chain, lean, case), None)
-        system = System(chain, full, case)
-        steps = carried_over(system, solved)
-        seen = [
-            observed_by_parameters(system, step.equilibrium.q, dq, free)
-            for step, dq in zip(steps, by_parameters(system, steps, free), strict=True)
-        ]
-        stacked = np.stack(seen)
-        found.append(stacked - stacked[0] if zeroed else stacked)
-    return tuple(found)
+
+    def __init__(self, model: SpineModel, cases: Sequence[LoadCase], zeroed: bool) -> None:
+        """Solve all tests.
+
+        Raises
+        ------
+        NoEquilibrium
+            When a load step has no stable pose.
+        """
+        self.model, self.cases, self.zeroed = model, tuple(cases), zeroed
+        self._chain = Chain(model)
+        self.steps = [solved_steps(System(self._chain, model, case), None) for case in cases]
+
+    def by(self, full: SpineModel, free: Sequence[FreeParameter]) -> tuple[Array, ...]:
+        """(T, J, 6, m) derivatives of each test's readings by unknowns of idle effects.
+
+        Parameters
+        ----------
+        full : the solved model with further effects behind its own, all of them off.
+        free : unknowns of ``full``.
+        """
+        found = []
+        for case, solved in zip(self.cases, self.steps, strict=True):
+            system = System(self._chain, full, case)
+            steps = carried_over(system, solved)
+            seen = [
+                observed_by_parameters(system, step.equilibrium.q, dq, free)
+                for step, dq in zip(steps, by_parameters(system, steps, free), strict=True)
+            ]
+            stacked = np.stack(seen)
+            found.append(stacked - stacked[0] if self.zeroed else stacked)
+        return tuple(found)
 
 
 def solved_steps(system: System, guesses: list[Array] | None) -> list[SolvedStep]:

@@ -76,49 +76,52 @@ def _basis(columns: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """Products of signatures, by specimen; M columns, D draws with the data as the first.
+class Products:
+    """Products of a specimen's signatures; M columns, the data and D draws of the null.
 
     Attributes
     ----------
-    gram : (M, M) F'F. moments : (M, D + 1) F'r of the data and of draws of the null.
-    raw : (M,) squared norms before anything was taken out.
-    shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) sum of A'A over all specimens.
-    moments_shared : (a, D + 1) sum of A'r.
+    gram : (M, M) F'F. moments : (M, 1 + D) F'r of the data and of the draws.
+    raw : (M,) squared norms in noise SDs before anything was taken out.
+    shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) A'A.
+    moments_shared : (a, 1 + D) A'r.
     """
 
-    gram: Mapping[str, Array]
-    moments: Mapping[str, Array]
-    raw: Mapping[str, Array]
-    shared: Mapping[str, Array]
+    gram: Array
+    moments: Array
+    raw: Array
+    shared: Array
     gram_shared: Array
     moments_shared: Array
 
 
-def linearised(
-    taken: Mapping[str, Taken],
-    signatures: Mapping[str, Array],
-    raw: Mapping[str, Array],
-    draws: int,
-    rng: np.random.Generator,
-) -> Linearised:
-    """Products that all evidence is made of.
+def drawn(taken: Taken, draws: int, rng: np.random.Generator) -> Array:
+    """(N, 1 + D) the data's residual, and residuals as the null would have them."""
+    return np.column_stack([taken.residual, rng.standard_normal((len(taken.residual), draws))])
 
-    Parameters
-    ----------
-    signatures : (N, M) whitened, by specimen. raw : (M,) their squared norms in noise SDs alone.
-    """
-    gram, moments, shared = {}, {}, {}
-    a = next(iter(taken.values())).shared.shape[1]
-    gram_shared, moments_shared = np.zeros((a, a)), np.zeros((a, draws + 1))
-    for name, out in taken.items():
-        left = out.out_of(signatures[name])
-        noise = rng.standard_normal((len(left), draws))
-        errors = np.column_stack([out.residual, noise])
-        gram[name], moments[name] = left.T @ left, left.T @ errors
-        gone = np.diagonal(gram[name]) < UNSEEN * raw[name]
-        gram[name][gone], gram[name][:, gone], moments[name][gone] = 0.0, 0.0, 0.0
-        shared[name] = np.where(gone[:, None], 0.0, left.T @ out.shared)
-        gram_shared += out.shared.T @ out.shared
-        moments_shared += out.shared.T @ errors
-    return Linearised(gram, moments, dict(raw), shared, gram_shared, moments_shared)
+
+def products(taken: Taken, white: Array, raw: Array, errors: Array) -> Products:
+    """Products of whitened signatures (N, M) with themselves, the errors and what is shared."""
+    left = taken.out_of(white)
+    gram, moments = left.T @ left, left.T @ errors
+    gone = np.diagonal(gram) < UNSEEN * raw
+    gram[gone], gram[:, gone], moments[gone] = 0.0, 0.0, 0.0
+    shared = np.where(gone[:, None], 0.0, left.T @ taken.shared)
+    own = taken.shared.T
+    return Products(gram, moments, raw, shared, own @ taken.shared, own @ errors)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Products of all specimens; what they share, summed."""
+
+    of: Mapping[str, Products]
+    gram_shared: Array
+    moments_shared: Array
+
+
+def linearised(of: Mapping[str, Products]) -> Linearised:
+    """The problem of a cohort from those of its specimens."""
+    parts = list(of.values())
+    gram = np.sum([part.gram_shared for part in parts], axis=0)
+    return Linearised(of, gram, np.sum([part.moments_shared for part in parts], axis=0))

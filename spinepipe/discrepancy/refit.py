@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from spinepipe.discrepancy.evidence import SIZES
@@ -164,7 +165,7 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
     return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
 
 
-def curvature_of(fit: JointFit, own: Array) -> Array:
+def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
     """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
     jacobian = fit.whole_jacobian()
     priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])

@@ -7,37 +7,58 @@ import numpy as np
 from spinepipe.discrepancy.forms import Trials
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.groups import Index
-from spinepipe.discrepancy.projected import Linearised, linearised, taken_out
-from spinepipe.discrepancy.screen import Screen, Screened, screen, screened
+from spinepipe.discrepancy.prediction import Solved
+from spinepipe.discrepancy.projected import (
+    Linearised,
+    Products,
+    drawn,
+    linearised,
+    products,
+    taken_out,
+)
+from spinepipe.discrepancy.screen import Screen, screen, screened
 from spinepipe.discrepancy.signatures import columns_of, signatures
 
 
 def look(
-    grounds: Grounds, trials: Sequence[Trials], draws: int, false_alarm: float, seed: int
+    grounds: Grounds,
+    trials: Sequence[Trials],
+    draws: int,
+    false_alarm: float,
+    seed: int,
+    threshold: float | None = None,
 ) -> Screen:
-    """Evidence of every effect beside those of the fit, with base and nuisances taken out."""
-    found = []
-    for number, one in enumerate(trials):
-        index, problem = linearised_for(grounds, one, draws, seed)
-        found.append(screened(one, index, problem, tuple(grounds.readings), grounds.tests))
-    return screen(found, false_alarm)
+    """Evidence of every effect beside those of the fit, with base and nuisances taken out.
+
+    Parameters
+    ----------
+    threshold : as known already; then no draws of the null are needed.
+    """
+    number = draws if threshold is None else 0
+    problems = linearised_for(grounds, trials, number, seed)
+    found = [
+        screened(one, index, problem, tuple(grounds.readings), grounds.tests)
+        for one, (index, problem) in zip(trials, problems, strict=True)
+    ]
+    return screen(found, false_alarm, threshold)
 
 
 def linearised_for(
-    grounds: Grounds, trials: Trials, draws: int, seed: int
-) -> tuple[Index, Linearised]:
-    """The products of one effect's signatures; draws of the null are the same for all effects."""
-    fit = grounds.fit
-    joints = next(iter(fit.models.values())).n_joints
-    columns = columns_of(trials, joints, grounds.tests)
-    white, raw = {}, {}
-    for name, one in grounds.readings.items():
-        moved = signatures(fit.models[name], one.cases, grounds.noise.zeroed, columns)
-        plain = grounds.plain[name].noise_only(moved)
-        raw[name] = np.sum(plain**2, axis=0)
-        white[name] = grounds.setting.whitenings[name].shortened(plain)
-    rng = np.random.default_rng(seed)
-    return Index(columns), linearised(taken_out(fit), white, raw, draws, rng)
-
-
-__all__ = ["Screened", "linearised_for", "look"]
+    grounds: Grounds, trials: Sequence[Trials], draws: int, seed: int
+) -> list[tuple[Index, Linearised]]:
+    """The products of each effect's signatures; draws of the null are the same for all effects."""
+    joints = next(iter(grounds.fit.models.values())).n_joints
+    columns = [columns_of(one, joints, grounds.tests) for one in trials]
+    taken = taken_out(grounds.fit)
+    parts: list[dict[str, Products]] = [{} for _ in trials]
+    for number, (name, one) in enumerate(grounds.readings.items()):
+        solved = Solved(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
+        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
+        for place, of_effect in zip(parts, columns, strict=True):
+            plain = grounds.plain[name].noise_only(signatures(solved, of_effect))
+            white = grounds.setting.whitenings[name].shortened(plain)
+            place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
+    return [
+        (Index(of_effect), linearised(place))
+        for of_effect, place in zip(columns, parts, strict=True)
+    ]

@@ -89,10 +89,13 @@ def _tried(one: Summed, log_evidence: float) -> Tried:
     return Tried(one.form, one.sds, one.strengths, log_evidence, estimate, explained)
 
 
-def screen(effects: Sequence[Screened], false_alarm: float) -> Screen:
-    """Effects ranked, with the threshold from the largest evidence of each draw of the null."""
+def screen(
+    effects: Sequence[Screened], false_alarm: float, threshold: float | None = None
+) -> Screen:
+    """Effects ranked; the threshold is that of the largest evidence of each draw of the null."""
     largest = np.max(np.stack([one.null for one in effects]), axis=0)
-    threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
+    if threshold is None:
+        threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
     ranked = sorted(effects, key=lambda one: (-one.log_evidence, one.effect))
     return Screen(tuple(ranked), threshold, len(largest))
 

@@ -127,8 +127,11 @@ def search(base: Grounds, rules: Rules, run: Run) -> Found:
     )
 
 
-def _look(grounds: Grounds, rules: Rules, run: Run) -> Screen:
-    return run(look, grounds, rules.trials, rules.draws, rules.false_alarm, rules.seed)
+def _look(grounds: Grounds, rules: Rules, run: Run, log: _Log) -> Screen:
+    """A screen; the null's draws are those of the first, beside the base alone."""
+    threshold = log.stages[0].screen.threshold if log.stages else None
+    draws = (rules.draws, rules.false_alarm, rules.seed)
+    return run(look, grounds, rules.trials, *draws, threshold)
 
 
 def _forward(
@@ -137,7 +140,7 @@ def _forward(
     """Let effects enter; the grounds that are left, and the last that entered."""
     last: Refit | None = None
     while len(current.fit.hypothesis.supposed) < MOST_FORMS_NAMED:
-        screen = _look(current, rules, run)
+        screen = _look(current, rules, run, log)
         number = len(current.fit.hypothesis.supposed) + 1
         if screen.effects[0].log_evidence <= screen.threshold:
             log.stages.append(Stage(f"round {number}", screen))
@@ -181,7 +184,7 @@ def _examined(
     for number, one in enumerate(supposed):
         others = tuple(other for k, other in enumerate(supposed) if k != number)
         without = _without(base, others, run)
-        screen = _look(without, rules, run) if others else log.stages[0].screen
+        screen = _look(without, rules, run, log) if others else log.stages[0].screen
         tried = refits(without, screen, rules.trials, run) if others else log.stages[0].refits
         own = _own(without, one, tried, rules, run)
         log.stages.append(Stage(f"in the place of {one.form.name}", screen, tried))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.discrepancy.forms import Trials, Variant, shape_grid
-from spinepipe.discrepancy.prediction import switched_on
-from spinepipe.effects import Kind, Spread
+from spinepipe.discrepancy.prediction import Solved
+from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.model import ScopedEffect
 from spinepipe.statics import FreeParameter
 
 EVERY_TEST = "*"
@@ -57,13 +57,9 @@ def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column
     return found
 
 
-def signatures(
-    model: SpineModel,
-    cases: Sequence[LoadCase],
-    zeroed: bool,
-    columns: Sequence[Column],
-) -> tuple[Array, ...]:
+def signatures(solved: Solved, columns: Sequence[Column]) -> tuple[Array, ...]:
     """(T, J, 6, m) derivative of each test's readings by each column's strength, in prior SDs."""
+    model = solved.model
     scoped: dict[tuple[Variant, tuple[float, ...]], int] = {}
     effects: list[ScopedEffect] = list(model.effects)
     free = []
@@ -75,12 +71,11 @@ def signatures(
         parameter = effects[scoped[key]].effect.parameters[column.strength]
         row = 0 if column.joint is None else column.joint
         free.append(FreeParameter("", scoped[key], column.strength, (row,), parameter.logarithmic))
-    full = model.with_effects(tuple(effects))
-    found = switched_on(model, full, cases, zeroed, free)
+    found = solved.by(model.with_effects(tuple(effects)), free)
     scales = np.array([column.scale for column in columns])
     return tuple(
         by_x * np.where([column.test in (EVERY_TEST, case.test) for column in columns], scales, 0.0)
-        for by_x, case in zip(found, cases, strict=True)
+        for by_x, case in zip(found, solved.cases, strict=True)
     )
 
 
@@ -89,8 +84,3 @@ def idle(variant: Variant, sds: Sequence[float], joints: int) -> ScopedEffect:
     effect = variant.create()
     rows = joints if effect.per_joint else 1
     return ScopedEffect(effect, tuple(range(joints)), np.tile(variant.off(sds), (rows, 1)))
-
-
-def is_measured(variant: Variant) -> bool:
-    """Whether an effect acts on the measurement and not on the physics."""
-    return variant.create().kind is Kind.MEASUREMENT

@@ -158,9 +158,13 @@ def on_bushings(
     frames: tuple[Pose, ...],
     stiffness: Array,
     damping: Array,
+    others: tuple[ScopedEffect, ...] = (),
 ) -> SpineModel:
-    """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6)."""
+    """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6).
+
+    The bushings are its first effect, ``others`` come after them.
+    """
     n = len(cohort.joint_names)
     values = np.broadcast_to(stiffness, (n, 6)).copy()
     bushing = ScopedEffect(create("linear_bushing"), tuple(range(n)), values)
-    return spine_model(cohort, specimen, frames, (bushing,), damping)
+    return spine_model(cohort, specimen, frames, (bushing, *others), damping)

@@ -6,6 +6,7 @@ from typing import Any
 from spinepipe.cohort import Cohort
 from spinepipe.jobs import layout
 from spinepipe.jobs.cohort_stiffness import layout as cohort_stiffness
+from spinepipe.jobs.discrepancy import layout as discrepancy
 from spinepipe.jobs.range_of_motion import layout as range_of_motion
 from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies import Study
@@ -14,6 +15,7 @@ LAYOUTS: dict[str, Callable[[Any, Cohort], StudyFiles]] = {
     "joint_pose_sensitivity": layout.Layout.of,
     "range_of_motion": range_of_motion.RangeOfMotionFiles.of,
     "cohort_stiffness": cohort_stiffness.CohortLayout.of,
+    "discrepancy": discrepancy.DiscrepancyFiles.of,
 }
 """What lists the files of each kind of study."""
 

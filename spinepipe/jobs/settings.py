@@ -79,6 +79,9 @@ IRRELEVANT: dict[str, dict[str, Any]] = {
     "range_of_motion.variance": {},
     "range_of_motion.figures": {},
     "range_of_motion.report": {},
+    "discrepancy.search": {},  # every setting says something about the search
+    "discrepancy.figures": {},
+    "discrepancy.report": {},
 }
 """Settings that a job does not look at. All others count, so one added later is not overlooked."""
 

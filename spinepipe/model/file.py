@@ -148,8 +148,16 @@ def _within(value: Any, low: float, high: float) -> bool:
     return is_number and bool(low <= value <= high)
 
 
-def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple[ScopedEffect, ...]:
+def effects_for(
+    model: ModelFile, specimen: str, joints: Sequence[str], left_out: bool = False
+) -> tuple[ScopedEffect, ...]:
     """The effects of a model file that act on a specimen with these joints.
+
+    Parameters
+    ----------
+    specimen : its name; ``*`` for one that the file does not name.
+    left_out : whether values for all specimens (``*``) count before those for this specimen, which
+        then stand only where the file has no others.
 
     Raises
     ------
@@ -169,7 +177,7 @@ def effects_for(model: ModelFile, specimen: str, joints: Sequence[str]) -> tuple
                 for index, joint in enumerate(joints)
                 if entry.scope.joints == ("*",) or joint in entry.scope.joints
             )
-            values = _values(entry, effect, specimen, [joints[index] for index in chosen])
+            values = _values(entry, effect, specimen, [joints[index] for index in chosen], left_out)
             scoped.append(ScopedEffect(effect, chosen, values, entry.scope.tests))
     return tuple(scoped)
 
@@ -193,12 +201,17 @@ def _strangers(number: int, entry: EffectEntry, joints: Sequence[str]) -> list[P
     return problems
 
 
-def _values(entry: EffectEntry, effect: Effect, specimen: str, joints: Sequence[str]) -> Array:
+def _values(
+    entry: EffectEntry, effect: Effect, specimen: str, joints: Sequence[str], left_out: bool
+) -> Array:
     """(R, P) values of the joints in scope; one row for effects that are not per joint."""
     names = [parameter.name for parameter in effect.parameters]
     rows = joints if effect.per_joint else ["*"]
     values = np.tile([parameter.default for parameter in effect.parameters], (len(rows), 1))
-    for row in entry.values:
+    given = entry.values
+    if left_out:  # the last row that fits counts
+        given = tuple(sorted(given, key=lambda row: row.specimen == "*"))
+    for row in given:
         if row.specimen in ("*", specimen):
             for index, joint in enumerate(rows):
                 if row.joint in ("*", joint):

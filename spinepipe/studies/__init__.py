@@ -2,6 +2,7 @@
 
 from spinepipe.studies.check import check
 from spinepipe.studies.cohort_stiffness import CohortStiffness, CrossValidation
+from spinepipe.studies.discrepancy import Discrepancy, DiscrepancyBase, HeldOut, Nuisance
 from spinepipe.studies.identification import (
     Bootstrap,
     DampingBootstrap,
@@ -24,10 +25,14 @@ __all__ = [
     "CohortStiffness",
     "CrossValidation",
     "DampingBootstrap",
+    "Discrepancy",
+    "DiscrepancyBase",
+    "HeldOut",
     "JointPoseSensitivity",
     "LandmarkPrecision",
     "LevelStiffness",
     "Methods",
+    "Nuisance",
     "PoseSd",
     "RangeOfMotion",
     "Selection",

@@ -8,7 +8,9 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.check_base_model import check_base_model
 from spinepipe.studies.check_cohort_stiffness import check_cohort_stiffness
+from spinepipe.studies.check_discrepancy import check_discrepancy
 from spinepipe.studies.check_joint_pose_sensitivity import check_joint_pose_sensitivity
 from spinepipe.studies.check_range_of_motion import check_range_of_motion
 from spinepipe.studies.read import STUDIES, load
@@ -20,8 +22,14 @@ CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
     "joint_pose_sensitivity": check_joint_pose_sensitivity,
     "range_of_motion": check_range_of_motion,
     "cohort_stiffness": check_cohort_stiffness,
+    "discrepancy": check_discrepancy,
 }
 """What each kind of study demands of its cohort."""
+
+FILE_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
+    "discrepancy": check_base_model,
+}
+"""What kinds of studies demand of further files, whose paths count from the Snakefile."""
 
 
 def check(root: Path, study_name: str) -> tuple[Study, Cohort]:
@@ -43,6 +51,8 @@ def check(root: Path, study_name: str) -> tuple[Study, Cohort]:
     problems += faults
     if document and study and cohort:
         problems += CHECKS[study.kind](document, study, cohort)
+        if study.kind in FILE_CHECKS:
+            problems += FILE_CHECKS[study.kind](document, study, cohort, root)
     if problems or study is None or cohort is None:
         raise InputError(problems)
     return study, cohort

@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe.anatomy import published
 from spinepipe.cohort.header import MeasurementSd
+from spinepipe.studies.base_model import Base
 from spinepipe.studies.coordinates import FORM
 from spinepipe.studies.lists import Coordinates, EachOnce, Tests
 from spinepipe.studies.published_stiffness import LevelStiffness, PublishedStiffness
@@ -81,6 +82,9 @@ class CohortStiffness(Study):
     level_stiffness: Mapping[str, LevelStiffness] = Field(
         default_factory=_published_levels,
         description="published rotational stiffness joint by joint, whose ratios level_ratio keeps",
+    )
+    base: Base | None = Field(
+        default=None, description="what acts in every model besides the bushings; null: nothing"
     )
     bound_factor: float = Field(
         default=100.0, gt=1, le=1e9, description="bounds are start / factor and start x factor"

@@ -6,6 +6,7 @@ from spinepipe.cohort.read_yaml import Document, read_yaml
 from spinepipe.cohort.validate import validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.cohort_stiffness import CohortStiffness
+from spinepipe.studies.discrepancy import Discrepancy
 from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
 from spinepipe.studies.range_of_motion import RangeOfMotion
 from spinepipe.studies.study import Study
@@ -18,6 +19,7 @@ KINDS: dict[str, type[Study]] = {
     "joint_pose_sensitivity": JointPoseSensitivity,
     "range_of_motion": RangeOfMotion,
     "cohort_stiffness": CohortStiffness,
+    "discrepancy": Discrepancy,
 }
 """The model of each kind of study."""
 

@@ -2,6 +2,7 @@
 
 from spinepipe.tables.cohort_stiffness import ERRORS, FITS, POOLING, SIGN_CHECKS, STIFFNESS
 from spinepipe.tables.cohort_stiffness_analyses import FINDINGS, MAE, RANKING
+from spinepipe.tables.discrepancy import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 from spinepipe.tables.identification import (
     AGAINST_GOULD_2024A,
     AGAINST_GOULD_2024B,
@@ -71,6 +72,11 @@ TABLES = {
         RANGE_OF_MOTION,
         ROM_SUMMARY,
         ROM_VARIANCE,
+        GAP,
+        CANDIDATES,
+        WHERE,
+        CONFUSIONS,
+        HELD_OUT,
     )
 }
 
@@ -80,11 +86,15 @@ __all__ = [
     "AGREEMENT",
     "BOOTSTRAP",
     "CALIBRATIONS",
+    "CANDIDATES",
+    "CONFUSIONS",
     "COUNTS",
     "ERRORS",
     "FINDINGS",
     "FITS",
     "FRAMES",
+    "GAP",
+    "HELD_OUT",
     "IMPORTANCE",
     "LANDMARKS",
     "LANDMARK_PRECISION",
@@ -108,6 +118,7 @@ __all__ = [
     "SUMMARY",
     "TABLES",
     "VARIANCE_SHARES",
+    "WHERE",
     "BadTable",
     "Column",
     "Table",

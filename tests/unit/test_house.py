@@ -18,7 +18,7 @@ PACKAGE = "spinepipe"
 ROOMS = (
     *("units", "problems", "files", "frames", "anatomy", "effects", "model", "world", "statics"),
     *("calibrate", "designs", "statistics", "sensitivity"),
-    *("tables", "comparison", "cohort", "studies", "report", "jobs", "cli"),
+    *("tables", "comparison", "cohort", "studies", "discrepancy", "report", "jobs", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it."""
 

@@ -8,6 +8,8 @@ POOL = "fitted_to={fitted_to}/without={without}"
 
 
 rule literature:
+    input:
+        base_model,
     output:
         stiffness=f"{COHORTS}/literature/specimen={{specimen}}/stiffness.parquet",
         errors=f"{COHORTS}/literature/specimen={{specimen}}/errors.parquet",
@@ -21,6 +23,8 @@ rule literature:
 
 
 rule fit:
+    input:
+        base_model,
     output:
         stiffness=f"{COHORTS}/fits/{OWN}/stiffness.parquet",
         fits=f"{COHORTS}/fits/{OWN}/fits.parquet",
@@ -35,6 +39,7 @@ rule fit:
 
 rule left_out:
     input:
+        base_model,
         others=fits_of_others,
     output:
         stiffness=f"{COHORTS}/left_out/{OWN}/stiffness.parquet",
@@ -48,6 +53,8 @@ rule left_out:
 
 
 rule pool:
+    input:
+        base_model,
     output:
         stiffness=f"{COHORTS}/pooled/{POOL}/stiffness.parquet",
         fits=f"{COHORTS}/pooled/{POOL}/fits.parquet",

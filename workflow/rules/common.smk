@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from spinepipe import studies
+from spinepipe.jobs.cohort_stiffness.base_model import given_digest
 from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.jobs.layout import METHODS
 from spinepipe.jobs.layouts import JOINED, files_of
@@ -89,7 +90,8 @@ def digests(job, name=None):
         return code
     study, cohort = load(name)
     settings = relevant_settings(job, study)
-    return value_digest(code, settings, cohort.digest)
+    given = [given_digest(ROOT, study)] if study.kind == "cohort_stiffness" else []
+    return value_digest(code, settings, cohort.digest, *given)
 
 
 def digest(job):
@@ -126,6 +128,12 @@ def fits_of_others(wildcards):
     """Fits of the other specimens, of which the left-out one takes the median."""
     place = wildcards.specimen, wildcards.representation, wildcards.fitted_to
     return layout(wildcards.study).fits_of_others(*place)
+
+
+def base_model(wildcards):
+    """The model file that a study builds on, or nothing; another study may make it."""
+    base = load(wildcards.study)[0].base
+    return [os.path.relpath(base.path(Path(ROOT)), ROOT)] if base else []
 
 
 def shown(results, name):

@@ -7,14 +7,14 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
+from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin
 from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent, no_fit
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
 from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
-from spinepipe.model import RefusedModel
+from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import Status, moved
 from spinepipe.studies import CohortStiffness
 from spinepipe.tables import ERRORS, FITS, STIFFNESS, from_rows, write
@@ -37,21 +37,23 @@ def run(
     """Write stiffness, the record of the fit, and the errors under all tests of the specimen."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
-    problem, found, refusal = _fit(settings, cohort, specimen, representation, fitted_to, tests)
+    others = base_effects(root, settings, cohort, specimen)
+    where = specimen, representation, fitted_to
+    problem, found, refusal = _fit(settings, cohort, *where, tests, others)
     if problem is None or found is None:
         k, rows = None, _no_stiffness(settings, cohort, refusal)
         record = no_fit(Status.REFUSED.value, refusal)
     else:
         k, rows = _stiffness(settings, cohort, problem, found)
         record = _record(problem, found)
-    seen = [] if k is None else error_rows(cohort, specimen, tests, k)
+    seen = [] if k is None else error_rows(cohort, specimen, tests, k, others)
     labelled = [
         {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
     ]
-    origin = provenance("cohort_stiffness.fit", settings, cohort)
-    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, origin)
-    write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, origin)
-    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, origin)
+    made = origin("fit", root, settings, cohort)
+    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
+    write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, made)
+    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
 
 
 def _fit(
@@ -61,6 +63,7 @@ def _fit(
     representation: str,
     fitted_to: str,
     tests: SpecimenTests,
+    others: tuple[ScopedEffect, ...],
 ) -> tuple[Problem | None, Fit | None, str]:
     """The problem and its fit, or why there is none."""
     chosen: tuple[TestedCycle, ...] = tests.fitted_to(fitted_to)
@@ -68,7 +71,7 @@ def _fit(
         return None, None, f"{specimen}: {tests.why_none(fitted_to)}"
     try:
         problem = calibration_problem(
-            settings, cohort, specimen, representation, tests.frames, chosen
+            settings, cohort, specimen, representation, tests.frames, chosen, others
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
         return problem, fit(problem, settings.starts, seed, settings.identifiable_below), ""

@@ -7,13 +7,14 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin, seen_note
+from spinepipe.jobs.cohort_stiffness.claims import joined
 from spinepipe.jobs.cohort_stiffness.fit import IN_FOLDERS
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
 from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
 from spinepipe.tables import ERRORS, STIFFNESS, from_rows, read_frame, write
@@ -36,17 +37,19 @@ def run(
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
     k, used = _median(settings, cohort, representation, [read_frame(path) for path in others])
-    rows = _stiffness(settings, cohort, k, used, len(others))
+    note = seen_note(root, settings, cohort, specimen)
+    rows = _stiffness(settings, cohort, k, used, len(others), note)
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
-    seen = [] if not used else error_rows(cohort, specimen, tests, k)
+    effects = base_effects(root, settings, cohort, specimen, left_out=True)
+    seen = [] if not used else error_rows(cohort, specimen, tests, k, effects)
     labelled = [
         {**row, "source": SOURCE, "stage": "left_out_specimen"}
         for row in seen
         if row["test"] in within
     ]
-    origin = provenance("cohort_stiffness.left_out", settings, cohort)
-    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, origin)
-    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, origin)
+    made = origin("left_out", root, settings, cohort)
+    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
+    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
 
 
 def _median(
@@ -65,11 +68,11 @@ def _median(
 
 
 def _stiffness(
-    settings: CohortStiffness, cohort: Cohort, k: Array, used: int, others: int
+    settings: CohortStiffness, cohort: Cohort, k: Array, used: int, others: int, note: str
 ) -> list[dict[str, Any]]:
     whole = f"median of {used} specimen{'s' if used != 1 else ''}"
-    part = f"; {others - used} of {others} have no stiffness" if used < others else ""
-    status, message = Status.CONVERGED, whole + part
+    part = f"{others - used} of {others} have no stiffness" if used < others else ""
+    status, message = Status.CONVERGED, joined(whole, part, note)
     if not used:
         status, message = Status.REFUSED, "no other specimen has a stiffness"
     values = k if used else np.full(k.shape, np.nan)

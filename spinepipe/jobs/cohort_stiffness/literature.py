@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.signs import sign_rows
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
 from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
 from spinepipe.studies.fitted_to import NOTHING
@@ -26,6 +26,7 @@ def run(
     """Write published stiffness, its errors, and the sign checks of the specimen."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
+    others = base_effects(root, settings, cohort, specimen)
     values: list[dict[str, Any]] = []
     seen: list[dict[str, Any]] = []
     for name in published_sets(settings, cohort):
@@ -37,14 +38,14 @@ def run(
         )
         ended = {"status": Status.CONVERGED.value, "message": ""}
         values += [{**row, **common, **ended} for row in rows]
-        found = error_rows(cohort, specimen, tests, k)
+        found = error_rows(cohort, specimen, tests, k, others)
         seen += [{**row, **common, "stage": "literature"} for row in found]
     k = start_stiffness(settings, cohort, "literature")
-    signs = sign_rows(cohort, specimen, tests, k)
-    origin = provenance("cohort_stiffness.literature", settings, cohort)
-    write(from_rows(STIFFNESS.without("specimen"), values), stiffness, origin)
-    write(from_rows(ERRORS.without("specimen"), seen), errors, origin)
-    write(from_rows(SIGN_CHECKS.without("specimen"), signs), sign_checks, origin)
+    signs = sign_rows(cohort, specimen, tests, k, others)
+    made = origin("literature", root, settings, cohort)
+    write(from_rows(STIFFNESS.without("specimen"), values), stiffness, made)
+    write(from_rows(ERRORS.without("specimen"), seen), errors, made)
+    write(from_rows(SIGN_CHECKS.without("specimen"), signs), sign_checks, made)
 
 
 def published_sets(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Rows of the tables of a pooled fit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,11 +9,13 @@ import numpy as np
 from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
+from spinepipe.jobs.cohort_stiffness.claims import joined
 from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent, no_fit
 from spinepipe.jobs.cohort_stiffness.predict import error_rows
 from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
 from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
 from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.model import ScopedEffect
 from spinepipe.statics import Status
 from spinepipe.studies import CohortStiffness
 from spinepipe.studies.fitted_to import POOLED
@@ -36,6 +38,7 @@ class PooledRows:
     problems : of the specimens that were fitted. refusals : why some have no problem. A specimen
         in neither is a newcomer to them.
     found : None where there was nothing to fit.
+    others : effects of each specimen besides the bushings. note : to be told of a newcomer's.
     """
 
     study: CohortStiffness
@@ -44,6 +47,8 @@ class PooledRows:
     problems: Mapping[str, Problem]
     refusals: Mapping[str, str]
     found: Pooled | None
+    others: Mapping[str, tuple[ScopedEffect, ...]] = field(default_factory=dict)
+    note: str = ""
 
     def stiffness(self, specimen: str) -> list[Row]:
         """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
@@ -59,7 +64,7 @@ class PooledRows:
         if values is None:
             return []
         tests = specimen_tests(self.study, self.cohort, specimen)
-        found = error_rows(self.cohort, specimen, tests, values[0])
+        found = error_rows(self.cohort, specimen, tests, values[0], self.others.get(specimen, ()))
         rows = [{**row, "specimen": specimen} for row in found]
         if specimen not in self.problems:
             within = [r for r in rows if tests.stage(r["test"], self.fitted_to) == "fitted"]
@@ -77,7 +82,7 @@ class PooledRows:
         cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
         alone = independent(self.problems[specimen])
         if usable and not alone:
-            ended["message"] = _joined(message, SHARED_ERROR)
+            ended["message"] = joined(message, SHARED_ERROR)
         return {
             "readings": own.n_readings,
             "unknowns": len(own.x),
@@ -126,7 +131,7 @@ class PooledRows:
             "log_likelihood": found.log_likelihood if alone else None,
             "iterations": found.iterations,
             "status": found.status.value,
-            "message": _joined(found.message, "" if alone else SHARED_ERROR),
+            "message": joined(found.message, "" if alone else SHARED_ERROR),
         }
 
     def _own(self, specimen: str) -> PooledSpecimen | None:
@@ -143,9 +148,9 @@ class PooledRows:
             return Status.REFUSED, NOBODY_FITTED
         pool = self.found.status, self.found.message
         if own is None:
-            return pool[0], _joined("what the others lead one to expect", pool[1])
+            return pool[0], joined("what the others lead one to expect", pool[1], self.note)
         if own.status.usable and not pool[0].usable:
-            return pool[0], _joined(own.message, f"pooled fit: {pool[1] or pool[0].value}")
+            return pool[0], joined(own.message, f"pooled fit: {pool[1] or pool[0].value}")
         return own.status, own.message
 
     def _values(self, specimen: str) -> tuple[Array, Array, Indices, Indices] | None:
@@ -185,14 +190,10 @@ class PooledRows:
         for row in rows:
             at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
             of_cohort = fitted and np.isfinite(error[at]) and not decided[at]
-            note = _joined(message, NOT_DECIDED if of_cohort else "")
+            note = joined(message, NOT_DECIDED if of_cohort else "")
             row |= {"specimen": specimen, "status": status.value, "message": note}
         return rows
 
     def _specimens(self) -> int:
         """How many specimens the spreads were estimated from."""
         return sum(bool(one.poses) for one in self.found.specimens) if self.found else 0
-
-
-def _joined(*notes: str) -> str:
-    return "; ".join(note for note in notes if note)

@@ -10,24 +10,29 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.cohort_stiffness.problem import stiff_model
 from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, driven
-from spinepipe.model import RefusedModel
-from spinepipe.statics import Chain, Status, System, follow
+from spinepipe.model import RefusedModel, ScopedEffect
+from spinepipe.statics import Chain, Status, System, follow, observe
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
 
 Row = dict[str, Any]
 
 
 def predicted(
-    cohort: Cohort, specimen: str, frames: tuple[Pose, ...], tested: Sequence[TestedCycle], k: Array
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    tested: Sequence[TestedCycle],
+    k: Array,
+    others: tuple[ScopedEffect, ...] = (),
 ) -> list[tuple[Array | None, Status, str]]:
     """(T, J, 6) m and rad of each case as it was measured, or why there is none.
 
     Parameters
     ----------
-    k : (J, 6) stiffness, SI.
+    k : (J, 6) stiffness, SI. others : effects besides the bushings.
     """
     try:
-        model = stiff_model(cohort, specimen, frames, k)
+        model = stiff_model(cohort, specimen, frames, k, others)
         chain = Chain(model)
         systems = [System(chain, model, one.case) for one in tested]
     except RefusedModel as error:
@@ -40,13 +45,19 @@ def _motion(system: System, zeroed: bool) -> tuple[Array | None, Status, str]:
     for step in steps:
         if not step.usable:
             return None, step.equilibrium.status, step.equilibrium.message
-    q = np.stack([step.equilibrium.q.reshape(-1, 6) for step in steps])
+    q = np.stack([observe(system, step.equilibrium.q) for step in steps])
     return (q - q[0] if zeroed else q), Status.CONVERGED, ""
 
 
-def error_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) -> list[Row]:
+def error_rows(
+    cohort: Cohort,
+    specimen: str,
+    tests: SpecimenTests,
+    k: Array,
+    others: tuple[ScopedEffect, ...] = (),
+) -> list[Row]:
     """Errors by test, joint and measured coordinate, all cycles together; see table ``errors``."""
-    ended = predicted(cohort, specimen, tests.frames, tests.tested, k)
+    ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
     rows = []
     for test in tests.tests:
         here = [(one, end) for one, end in zip(tests.tested, ended, strict=True)

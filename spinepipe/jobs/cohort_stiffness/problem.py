@@ -10,7 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.cohort_stiffness.tested import TestedCycle
 from spinepipe.jobs.inputs import on_bushings, stiffness_of_joints
-from spinepipe.model import SpineModel
+from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.studies import CohortStiffness
 from spinepipe.studies.coordinates import Damping
@@ -37,11 +37,18 @@ def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str)
 
 
 def stiff_model(
-    cohort: Cohort, specimen: str, frames: tuple[Pose, ...], stiffness: Array
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+    others: tuple[ScopedEffect, ...] = (),
 ) -> SpineModel:
-    """A specimen with this stiffness (J, 6) SI; equilibria do not hang on damping."""
+    """A specimen with this stiffness (J, 6) SI and ``others``, effects besides the bushings.
+
+    Equilibria do not hang on damping.
+    """
     damping = np.array(Damping().in_order(), dtype=float)
-    return on_bushings(cohort, specimen, frames, stiffness, damping)
+    return on_bushings(cohort, specimen, frames, stiffness, damping, others)
 
 
 def calibration_problem(
@@ -51,8 +58,9 @@ def calibration_problem(
     representation: str,
     frames: tuple[Pose, ...],
     tested: Sequence[TestedCycle],
+    others: tuple[ScopedEffect, ...] = (),
 ) -> Problem:
-    """The fit of one representation to these tests.
+    """The fit of one representation to these tests; ``others`` are effects besides the bushings.
 
     Raises
     ------
@@ -60,7 +68,7 @@ def calibration_problem(
         When frames and loads make no model.
     """
     start = start_stiffness(study, cohort, representation)
-    model = stiff_model(cohort, specimen, frames, start)
+    model = stiff_model(cohort, specimen, frames, start, others)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
     free = free_parameters(model, 0, names, GROUPING[representation])
     reach = np.full(len(free), np.log(study.bound_factor))

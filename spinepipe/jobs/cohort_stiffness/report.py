@@ -1,12 +1,17 @@
 """Job: the report of a cohort study, one HTML file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from spinepipe.files import appearing
+from spinepipe.jobs.cohort_stiffness.base_model import NOT_HELD_OUT
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.page_inputs import results_of
 from spinepipe.report.cohort.page import READ, cohort_page
+from spinepipe.report.page.results import Results
 from spinepipe.studies import CohortStiffness
+
+HELD_OUT = "held_out_error"
 
 
 def run(
@@ -14,6 +19,16 @@ def run(
 ) -> None:
     """Write the page from the files of all tables, pictures (SVG) and captions."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
-    page = cohort_page(settings, cohort, results_of(READ, tables, figures, captions))
+    results = results_of(READ, tables, figures, captions)
+    page = cohort_page(settings, cohort, _with_base(settings, results))
     with appearing(Path(output)) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _with_base(study: CohortStiffness, results: Results) -> Results:
+    """Beneath held-out errors, what of a base model was not held out."""
+    caption = results.captions.get(HELD_OUT)
+    if study.base is None or caption is None:
+        return results
+    told = f"{caption} {NOT_HELD_OUT.format(file=study.base.model)}"
+    return replace(results, captions={**results.captions, HELD_OUT: told})

@@ -11,6 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.cohort_stiffness.predict import predicted
 from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, driven
+from spinepipe.model import ScopedEffect
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
@@ -30,7 +31,13 @@ ONE_READING = "one reading does not tell how sure it is"
 NO_POSE = "no pose was found with the published stiffness: nothing to compare with"
 
 
-def sign_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) -> list[Row]:
+def sign_rows(
+    cohort: Cohort,
+    specimen: str,
+    tests: SpecimenTests,
+    k: Array,
+    others: tuple[ScopedEffect, ...] = (),
+) -> list[Row]:
     """One row per test and joint with readings in the loaded coordinate.
 
     A passive segment cannot give energy: moments times rotations are positive in sum. Along the
@@ -39,9 +46,9 @@ def sign_rows(cohort: Cohort, specimen: str, tests: SpecimenTests, k: Array) -> 
 
     Parameters
     ----------
-    k : (J, 6) published stiffness, SI, for the expected motion.
+    k : (J, 6) published stiffness, SI, for the expected motion; ``others`` act besides it.
     """
-    ended = predicted(cohort, specimen, tests.frames, tests.tested, k)
+    ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
     rows: list[Row] = []
     for test in tests.tests:
         loaded = driven([one for one in tests.tested if one.case.test == test])

@@ -38,6 +38,15 @@ class Picture:
         return cls(name, title, _address(svg.encode()), caption)
 
 
+@dataclass(frozen=True)
+class Headline:
+    """The answer in one sentence, how sure it is, and what casts doubt on it."""
+
+    words: str
+    how_sure: str
+    warnings: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
     """What differs between reports.
@@ -48,6 +57,7 @@ class Document:
     poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled.
     metadata : what each table's file says of where it comes from.
     with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
+    headline : the answer, where the study asks for one; figures then come before the 3-D view.
     """
 
     question: str
@@ -58,6 +68,7 @@ class Document:
     left_out: Sequence[str]
     poses: pd.DataFrame
     with_loads: bool = True
+    headline: Headline | None = None
 
     def html(self, study: Study, cohort: Cohort) -> str:
         """The document, which fetches nothing; the same results, the same bytes."""
@@ -71,6 +82,7 @@ class Document:
             study=study,
             cohort=cohort,
             question=self.question,
+            headline=self.headline,
             specimens=_specimens(cohort),
             findings=self.findings,
             pictures=self.pictures,

@@ -1,0 +1,106 @@
+"""Fitted models as a model file: effects with their scope, values per specimen and joint."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from spinepipe.discrepancy.forms import Form
+from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.effects import Spread
+from spinepipe.model import ScopedEffect, SpineModel
+from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values
+
+EVERY = ("*",)
+
+
+def model_file(fit: JointFit, name: str, cohort: str, base_effects: int) -> ModelFile:
+    """The models of all specimens in one file.
+
+    Parameters
+    ----------
+    base_effects : number of effects that the base has, in front of the supposed ones.
+    """
+    entries = [_entry(fit.models, number, EVERY) for number in range(base_effects)]
+    after = dict.fromkeys(fit.models, base_effects)
+    for supposed in fit.hypothesis.supposed:
+        acting = {n: m for n, m in fit.models.items() if supposed.form.acts_in(n)}
+        copies = _copies(supposed.form, acting, after)
+        for copy in range(copies):
+            scoped = {n: m.effects[after[n] + copy] for n, m in acting.items()}
+            entries.append(_of_scoped(acting, scoped, _specimens(supposed.form)))
+        for specimen in acting:
+            after[specimen] += copies
+    return ModelFile(model=name, cohort=cohort, effects=tuple(entries))
+
+
+def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
+    """One copy of the effect, or one per test that it tells apart."""
+    if form.spread is not Spread.BY_TEST:
+        return 1
+    name, model = next(iter(models.items()))
+    behind = model.effects[after[name] :]
+    tests: list[tuple[str, ...]] = []
+    for scoped in behind:
+        if scoped.effect != behind[0].effect or scoped.tests in tests or scoped.tests == EVERY:
+            break
+        tests.append(scoped.tests)
+    return len(tests)
+
+
+def _specimens(form: Form) -> tuple[str, ...]:
+    return EVERY if form.specimen is None else (form.specimen,)
+
+
+def _entry(
+    models: Mapping[str, SpineModel], number: int, specimens: tuple[str, ...]
+) -> EffectEntry:
+    return _of_scoped(models, {n: m.effects[number] for n, m in models.items()}, specimens)
+
+
+def _of_scoped(
+    models: Mapping[str, SpineModel],
+    scoped: Mapping[str, ScopedEffect],
+    specimens: tuple[str, ...],
+) -> EffectEntry:
+    """One effect of the file from what each specimen has of it."""
+    first = next(iter(scoped.values()))
+    joints = next(iter(models.values())).joints
+    acting = tuple(joints[j] for j in first.joints)
+    names = [p.name for p in first.effect.parameters]
+    options = {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in vars(first.effect).items()
+        if not key.startswith("_")
+    }
+    return EffectEntry(
+        effect=first.effect.name,
+        options=options,
+        scope=Scope(
+            specimens=specimens,
+            joints=EVERY if len(acting) == len(joints) else acting,
+            tests=first.tests,
+        ),
+        values=tuple(_rows(scoped, acting, names)),
+    )
+
+
+def _rows(
+    scoped: Mapping[str, ScopedEffect], joints: Sequence[str], names: Sequence[str]
+) -> list[Values]:
+    """Rows of values: one where all are the same, else by specimen, else by joint too."""
+    stacked = np.stack([one.values for one in scoped.values()])
+    if np.all(stacked == stacked[0, 0]):
+        return [_row("*", "*", names, stacked[0, 0])]
+    rows = []
+    for specimen, values in zip(scoped, stacked, strict=True):
+        if np.all(values == values[0]):
+            rows.append(_row(specimen, "*", names, values[0]))
+        else:
+            pairs = zip(joints, values, strict=True)
+            rows += [_row(specimen, joint, names, of_joint) for joint, of_joint in pairs]
+    return rows
+
+
+def _row(specimen: str, joint: str, names: Sequence[str], values: Sequence[float]) -> Values:
+    numbers = {name: float(value) for name, value in zip(names, values, strict=True)}
+    return Values(specimen=specimen, joint=joint, **numbers)

@@ -1,0 +1,1 @@
+"""Jobs of studies of kind discrepancy."""

@@ -1,0 +1,27 @@
+"""Job: the report of a search for missing effects, one HTML file."""
+
+from pathlib import Path
+
+from spinepipe.files import appearing
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.page_inputs import results_of
+from spinepipe.report.discrepancy import read_verdict
+from spinepipe.report.discrepancy.page import READ, discrepancy_page
+from spinepipe.studies import Discrepancy
+
+
+def run(
+    root: str,
+    study: str,
+    tables: list[str],
+    figures: list[str],
+    captions: list[str],
+    verdict: str,
+    output: str,
+) -> None:
+    """Write the page from the files of all tables, pictures (SVG), captions and the verdict."""
+    settings, cohort = study_of_kind(Discrepancy, root, study)
+    results = results_of(READ, tables, figures, captions)
+    page = discrepancy_page(settings, cohort, results, read_verdict(verdict))
+    with appearing(Path(output)) as temporary:
+        temporary.write_text(page, encoding="utf-8")

@@ -1,0 +1,130 @@
+"""Figure: evidence for each effect, round by round of the search."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.report.discrepancy.words import plain
+from spinepipe.report.layout import explain_marks
+from spinepipe.report.sections import sections
+from spinepipe.report.spread import finite
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, note, saying
+from spinepipe.report.words import fixed, number, tick
+
+MOST_ROUNDS, _ACROSS = 3, 2
+SCREEN, REFIT = "screen", "refit"
+PALE = "#B9B9B9"
+_ROW_MM, _AROUND_MM, _KEY_MM = 4.4, 20.0, 15.0
+_LINEAR_TO = 10.0
+"""Log evidence up to which the axis is linear, beyond it is logarithmic."""
+
+
+def effect_evidence_figure(
+    cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel for each round: the best form of each effect, screened and refitted."""
+    rounds = evidence_by_round(tables["candidates"])[:MOST_ROUNDS]
+    if not rounds:
+        return saying("No evidence can be shown: no effect was tried.")
+    longest = max(len(found) for found in rounds)
+    (panels,), figure = sections([(len(rounds), longest * _ROW_MM + _AROUND_MM)], _KEY_MM, _ACROSS)
+    low, high = _reach(rounds, verdict)
+    for index, (axis, found) in enumerate(zip(panels, rounds, strict=True)):
+        _draw(axis, found, verdict)
+        axis.set_ylim(len(found) - longest - 0.7, len(found) - 0.3)
+        axis.set_xscale("symlog", linthresh=_LINEAR_TO)
+        axis.set_xlim(low, high)
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
+        axis.set_xlabel("log evidence for the effect")
+        axis.set_title(f"{chr(ord('a') + index)}   {_title(index)}")
+        if verdict.threshold is not None:
+            axis.axvline(verdict.threshold, color=BLACK, lw=0.8, ls="--", zorder=5)
+    explain_marks(figure, _handles(verdict), _words(verdict), len(_handles(verdict)))
+    return figure
+
+
+def evidence_by_round(candidates: pd.DataFrame) -> list[pd.DataFrame]:
+    """Of each round a row per effect with columns ``screen`` and ``refit``, the best one last.
+
+    The best form of an effect stands for it. NaN: not refitted, or no fit has a result.
+    """
+    found = []
+    rows = candidates[candidates["log_evidence"].notna()]
+    for round_ in range(1, 100):
+        stages = {name: rows[rows["stage"] == f"{name} {round_}"] for name in (SCREEN, REFIT)}
+        if all(part.empty for part in stages.values()):
+            break
+        best = {name: part.groupby("effect")["log_evidence"].max() for name, part in stages.items()}
+        one = pd.DataFrame(best)
+        order = one[REFIT].fillna(-np.inf).rename("order").to_frame().assign(second=one[SCREEN])
+        found.append(one.loc[order.sort_values(["order", "second"], kind="stable").index])
+    return found
+
+
+def _draw(axis: Axes, found: pd.DataFrame, verdict: Verdict) -> None:
+    for y, (name, row) in enumerate(found.iterrows()):
+        refitted = np.isfinite(row[REFIT])
+        if np.isfinite(row[SCREEN]):
+            axis.plot([row[SCREEN]], [y], "|", color=BLACK, ms=7.0, mew=1.1, zorder=6)
+        value = row[REFIT] if refitted else row[SCREEN]
+        axis.barh(y, value, height=0.62, color=_color(str(name), verdict),
+                  alpha=1.0 if refitted else 0.45, lw=0, zorder=3)  # fmt: skip
+        note(axis, 1.0, y, fixed(float(value), 1), ha="right")
+    axis.set_yticks(range(len(found)), [plain(str(name)) for name in found.index])
+    for label, name in zip(axis.get_yticklabels(), found.index, strict=True):
+        label.set_fontweight(
+            "bold" if name in verdict.named or name in verdict.in_set else "normal"
+        )
+    axis.axvline(0.0, color=GREY, lw=0.6, zorder=2)
+    axis.spines["left"].set_visible(False)
+
+
+def _color(name: str, verdict: Verdict) -> str:
+    if name in verdict.named:
+        return BLUE
+    return GREEN if name in verdict.in_set else PALE
+
+
+def _reach(rounds: list[pd.DataFrame], verdict: Verdict) -> tuple[float, float]:
+    values = finite(pd.concat(rounds).to_numpy(float))
+    low = min(0.0, float(values.min()))
+    high = max(_LINEAR_TO, float(values.max()), 1.5 * (verdict.threshold or 0.0))
+    return 1.2 * low - 1.0, 4.0 * high
+
+
+def _title(index: int) -> str:
+    return "First effect" if index == 0 else f"Beside {index} effect{'s' if index > 1 else ''}"
+
+
+def _handles(verdict: Verdict) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = []
+    if verdict.named:
+        handles.append(Patch(facecolor=BLUE, lw=0, label="named"))
+    if verdict.in_set:
+        handles.append(Patch(facecolor=GREEN, lw=0, label="cannot be told apart"))
+    handles += [
+        Patch(facecolor=PALE, lw=0, label="other effect, refitted"),
+        Patch(facecolor=PALE, alpha=0.45, lw=0, label="screened only"),
+        Line2D([], [], color=BLACK, marker="|", ms=6.0, mew=1.1, lw=0, label="at the screen"),
+    ]
+    if verdict.threshold is not None:
+        handles.append(Line2D([], [], color=BLACK, lw=0.8, ls="--", label="threshold"))
+    return handles
+
+
+def _words(verdict: Verdict) -> str:
+    told = "Best form of each effect (places, shape); linear up to 10, logarithmic beyond"
+    if verdict.threshold is None or verdict.false_alarm is None:
+        return f"{told}."
+    return (
+        f"{told}; the threshold {number(verdict.threshold, 2)} is passed in "
+        f"{tick(100.0 * verdict.false_alarm)} % of data sets that lack nothing."
+    )

@@ -1,0 +1,124 @@
+"""The study kind that asks which effect a model lacks, where, and how sure that is."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, Field, StringConstraints, model_validator
+
+from spinepipe.cohort.header import MeasurementSd
+from spinepipe.studies.coordinates import FORM
+from spinepipe.studies.lists import Coordinates, EachOnce, Tests
+from spinepipe.studies.published_stiffness import PublishedStiffness
+from spinepipe.studies.study import Study
+
+__all__ = ["Discrepancy", "DiscrepancyBase", "HeldOut", "Nuisance"]
+
+_Name = Annotated[str, StringConstraints(min_length=1)]
+
+
+class DiscrepancyBase(BaseModel):
+    """The model that is asked what it lacks."""
+
+    model_config = FORM
+
+    stiffness: Literal["per_specimen", "per_joint"] | None = Field(
+        default=None,
+        description="linear bushings: per_specimen, one stiffness that all joints of a specimen "
+        "share; per_joint, one for each joint",
+    )
+    model: _Name | None = Field(
+        default=None,
+        description="a model file instead, as a path relative to the Snakefile or absolute",
+    )
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Self:
+        if (self.stiffness is None) == (self.model is None):
+            raise ValueError(
+                "exactly one of the two: {stiffness: per_specimen}, {stiffness: per_joint}, or "
+                "{model: path of a model file}"
+            )
+        return self
+
+
+class HeldOut(BaseModel):
+    """What is left out of the fits, one at a time, to see whether a named effect carries over."""
+
+    model_config = FORM
+
+    specimens: bool = Field(default=True, description="leave one specimen out")
+    tests: bool = Field(default=True, description="leave one test out")
+
+
+class Nuisance(BaseModel):
+    """Small imperfections that must not pose as physics: one prior SD of each, 0 for none."""
+
+    model_config = FORM
+
+    joint_centre_mm: float = Field(
+        default=2.0, ge=0, le=50, description="joint centre per axis, mm"
+    )
+    law_axes_deg: float = Field(
+        default=2.0, ge=0, le=45, description="axes in which a joint's laws act, deg"
+    )
+    registration_deg: float = Field(
+        default=1.0, ge=0, le=45, description="frame in which motion is reported, deg"
+    )
+    load_axis_deg: float = Field(default=1.0, ge=0, le=45, description="axis of the load, deg")
+    load_gain: float = Field(default=0.02, ge=0, le=1, description="size of the load, as a share")
+    off_diagonal_nm_per_rad: float = Field(
+        default=1.0, ge=0, le=1e4, description="stiffness between two rotations, N m/rad"
+    )
+    rotation_order: float = Field(
+        default=0.5,
+        ge=0,
+        le=10,
+        description="order of rotations in which a joint's laws act: 0 is Z, X', Y'', 1 the "
+        "reverse",
+    )
+
+
+class Discrepancy(Study):
+    """Find which effect the base model lacks, and prove it on motion that was held out."""
+
+    kind: Literal["discrepancy"] = Field(description="kind of study")
+    base: DiscrepancyBase = Field(description="the model that is asked what it lacks")
+    seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
+    tests: Tests | None = Field(default=None, description="tests used; null: all with motion")
+    coordinates: Coordinates | None = Field(
+        default=None, description="measured coordinates used; null: all that were measured"
+    )
+    effects: EachOnce[_Name] | None = Field(
+        default=None, description="effects that are tried; null: all that can be"
+    )
+    false_alarm: float = Field(
+        default=0.01,
+        gt=0,
+        lt=1,
+        description="how often an effect may be named where none is missing; sets the threshold",
+    )
+    bootstrap: int = Field(
+        default=500, ge=20, le=100_000, description="draws without a missing effect, for that"
+    )
+    most_effects: int = Field(default=3, ge=1, le=10, description="most effects that are named")
+    margin: float = Field(
+        default=3.0,
+        ge=0,
+        le=1e3,
+        description="log evidence by which a name must beat its runner-up; with less both form a "
+        "set",
+    )
+    held_out: HeldOut = Field(default_factory=HeldOut, description="what is held out")
+    measurement_sd: MeasurementSd | None = Field(
+        default=None,
+        description="SDs of one reading where no cycle is repeated; null: the cohort's",
+    )
+    stiffness: PublishedStiffness = Field(
+        default_factory=PublishedStiffness, description="stiffness of all joints where fits start"
+    )
+    bound_factor: float = Field(
+        default=100.0, gt=1, le=1e9, description="bounds are start / factor and start x factor"
+    )
+    nuisance: Nuisance = Field(
+        default_factory=Nuisance,
+        description="small imperfections that are fitted along, one prior SD of each",
+    )

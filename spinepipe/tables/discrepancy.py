@@ -1,0 +1,161 @@
+"""Tables of studies of kind discrepancy: where a model is wrong, and what was tried to mend it."""
+
+from spinepipe.effects import Kind, Spread
+from spinepipe.statics.status import Status
+from spinepipe.tables.columns import JOINT, MESSAGE, SPECIMEN, status
+from spinepipe.tables.schema import Column, Table
+from spinepipe.units import COORDINATES
+
+MODELS = ("base", "with_effects")
+"""The two models that are compared; without a named effect they are the same."""
+
+POOLED_BY = (
+    *("all", "specimen", "joint", "coordinate", "test", "step"),
+    "joint x coordinate x test",
+)
+NOT_TESTABLE = "not_testable"
+
+_MOTION = "mm or deg, see unit"
+_NO_POSE = "no pose was found"
+_NOT_HELD_OUT = "not held out, or no pose was found"
+_TEST = Column("test", "text", "test")
+_EVERYWHERE = "or * where all are together"
+
+
+def _place(name: str) -> Column:
+    return Column(name, "text", f"{name} {_EVERYWHERE}")
+
+
+def _motion(name: str, meaning: str, null: str | None) -> Column:
+    return Column(name, "number", meaning, _MOTION, null)
+
+
+def _of_noise(name: str, meaning: str, null: str | None = None) -> Column:
+    return Column(name, "number", meaning, "noise SD", null, low=0.0)
+
+
+GAP = Table(
+    "gap",
+    "Measured and modelled motion, reading by reading: one row per specimen, test, load step, "
+    "joint and measured coordinate. Cycles are averaged.",
+    ("specimen", "test", "step", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        _TEST,
+        Column("step", "integer", "load step", low=0),
+        JOINT,
+        Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
+        Column("unit", "text", "unit of the motion", allowed=("mm", "deg")),
+        _motion("measured", "measured motion, mean over cycles", None),
+        Column("readings", "integer", "cycles averaged", low=1),
+        _motion("base", "motion of the base model, fitted", _NO_POSE),
+        _motion(
+            "with_effects",
+            "motion of the full simulator with the named effects, fitted; the base's where none "
+            "is named",
+            _NO_POSE,
+        ),
+        Column("noise_sd", "number", "SD of the measured mean", _MOTION, low=0.0),
+        Column("held_out_fold", "text", "fold in which this row was held out; empty: in none"),
+        _motion("held_out_base", "motion of the base model fitted without this row", _NOT_HELD_OUT),
+        _motion(
+            "held_out_with_effects",
+            "motion with the named effects, all fitted without this row",
+            _NOT_HELD_OUT,
+        ),
+    ),
+)
+
+CANDIDATES = Table(
+    "candidates",
+    "What was tried: one row per stage of the search and form of an effect.",
+    ("stage", "effect", "variant", "spread", "scope", "shape"),
+    (
+        Column("stage", "text",
+               "design: what the tests could tell, before residuals are looked at; screen N: all "
+               "candidates, linear at the model of round N; refit N: the leading few, by the full "
+               "simulator"),
+        Column("effect", "text", "effect, as in a model file"),
+        Column("kind", "text", "what it acts on", allowed=tuple(Kind)),
+        Column("variant", "text", "its options, as JSON"),
+        Column("spread", "text", "how its values may differ between places",
+               allowed=tuple(Spread)),
+        Column("scope", "text", "joints, specimens and tests it acts in, in words; * for all"),
+        Column("shape", "text", "its parameters of shape in units of the parameter, as JSON"),
+        Column("parameters", "integer", "parameters that are fitted", low=0),
+        Column("estimate", "number", "estimate of its strength", "see unit",
+               "not fitted, or several strengths"),
+        Column("unit", "text", "unit of the estimate"),
+        Column("log_evidence", "number",
+               "natural logarithm of the evidence for the effect against the model without it",
+               null="not computed"),
+        Column("delta_chi2", "number", "by how much it lowers chi squared", null="not computed"),
+        Column("gap_share", "number", "share of the discrepancy that it closes",
+               null="not computed"),
+        Column("absorbed", "number",
+               "share of its signature that the base and the nuisance take up",
+               null="not computed", low=0.0, high=1.0),
+        _of_noise("detectable_gap", "smallest gap at which it would be named", "not computed"),
+        Column("threshold", "number", "log evidence that it must exceed", null="not calibrated"),
+        Column("status", "text", "how its fit ended; not_testable: these tests cannot show it",
+               allowed=(*Status, NOT_TESTABLE)),
+        MESSAGE,
+    ),
+)  # fmt: skip
+
+WHERE = Table(
+    "where",
+    "Where model and measurement disagree, in SDs of the noise: one row per place and model, "
+    "pooled in seven ways. The gap is the root of chi2 / dof - 1: 0 where only noise is left.",
+    ("by", "specimen", "test", "step", "joint", "coordinate", "model"),
+    (
+        Column("by", "text", "what is told apart; the rest is together", allowed=POOLED_BY),
+        *(_place(name) for name in ("specimen", "test")),
+        Column("step", "text", f"number of the load step, {_EVERYWHERE}"),
+        *(_place(name) for name in ("joint", "coordinate")),
+        Column("readings", "integer", "rows of the table gap in it", low=0),
+        Column("model", "text", "base, or with the named effects", allowed=MODELS),
+        _of_noise("gap", "discrepancy above the noise", "no pose was found"),
+        _of_noise("gap_low", "lower end of its 95 % interval", "no pose was found"),
+        _of_noise("gap_high", "upper end of its 95 % interval", "no pose was found"),
+        _of_noise("rms_residual", "root of chi2 / dof: 1 where only noise is left",
+                  "no pose was found"),
+    ),
+)  # fmt: skip
+
+CONFUSIONS = Table(
+    "confusions",
+    "What these tests could tell apart: one row per pair of effects.",
+    ("effect", "other"),
+    (
+        Column("effect", "text", "effect that is there"),
+        Column("other", "text", "effect that is taken for it"),
+        Column("share", "number",
+               "share of the discrepancy that `effect` would make which `other` can explain, "
+               "beyond base and nuisance; 1: they cannot be told apart", low=0.0, high=1.0),
+    ),
+)  # fmt: skip
+
+
+def _rms(name: str, of: str, null: str) -> Column:
+    return _of_noise(name, f"root mean square residual of {of}: 1 is noise", null)
+
+
+HELD_OUT = Table(
+    "held_out",
+    "Proof on motion that no fit has seen: one row per specimen or test left out.",
+    ("fold",),
+    (
+        Column("fold", "text", "specimen or test left out"),
+        Column("kind", "text", "what is left out", allowed=("specimen", "test")),
+        Column("readings", "integer", "readings left out", low=0),
+        _rms("rms_base", "the base model", "no result, see status"),
+        _rms("rms_with_effects", "the model with the named effects", "no result, see status"),
+        _rms("rms_surrogate", "a generic surrogate that knows no physics", "not computed"),
+        Column("closed", "number",
+               "share of the base's discrepancy that the effects close; negative: they widen it",
+               null="no result, or the base's discrepancy is not above the noise", high=1.0),
+        status("fits"),
+        MESSAGE,
+    ),
+)  # fmt: skip

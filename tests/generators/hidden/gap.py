@@ -1,0 +1,153 @@
+"""How large a discrepancy is: what the base model cannot follow, in SD of one reading.
+
+The base model is what a study starts from: linear springs, one set per specimen, equal at all
+levels. It is refitted to the noiseless motion by Gauss-Newton with exact derivatives. The gap is
+the root mean square of what is left over all readings, specimens, tests, steps and joints.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .anatomy import N_JOINTS
+from .recipe import Hidden, Recipe
+from .rigid import Spine
+from .scene import Scene, with_effect
+from .solve import NoEquilibriumError, solve
+from .world import World
+
+MOST_REFITS = 6
+SMALL_STEP = 0.02
+"""Of log stiffness: the motion's curvature over such a step is 1e-4 of the motion."""
+LOG_SD = 3.0
+"""A loose prior on log stiffness, so that one that nothing tells of stays where it is."""
+CLOSE = 0.04
+MOST_TRIALS = 12
+
+
+def readings(q: np.ndarray, recipe: Recipe) -> np.ndarray:
+    """(..., S, J, 3 or 6) in noise SD, of motion (..., S, J, 6) in SI; step 0 off if zeroed."""
+    sd = np.array([recipe.noise_sd_mm / 1000.0] * 3 + [np.deg2rad(recipe.noise_sd_deg)] * 3)
+    told = (q / sd)[..., 0 if recipe.translations else 3 :]
+    return told[..., 1:, :, :] - told[..., :1, :, :] if recipe.zeroed else told
+
+
+@dataclass
+class Base:
+    """The base model of one specimen, with the last refit as the next one's start."""
+
+    scene: Scene
+    recipe: Recipe
+    number: int
+    spine: Spine
+    log_factors: np.ndarray
+    q: np.ndarray
+
+    def left(self, target: np.ndarray) -> np.ndarray:
+        """Readings that the refitted base does not follow; ``target`` as `readings` gives it.
+
+        Ends when a linear step changes little: what it would leave is what the refit leaves.
+        """
+        for _ in range(MOST_REFITS):
+            error, by_log = self._predict(target)
+            step = self._step(error, by_log)
+            left = error - by_log @ step
+            if np.abs(step).max() < SMALL_STEP:
+                break
+            self.log_factors = self.log_factors + step
+        return left
+
+    def _predict(self, target):
+        """Errors and their derivative by the free log stiffnesses."""
+        stiffness = self.scene.stiffness[self.number] * np.exp(self.log_factors)
+        world = self.scene.plain(self.number, stiffness)
+        solved = solve(world, self.spine, self.q, with_tangents=True)
+        self.q = solved.q
+        loads = np.einsum("tsjc,c,cd->tsjcd", solved.q, stiffness, np.eye(6))
+        shape = solved.q.shape
+        by_log = -np.linalg.solve(solved.tangents, loads.reshape(*shape[:2], -1, 6))
+        columns = np.moveaxis(by_log, -1, 0).reshape(6, *shape)
+        told = np.stack([readings(column, self.recipe) for column in columns], axis=-1)
+        return target - readings(solved.q, self.recipe), told
+
+    def _step(self, error, by_log):
+        free = np.arange(0 if self.recipe.translations else 3, 6)
+        matrix = by_log.reshape(-1, 6)[:, free]
+        pull = np.eye(len(free)) / LOG_SD
+        rows = np.vstack([matrix, pull])
+        right = np.concatenate([error.ravel(), -pull @ self.log_factors[free]])
+        step = np.zeros(6)
+        step[free] = np.clip(np.linalg.lstsq(rows, right, rcond=None)[0], -0.5, 0.5)
+        return step
+
+
+class Meter:
+    """Measures and sets the gap of effects on a scene; keeps models and poses warm."""
+
+    def __init__(self, scene: Scene, recipe: Recipe) -> None:
+        self.scene, self.recipe = scene, recipe
+        numbers = range(len(scene.bones))
+        self.spines = [Spine(bones) for bones in scene.bones]
+        self.plain = [self._plain(number) for number in numbers]
+        self.last = list(self.plain)
+        self.bases = [self._base(number) for number in numbers]
+
+    def gap(self, effects: list[tuple[Hidden, float]]) -> float:
+        """Root mean square over all readings, SD of one reading."""
+        left = [self._left(number, effects) for number in range(len(self.scene.bones))]
+        return float(np.sqrt(np.mean(np.square(left))))
+
+    def motion(self, world: World) -> np.ndarray:
+        """(T, S, J, 6) reported without noise."""
+        return world.reported(self.true_motion(world))
+
+    def true_motion(self, world: World) -> np.ndarray:
+        """(T, S, J, 6) coordinates of the true joints."""
+        same = world.bones is self.scene.bones[world.number]
+        spine = self.spines[world.number] if same else Spine(world.bones)
+        self.last[world.number] = solve(world, spine, self.last[world.number]).q
+        return self.last[world.number]
+
+    def strength(self, hidden: Hidden, wanted: float, start: float, top: float):
+        """Strength whose gap is the wanted one, or the largest plausible and solvable; its gap.
+
+        A secant in the logarithms of strength and gap.
+        """
+        (now, power), tried = (min(start, top), 1.0), []
+        for _ in range(MOST_TRIALS):
+            try:
+                found = max(self.gap([(hidden, now)]), 1e-9)
+            except NoEquilibriumError:
+                top = now = 0.7 * now
+                continue
+            tried.append((np.log(now), np.log(found)))
+            if abs(found / wanted - 1.0) < CLOSE or (now >= top and found < wanted):
+                break
+            if len(tried) > 1 and tried[-1][0] != tried[-2][0]:
+                (x, y), (x0, y0) = tried[-1], tried[-2]
+                power = float(np.clip((y - y0) / (x - x0), 0.3, 3.0))
+            ratio = np.clip((wanted / found) ** (1.0 / power), 0.05, 8.0)
+            now = float(min(now * ratio, top))
+        return now, found
+
+    def _left(self, number, effects):
+        world = self.scene.plain(number)
+        for hidden, strength in effects:
+            world = with_effect(world, hidden, strength)
+        if not effects_here(effects, number):
+            return np.zeros_like(readings(self.plain[number], self.recipe))
+        return self.bases[number].left(readings(self.motion(world), self.recipe))
+
+    def _plain(self, number):
+        case = self.scene.tests[0]
+        rest = np.zeros((len(self.scene.tests), len(case.moments), N_JOINTS, 6))
+        return solve(self.scene.plain(number), self.spines[number], rest).q
+
+    def _base(self, number):
+        spine, q = self.spines[number], self.plain[number]
+        return Base(self.scene, self.recipe, number, spine, np.zeros(6), q)
+
+
+def effects_here(effects: list[tuple[Hidden, float]], number: int) -> bool:
+    """Whether any effect has this specimen in its scope."""
+    return any(hidden.specimen in (None, number) for hidden, _ in effects)

@@ -1,0 +1,93 @@
+"""Effects outside the vocabulary, by name."""
+
+import numpy as np
+
+from . import foreign
+from .anatomy import N_JOINTS
+from .design import tests
+from .entry import Entry, joints_of, reach_rad, scope_of, sign, value
+from .recipe import Hidden, Recipe
+from .world import World
+
+
+def _neighbours(world: World, hidden: Hidden, strength: float) -> World:
+    return world.with_law(foreign.Leaning(scope_of(world, hidden), strength))
+
+
+def _clicks(world: World, hidden: Hidden, strength: float) -> World:
+    period = value(hidden, "period_rad")
+    return world.with_law(foreign.Clicks(scope_of(world, hidden), period, strength))
+
+
+def _draw_clicks(rng, recipe: Recipe, coordinate):
+    return {"period_rad": float(rng.uniform(0.8, 1.6) * reach_rad(coordinate, recipe))}
+
+
+def _bump(world: World, hidden: Hidden, strength: float) -> World:
+    angle, width = value(hidden, "angle_rad"), value(hidden, "width_rad")
+    return world.with_law(foreign.Bump(scope_of(world, hidden), angle, width, strength))
+
+
+def _draw_bump(rng, recipe: Recipe, coordinate):
+    reach = reach_rad(coordinate, recipe)
+    return {
+        "angle_rad": float(sign(rng) * rng.uniform(0.3, 0.7) * reach),
+        "width_rad": float(rng.uniform(0.3, 0.5) * reach),
+    }
+
+
+def _quadratic(world: World, hidden: Hidden, strength: float) -> World:
+    stiffness = value(hidden, "sign") * strength
+    return world.with_law(foreign.QuadraticCross(joints_of(world, hidden), stiffness))
+
+
+def _draw_sign(rng, recipe: Recipe, coordinate):
+    return {"sign": sign(rng)}
+
+
+def _walk(world: World, hidden: Hidden, strength: float) -> World:
+    walk = strength * np.cumsum(np.array(value(hidden, "steps"))[world.number], axis=0)
+    return world.with_law(foreign.NeutralWalk(scope_of(world, hidden), world.stiffness, walk))
+
+
+def _draw_walk(rng, recipe: Recipe, coordinate):
+    steps = rng.normal(size=(recipe.n_specimens, len(tests(recipe)), N_JOINTS))
+    return {"steps": steps.tolist()}
+
+
+def _soft_tissue(world: World, hidden: Hidden, strength: float) -> World:
+    reach = value(hidden, "reach_rad")
+    return world.with_view(foreign.SoftTissue(scope_of(world, hidden), reach, strength))
+
+
+def _draw_soft_tissue(rng, recipe: Recipe, coordinate):
+    return {"reach_rad": float(rng.uniform(0.3, 0.6) * reach_rad(coordinate, recipe))}
+
+
+def _drift(world: World, hidden: Hidden, strength: float) -> World:
+    sizes = np.array([np.linalg.norm(case.moments, axis=1) for case in world.tests])
+    share = sizes / sizes.max(axis=1, keepdims=True)
+    angle = value(hidden, "sign") * strength
+    return world.with_view(foreign.OrderDrift(scope_of(world, hidden), share, angle))
+
+
+LAW, READING = "joint law", "measurement"
+ENTRIES = {
+    "neighbour_coupling": Entry(
+        LAW, "stiffness", "N m/rad", 5.0, 200.0, _neighbours, joints="all", known=False
+    ),
+    "periodic_click": Entry(LAW, "load", "N m", 0.2, 5.0, _clicks, _draw_clicks, known=False),
+    "angle_bump": Entry(LAW, "load", "N m", 0.2, 8.0, _bump, _draw_bump, known=False),
+    "quadratic_cross_coupling": Entry(
+        LAW, "stiffness", "N m/rad2", 50.0, 2000.0, _quadratic, _draw_sign, (), known=False
+    ),
+    "neutral_pose_walk": Entry(
+        LAW, "step_sd", "rad", 0.002, 0.1, _walk, _draw_walk, joints="all", known=False
+    ),
+    "soft_tissue_artefact": Entry(
+        READING, "share", "1", 0.1, 1.0, _soft_tissue, _draw_soft_tissue, joints="all", known=False
+    ),
+    "test_order_drift": Entry(
+        READING, "angle", "rad", 0.001, 0.1, _drift, _draw_sign, joints="all", known=False
+    ),
+}

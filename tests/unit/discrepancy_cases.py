@@ -1,0 +1,249 @@
+"""Projects with results of a search for missing effects: made up, not computed."""
+
+import json
+from collections.abc import Mapping
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from chain_cases import JOINTS, ROTATIONS, STUDY, Chains
+
+from spinepipe.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE, Table, from_rows, write
+
+Rows = list[dict[str, Any]]
+
+TESTS = ("flexion", "left_lateral_bending", "left_axial_rotation")
+SPECIMENS = ("a", "b", "c")
+STEPS = 8
+SD_DEG = 0.07
+EFFECTS = {
+    "neutral_zone": ("joint law", 0.21, 88.0),
+    "nonlinear_stiffening": ("joint law", 0.32, 71.0),
+    "facet_contact": ("joint law", 0.18, 33.0),
+    "flexion_extension_asymmetry": ("joint law", 0.12, 30.5),
+    "hysteresis": ("path", 0.40, 4.1),
+    "load_misalignment": ("load", 0.66, -1.4),
+    "marker_bias": ("measurement", 0.55, -2.2),
+}
+"""Kind, share absorbed by base and nuisance, and log evidence when a neutral zone is missing."""
+
+HIDDEN = {"joint_centre_offset": "geometry", "preload_stiffening": "joint law"}
+"""Effects that these tests cannot show."""
+
+_SCOPE = {"joints": ["L4L5"], "coordinates": ["extension"], "specimens": ["*"]}
+_NAMED = {
+    "name": "neutral_zone",
+    "kind": "joint law",
+    "scope": _SCOPE,
+    "parameters": [
+        {"name": "half_width", "value": 1.55, "unit": "deg", "ci95": [1.42, 1.69]},
+        {"name": "stiffness_ratio", "value": 0.21, "unit": "", "ci95": [0.17, 0.26]},
+    ],
+    "log_evidence": 88.0,
+    "rivals": [
+        {"name": "nonlinear_stiffening", "log_evidence_margin": 17.0},
+        {"name": "facet_contact", "log_evidence_margin": 55.0},
+    ],
+}
+_COMMON = {
+    "cohort": "chains",
+    "effects": [],
+    "candidates_in_set": [],
+    "not_testable": [
+        {
+            "name": "joint_centre_offset",
+            "why": "pure moments and measured rotations leave no trace of it",
+            "test_that_would_tell": "measured translations, or a transverse force",
+        },
+        {
+            "name": "preload_stiffening",
+            "why": "all tests have the same compression",
+            "test_that_would_tell": "the same test under a second preload",
+        },
+    ],
+    "noise": {"source": "repeats", "rotation_sd_deg": 0.1, "serial_correlation": 0.3},
+    "rms_residual": {"unit": "noise sd", "base": 1.01, "with_effects": 1.01,
+                     "held_out_base": 1.04, "held_out_with_effects": 1.04},
+    "gap": {"unit": "noise sd", "base": 0.14, "with_effects": 0.14, "held_out_base": 0.28,
+            "held_out_with_effects": 0.28, "held_out_closed": None},
+    "smallest_detectable": [
+        {"name": name, "gap": round(0.15 + 0.3 * absorbed, 2)}
+        for name, (_, absorbed, _) in EFFECTS.items()
+    ],
+    "unknown": {"where": "", "shape": ""},
+    "suspected_data_errors": [],
+    "why": "",
+    "threshold": {"log_evidence": 6.2, "false_alarm": 0.01, "draws": 500},
+}  # fmt: skip
+_OPEN = {
+    "rms_residual": {"unit": "noise sd", "base": 4.1, "with_effects": 1.02,
+                     "held_out_base": 4.3, "held_out_with_effects": 1.06},
+    "gap": {"unit": "noise sd", "base": 3.98, "with_effects": 0.2, "held_out_base": 4.18,
+            "held_out_with_effects": 0.35, "held_out_closed": 0.97},
+}  # fmt: skip
+VERDICTS: dict[str, dict[str, Any]] = {
+    "NAMED": _COMMON | _OPEN | {
+        "verdict": "NAMED",
+        "effects": [_NAMED],
+        "why": "the neutral zone beats every rival by more than the margin",
+        "detected_from": "flexion",
+    },
+    "NULL": _COMMON | {"verdict": "NULL"},
+    "SET": _COMMON | _OPEN | {
+        "verdict": "SET",
+        "candidates_in_set": [
+            _NAMED,
+            {"name": "nonlinear_stiffening", "kind": "joint law", "scope": _SCOPE,
+             "log_evidence": 86.5},
+        ],
+        "suspected_data_errors": [
+            {"where": "specimen b, flexion, cycle 2, L3L4", "what": "sign flipped",
+             "evidence": "slope on the other cycles is -0.98"},
+        ],
+        "gap": {**_OPEN["gap"], "with_effects": 3.98, "held_out_with_effects": None,
+                "held_out_closed": None},
+        "rms_residual": {**_OPEN["rms_residual"], "with_effects": 4.1},
+    },
+    "UNKNOWN": _COMMON | _OPEN | {
+        "verdict": "UNKNOWN",
+        "unknown": {"where": "L4L5, flexion-extension, in flexion above 5 N m",
+                    "shape": "one side only, grows with the cube of the angle"},
+        "gap": {**_OPEN["gap"], "with_effects": 3.98, "held_out_with_effects": None,
+                "held_out_closed": None},
+        "rms_residual": {**_OPEN["rms_residual"], "with_effects": 4.1},
+    },
+}  # fmt: skip
+"""What a search may come to, as ``verdict.json`` holds it."""
+
+
+def project(root: Path, study: str = "base: {stiffness: per_specimen}\n") -> Path:
+    """A project with a cohort of straight chains and one study of it."""
+    stiffness = np.array([[50.0, 60.0, 200.0]] * len(JOINTS))
+    chains = Chains(dict.fromkeys(SPECIMENS, stiffness), TESTS, steps=STEPS, noise_deg=0.05)
+    chains.write(root)
+    head = f"study: {STUDY}\nkind: discrepancy\ncohort: chains\n"
+    (root / "config" / "studies" / f"{STUDY}.yaml").write_text(head + study)
+    return root
+
+
+def results(root: Path, answer: str) -> Path:
+    """Verdict and tables of a finished search in ``results/probe/discrepancy``; that folder."""
+    folder = root / "results" / STUDY / "discrepancy"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "verdict.json").write_text(json.dumps(VERDICTS[answer]))
+    for name, (table, rows) in _tables(answer).items():
+        write(table_of(table, rows), folder / f"{name}.parquet", {"seed": "1"})
+    return folder
+
+
+def table_of(table: Table, rows: Rows) -> pa.Table:
+    """Rows as a table; cells that are not given are empty."""
+    names = [column.name for column in table.columns]
+    return from_rows(table, [{name: row.get(name) for name in names} for row in rows])
+
+
+def frames(answer: str) -> dict[str, pd.DataFrame]:
+    """The tables as rows read back."""
+    return {
+        name: table_of(table, rows).to_pandas() for name, (table, rows) in _tables(answer).items()
+    }
+
+
+def _tables(answer: str) -> Mapping[str, tuple[Table, Rows]]:
+    wide, named = answer != "NULL", answer == "NAMED"
+    return {
+        "gap": (GAP, _gap(wide, named)),
+        "candidates": (CANDIDATES, _candidates(wide)),
+        "where": (WHERE, _where(wide, named)),
+        "confusions": (CONFUSIONS, _confusions()),
+        "held_out": (HELD_OUT, _held_out(wide, named)),
+    }
+
+
+def _gap(wide: bool, named: bool) -> Rows:
+    """A neutral zone at L4L5 in flexion makes it turn by 1.5 deg more, at once."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for specimen, (test, driven), joint, (axis, coordinate), step in product(
+        SPECIMENS, zip(TESTS, ROTATIONS, strict=True), JOINTS, enumerate(ROTATIONS), range(STEPS)
+    ):
+        base = -step / (50.0, 60.0, 200.0)[axis] * 57.3 if coordinate == driven else 0.0
+        loose = wide and joint == "L4L5" and coordinate == test.replace("flexion", "extension")
+        truth = base - (1.5 * np.tanh(step) - 0.2 * step if loose else 0.0)
+        measured = truth + SD_DEG * rng.normal()
+        modelled = truth if named else base
+        key = {"specimen": specimen, "test": test, "step": step, "joint": joint}
+        values = {"measured": measured, "base": base, "with_effects": modelled}
+        values |= {"held_out_base": base, "held_out_with_effects": modelled}
+        rows.append({**key, "coordinate": coordinate, "unit": "deg", "readings": 2, **values,
+                     "noise_sd": SD_DEG, "held_out_fold": f"specimen {specimen}"})  # fmt: skip
+    return rows
+
+
+def _where(wide: bool, named: bool) -> Rows:
+    places = [("all", {})]
+    places += [("joint", {"joint": joint}) for joint in JOINTS]
+    places += [("step", {"step": str(step)}) for step in range(STEPS)]
+    places += [
+        ("joint x coordinate x test", {"joint": joint, "coordinate": coordinate, "test": test})
+        for joint, coordinate, test in product(JOINTS, ROTATIONS, TESTS)
+    ]
+    everywhere = dict.fromkeys(("specimen", "test", "step", "joint", "coordinate"), "*")
+    rows = []
+    for (by, place), model in product(places, ("base", "with_effects")):
+        worst = place.get("joint") == "L4L5" and place.get("test", "flexion") == "flexion"
+        worst &= place.get("coordinate", "extension") == "extension"
+        left = wide and not (named and model == "with_effects")
+        gap = 9.3 if worst and left else 1.1 if by in ("all", "step") and left else 0.0
+        rows.append({"by": by, **everywhere, **place, "readings": 24, "model": model, "gap": gap,
+                     "gap_low": 0.8 * gap, "gap_high": 1.2 * gap + 0.1,
+                     "rms_residual": (1.0 + gap**2) ** 0.5})  # fmt: skip
+    return rows
+
+
+def _candidates(wide: bool) -> Rows:
+    rows = []
+    for name, (kind, absorbed, evidence) in EFFECTS.items():
+        told = {"effect": name, "kind": kind, "variant": '{"coordinate": "extension"}',
+                "spread": "one joint", "shape": "{}", "parameters": 1, "unit": "",
+                "absorbed": absorbed, "detectable_gap": 0.15 + 0.3 * absorbed,
+                "status": "converged", "message": ""}  # fmt: skip
+        rows.append({**told, "stage": "design", "scope": "*"})
+        for joint, share in (("L4L5", 1.0), ("L3L4", 0.2)):
+            found = share * evidence if wide else -2.0 + absorbed
+            fit = {"scope": joint, "log_evidence": 0.9 * found, "delta_chi2": 2.0 * found,
+                   "gap_share": 0.5, "threshold": 6.2, "estimate": 0.2}  # fmt: skip
+            rows.append({**told, "stage": "screen 1", **fit})
+            if joint == "L4L5" and wide and found > 20.0:
+                rows.append({**told, "stage": "refit 1", **fit, "log_evidence": found})
+    for name, kind in HIDDEN.items():
+        rows.append({"stage": "design", "effect": name, "kind": kind, "variant": "{}",
+                     "spread": "shared", "scope": "*", "shape": "{}", "parameters": 1, "unit": "",
+                     "absorbed": 0.999, "status": "not_testable",
+                     "message": "absorbed by the base"})  # fmt: skip
+    return rows
+
+
+def _confusions() -> Rows:
+    names = list(EFFECTS)
+    rng = np.random.default_rng(4)
+    return [
+        {"effect": one, "other": other, "share": 1.0 if one == other else 0.9 * rng.random()}
+        for one, other in product(names, names)
+    ]
+
+
+def _held_out(wide: bool, named: bool) -> Rows:
+    rows: Rows = []
+    folds = [("specimen", name) for name in SPECIMENS] + [("test", name) for name in TESTS]
+    for number, (kind, name) in enumerate(folds):
+        base = 3.9 + 0.2 * number if wide else 1.0 + 0.01 * number
+        done = {"status": "converged", "message": ""}
+        rows.append({"fold": f"{kind} {name}", "kind": kind, "readings": 216, "rms_base": base,
+                     "rms_with_effects": 1.03 + 0.01 * number if named else base,
+                     "rms_surrogate": 2.1 + 0.1 * number if wide else None,
+                     "closed": 0.97 if named else None, **done})  # fmt: skip
+    return rows

@@ -1,0 +1,279 @@
+"""Figures, headline and page of a search for missing effects, from made-up results."""
+
+import json
+import re
+from collections.abc import Mapping
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from discrepancy_cases import EFFECTS, HIDDEN, STUDY, VERDICTS, frames, project, results
+from matplotlib.figure import Figure
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.discrepancy import figures as figures_job
+from spinepipe.jobs.discrepancy import report as report_job
+from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES, TABLES
+from spinepipe.report.discrepancy import DRAW
+from spinepipe.report.discrepancy.effect_evidence import evidence_by_round
+from spinepipe.report.discrepancy.findings import findings, warnings
+from spinepipe.report.discrepancy.gap_by_step import worst_places
+from spinepipe.report.discrepancy.headline import headline, how_sure
+from spinepipe.report.discrepancy.page import TITLES, discrepancy_page, left_out
+from spinepipe.report.discrepancy.read_verdict import verdict_of
+from spinepipe.report.discrepancy.tables import shown_tables
+from spinepipe.report.discrepancy.verdict import Answer
+from spinepipe.report.page.results import Results
+from spinepipe.report.style import picture, style
+from spinepipe.studies import Discrepancy, check
+
+ROOT = Path(__file__).resolve().parents[2]
+CAPTIONS = {name: (ROOT / "workflow" / "report" / f"{name}.rst").read_text() for name in DRAW}
+
+
+def study_of(root: Path, text: str = "base: {stiffness: per_specimen}\n") -> Any:
+    return check(project(root, text), STUDY)
+
+
+def drawn(name: str, cohort: Cohort, answer: str, **changed: pd.DataFrame) -> Figure:
+    """A figure of a made-up outcome, some of its tables changed."""
+    with style():
+        figure = DRAW[name](cohort, verdict_of(VERDICTS[answer]), frames(answer) | changed)
+        assert picture(figure, "svg")
+    return figure
+
+
+def said(figure: Figure) -> str:
+    """All text of a figure in one line."""
+    texts = [*figure.texts]
+    for legend in figure.legends:
+        texts += [legend.get_title(), *legend.get_texts()]
+    for axis in figure.axes:
+        texts += [*axis.texts, axis.title, axis._left_title]  # type: ignore[attr-defined]
+        texts += [axis.xaxis.label, *axis.get_yticklabels(), *axis.get_xticklabels()]
+    return " ".join(" ".join(text.get_text() for text in texts).split())
+
+
+@pytest.mark.parametrize(("answer", "name"), list(product(VERDICTS, DRAW)))
+def test_every_figure_is_drawn_whatever_the_verdict(answer: str, name: str, tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    assert len(said(drawn(name, cohort, answer))) > 40
+
+
+def test_the_map_shows_each_test_before_and_after(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    figure = drawn("gap_map", cohort, "NAMED")
+    titles = [axis.get_title("left").strip() for axis in figure.axes]
+    assert titles.count("base") == titles.count("with effects") == 3
+    assert "9.3" in said(figure)
+    alone = [axis.get_title("left").strip() for axis in drawn("gap_map", cohort, "NULL").axes]
+    assert (alone.count("base"), alone.count("with effects")) == (3, 0)
+
+
+def test_the_map_takes_six_joints_six_coordinates_and_many_tests(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    one = frames("NAMED")["where"]
+    one = one[one["by"] == "joint x coordinate x test"]
+    every = [one.assign(coordinate=name) for name in ("anterior", "superior", "right")]
+    figure = drawn("gap_map", cohort, "NAMED", where=pd.concat([one, *every]))
+    assert "ant." in said(figure)
+
+
+def test_places_of_the_largest_gap_come_first_and_once() -> None:
+    gap = frames("NAMED")["gap"]
+    _, *place = worst_places(gap)[0]
+    assert place == ["flexion", "L4L5", "extension"]
+    assert len(worst_places(gap)) == 3  # one is off, and two more for comparison
+    hidden = gap.assign(base=np.nan)
+    assert worst_places(hidden) == []
+    off = gap.assign(base=gap["measured"] + 10.0 * gap["noise_sd"])
+    found = worst_places(off)
+    assert len(found) == 6
+    assert len({tuple(place[1:]) for place in found}) == 6
+
+
+def test_a_model_without_poses_is_said_to_have_none(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    tables = frames("NAMED")
+    gap = tables["gap"].assign(base=np.nan, with_effects=np.nan)
+    assert "no pose" in said(drawn("gap_by_step", cohort, "NAMED", gap=gap))
+    where = tables["where"].assign(gap=np.nan)
+    assert "no model has a pose" in said(drawn("gap_map", cohort, "NAMED", where=where))
+    nothing = tables["held_out"].iloc[:0]
+    assert "nothing was left out" in said(drawn("gap_held_out", cohort, "NAMED", held_out=nothing))
+    empty = {name: tables[name].iloc[:0] for name in ("candidates", "confusions")}
+    assert "no effect was tried" in said(drawn("effect_evidence", cohort, "NULL", **empty))
+
+
+def test_the_best_form_of_an_effect_stands_for_it() -> None:
+    candidates = frames("NAMED")["candidates"]
+    (first,) = evidence_by_round(candidates)
+    assert first.index[-1] == "neutral_zone"
+    assert first.loc["neutral_zone", "refit"] == 88.0
+    assert first.loc["neutral_zone", "screen"] == pytest.approx(0.9 * 88.0)  # not 0.2 of it at L3L4
+    assert np.isnan(first.loc["marker_bias", "refit"])
+    later = candidates.assign(stage=candidates["stage"].str.replace(" 1", " 2"))
+    assert len(evidence_by_round(pd.concat([candidates, later]))) == 2
+
+
+def test_what_cannot_be_tested_stands_beside_what_can(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    words = said(drawn("effect_confusions", cohort, "NULL"))
+    assert words.count("not testable here") == len(HIDDEN) + 1  # and in the key
+    assert all(name.replace("_", " ") in words for name in [*EFFECTS, *HIDDEN])
+
+
+def test_a_fold_without_a_result_tells_why(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    held = frames("NAMED")["held_out"]
+    rms = ["rms_base", "rms_with_effects", "rms_surrogate"]
+    held.loc[0, [*rms, "closed"]] = np.nan
+    held.loc[0, ["status", "message"]] = ["unstable", "it tips over"]
+    assert "no result: it tips over" in said(drawn("gap_held_out", cohort, "NAMED", held_out=held))
+
+
+HEADLINES = {
+    "NAMED": "The model lacks a neutral zone at L4L5, in flexion–extension.",
+    "NULL": "Nothing is missing above the noise. A gap would have been named from 0.19 to 0.35 "
+    "noise SD, depending on the effect.",
+    "SET": "One of these is missing, at L4L5, in flexion–extension, and these tests cannot tell "
+    "which: a neutral zone or nonlinear stiffening.",
+    "UNKNOWN": "Something is missing that is none of the known effects: L4L5, flexion-extension, "
+    "in flexion above 5 N m.",
+}
+
+
+@pytest.mark.parametrize(("answer", "words"), HEADLINES.items())
+def test_the_verdict_is_one_sentence(answer: str, words: str) -> None:
+    assert headline(verdict_of(VERDICTS[answer])) == words
+
+
+def test_how_sure_a_name_is() -> None:
+    assert how_sure(verdict_of(VERDICTS["NAMED"])) == (
+        "Neutral zone: log evidence 88.0, 6.2 is needed; next best nonlinear stiffening, 17 "
+        "behind. Residuals of 4.10 noise SD become 1.02 (1 is noise). On motion held out of the "
+        "fits 97 % of the gap is closed."
+    )
+    assert "Its shape: one side only" in how_sure(verdict_of(VERDICTS["UNKNOWN"]))
+
+
+def test_two_effects_and_a_set_beside_a_name() -> None:
+    second = {"name": "hysteresis", "scope": {"joints": ["*"], "specimens": ["a", "b"]}}
+    both = VERDICTS["NAMED"] | {"effects": [*VERDICTS["NAMED"]["effects"], second]}
+    told = headline(verdict_of(both))
+    assert told.endswith("; and hysteresis at all joints, in specimens a and b.")
+    beside = VERDICTS["SET"] | {"effects": [second], "candidates_in_set": ["creep", "marker_bias"]}
+    assert headline(verdict_of(beside)) == (
+        "The model lacks hysteresis at all joints, in specimens a and b. Besides, one of these is "
+        "missing, and these tests cannot tell which: creep or a marker bias."
+    )
+
+
+def test_keys_that_are_not_there_are_not_needed() -> None:
+    for answer in Answer:
+        bare = verdict_of({"cohort": "c", "verdict": answer.value})
+        assert headline(bare)
+        assert how_sure(bare) == ""
+        assert findings(bare, Results({}, {}, {}, {})) == []
+        assert shown_tables(bare, Results({}, {}, {}, {})) == []
+    with pytest.raises(ValueError, match="PERHAPS"):
+        verdict_of({"cohort": "c", "verdict": "PERHAPS"})
+
+
+def test_errors_of_the_data_come_first() -> None:
+    (told,) = warnings(verdict_of(VERDICTS["SET"]))
+    assert told == (
+        "Look at the data first: specimen b, flexion, cycle 2, L3L4: sign flipped (slope on the "
+        "other cycles is -0.98)."
+    )
+
+
+def told(answer: str, **changes: Any) -> str:
+    data: Mapping[str, Any] = VERDICTS[answer] | changes
+    return " ".join(findings(verdict_of(data), Results(frames(answer), {}, {}, {})))
+
+
+def test_findings_have_sizes_places_and_noise() -> None:
+    words = told("NAMED").replace("\u00a0", " ")
+    assert "half width 1.55° (95 % interval 1.42 to 1.69)" in words
+    assert "L4L5, flexion–extension, flexion: 9.3 (7.4 to 11.3)" in words
+    assert "above the noise at 1 of 27 places" in words
+    assert (
+        "SD of one reading 0.10°, from repeated cycles, correlation from step to step 0.30" in words
+    )
+    assert "by more than the margin. Detected from: flexion." in words
+    assert "agree within the noise" in told("NULL")
+    declared = told("NULL", noise={"source": "declared", "rotation_sd_deg": 0.2})
+    assert "no cycle was repeated, so all hangs on that number" in declared
+
+
+@pytest.mark.parametrize("answer", VERDICTS)
+def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
+    study, cohort = study_of(tmp_path)
+    pictures = dict.fromkeys(DRAW, "<svg xmlns='http://www.w3.org/2000/svg'/>")
+    found = Results(frames(answer), {}, pictures, CAPTIONS)
+    page = discrepancy_page(study, cohort, found, verdict_of(VERDICTS[answer]))
+    assert page == discrepancy_page(study, cohort, found, verdict_of(VERDICTS[answer]))
+    assert f'<p class="headline">{HEADLINES[answer]}</p>' in page
+    places = [page.index(f'<section id="{name}"') for name in ("findings", "figures", "segment")]
+    assert places == sorted(places)
+    assert page.index('class="headline"') < page.index("<li>")
+    if answer == "SET":
+        assert page.index('class="warning"') < page.index('class="headline"')
+    ids = re.findall(r'id="([^"]+)"', page[: page.index("<script")])
+    assert len(set(ids)) == len(ids)
+
+
+def test_tables_of_the_page_hold_the_verdict() -> None:
+    found = Results(frames("NAMED"), {}, {}, {})
+    titles = [table.title for table in shown_tables(verdict_of(VERDICTS["NAMED"]), found)]
+    assert titles[:3] == [
+        "What is missing, and how large it is",
+        "Next best names",
+        "What these tests cannot show",
+    ]
+    assert "One of these is missing" not in titles
+    in_set = shown_tables(verdict_of(VERDICTS["SET"]), found)
+    assert [table.title for table in in_set][:2] == [
+        "Suspected errors of the data",
+        "One of these is missing",
+    ]
+
+
+def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:
+    text = (
+        "base: {stiffness: per_joint}\nheld_out: {tests: false}\n"
+        "nuisance: {load_gain: 0, rotation_order: 0}\n"
+    )
+    study, _ = study_of(tmp_path, text)
+    assert isinstance(study, Discrepancy)
+    assert list(left_out(study)) == [
+        "prediction of left-out tests (held_out: tests: false)",
+        "nuisance load_gain (nuisance: load_gain: 0)",
+        "nuisance rotation_order (nuisance: rotation_order: 0)",
+    ]
+
+
+def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
+    folder = results(project(tmp_path), "NAMED")
+    verdict = str(folder / "verdict.json")
+    name = "gap_held_out"
+    made = {kind: str(folder / f"{name}.{kind}") for kind in ("svg", "png")}
+    tables = [str(folder / f"{table}.parquet") for table in DISCREPANCY_FIGURES[name]]
+    figures_job.run(str(tmp_path), STUDY, name, tables, verdict, **made)
+    assert Path(made["png"]).read_bytes().startswith(b"\x89PNG")
+    report_job.run(
+        str(tmp_path), STUDY, [str(folder / f"{table}.parquet") for table in TABLES],
+        [made["svg"]], [str(ROOT / "workflow" / "report" / f"{name}.rst")], verdict,
+        str(folder / "report.html"),
+    )  # fmt: skip
+    assert TITLES[name] in (folder / "report.html").read_text()
+    assert json.loads((folder / "verdict.json").read_text())["verdict"] == "NAMED"
+
+
+def test_every_figure_has_a_caption_and_a_title() -> None:
+    assert set(DRAW) == set(DISCREPANCY_FIGURES) == set(TITLES)
+    assert all(text.strip() for text in CAPTIONS.values())
