@@ -11,8 +11,13 @@ from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.discrepancy.whitening import Whitening, whitening
 from spinepipe.effects.contract import Array
 
+Flags = NDArray[np.bool_]
 
-def only(test: Repeats, chosen: NDArray[np.bool_]) -> Repeats:
+Masks = Mapping[str, tuple[Flags, ...]]
+"""Readings of each test, (T, J, 6), by specimen."""
+
+
+def only(test: Repeats, chosen: Flags) -> Repeats:
     """A test with the readings of some load steps (T,), or of some places (T, J, 6), alone."""
     there = chosen[:, None, None] if chosen.ndim == 1 else chosen
     return replace(test, cycles=np.where(there, test.cycles, np.nan))
@@ -25,7 +30,7 @@ class Chosen:
         self.readings, self.noise = readings, noise
         self._known: dict[tuple[str, int, bytes], Whitening] = {}
 
-    def whitening(self, specimen: str, test: int, chosen: NDArray[np.bool_]) -> Whitening:
+    def whitening(self, specimen: str, test: int, chosen: Flags) -> Whitening:
         """Of one test of a specimen."""
         key = (specimen, test, chosen.tobytes())
         if key not in self._known:

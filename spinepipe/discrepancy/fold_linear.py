@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cholesky, solve, solve_triangular
 from scipy.optimize import lsq_linear
 
-from spinepipe.discrepancy.chosen import Chosen
+from spinepipe.discrepancy.chosen import Chosen, Flags
 from spinepipe.discrepancy.folds import Part
 from spinepipe.discrepancy.tangent import LinearModel
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,11 @@ class Placed:
     Attributes
     ----------
     motion : per test (T, J, 6) of the model alone. nuisances : what nuisances, as found in
-        training, add to it. se : standard error of the prediction, nuisances held.
+        training, add to it.
     """
 
     motion: Mapping[str, tuple[Array, ...]]
     nuisances: Mapping[str, tuple[Array, ...]]
-    se: Mapping[str, tuple[Array, ...]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class _Normal:
 
     def nuisances(self, x: Array) -> Array:
         """(k,) most likely values beside unknowns x (m,)."""
-        found: Array = np.linalg.solve(self.inner, self.drive - self.outer @ x)
+        found: Array = solve(self.inner, self.drive - self.outer @ x, assume_a="pos")
         return found
 
 
@@ -64,55 +63,61 @@ class LinearFolds:
 
     def placed(self, part: Part) -> Placed:
         """The scored specimens as the training has them."""
-        model = self.model
-        normals = {name: self._normal(name, part) for name in model.members}
-        everyone = np.arange(len(model.mean))
-        others = {name: one for name, one in normals.items() if name != part.apart}
-        x, covariance = self._solved(others, everyone, np.zeros(len(everyone)))
-        if part.apart is not None:
-            own = self._own(part.apart)
-            alone = {part.apart: normals[part.apart]}
-            x[own], covariance[np.ix_(own, own)] = self._solved(alone, own, x)
-        motion, nuisances, se = {}, {}, {}
+        members = self.model.members
+        normals = {name: self._normal(name, part) for name in members}
+        x = self._fitted(part, normals)
+        motion, nuisances = {}, {}
         for name in part.scored:
-            one = model.members[name]
-            move = x[one.numbers]
+            one, move = members[name], x[members[name].numbers]
             z = normals[name].nuisances(move)
-            own_covariance = covariance[np.ix_(one.numbers, one.numbers)]
             motion[name] = tuple(
-                p + b @ move for p, b in zip(one.predicted, one.by_x, strict=True)
+                p + by_x @ move for p, by_x in zip(one.predicted, one.by_x, strict=True)
             )
             nuisances[name] = tuple(moved @ z for moved in one.nuisances)
-            se[name] = tuple(_se(by_x, own_covariance) for by_x in one.by_x)
-        return Placed(motion, nuisances, se)
+        return Placed(motion, nuisances)
 
-    def _own(self, specimen: str) -> Array:
-        """Unknowns of no other specimen."""
-        members = self.model.members
-        others = [one.numbers for name, one in members.items() if name != specimen]
-        return np.setdiff1d(members[specimen].numbers, np.concatenate(others))
+    def standard_errors(self, part: Part) -> dict[str, tuple[Array, ...]]:
+        """Per test (T, J, 6) standard error of what the training predicts, nuisances held."""
+        members, count = self.model.members, len(self.model.mean)
+        precision = np.diag(self.model.sd**-2.0)
+        for name, one in members.items():
+            np.add.at(precision, np.ix_(one.numbers, one.numbers), self._normal(name, part).held)
+        covariance: Array = solve(precision, np.eye(count), assume_a="pos")
+        found = {}
+        for name in part.scored:
+            own = covariance[np.ix_(members[name].numbers, members[name].numbers)]
+            found[name] = tuple(_se(by_x, own) for by_x in members[name].by_x)
+        return found
 
-    def _solved(
-        self, normals: Mapping[str, _Normal], free: Array, x: Array
-    ) -> tuple[Array, Array]:
-        """Most likely values of the free unknowns (others as in x), and their covariance.
+    def left_open(self, part: Part) -> dict[str, Array]:
+        """(k, k) covariance of each scored specimen's nuisances after training, unknowns held."""
+        found = {}
+        for name in part.scored:
+            inner = self._normal(name, part).inner
+            found[name] = solve(inner, np.eye(len(inner)), assume_a="pos")
+        return found
 
-        The covariance holds the nuisances: it says what the training tells of the unknowns.
-        """
+    def _fitted(self, part: Part, normals: Mapping[str, _Normal]) -> Array:
+        """(M,) most likely values."""
+        others = {name: one for name, one in normals.items() if name != part.apart}
+        x = np.zeros(len(self.model.mean))
+        x = self._solved(others, np.arange(len(x)), x)
+        if part.apart is not None:
+            own = own_unknowns({n: m.numbers for n, m in self.model.members.items()}, part.apart)
+            x[own] = self._solved({part.apart: normals[part.apart]}, own, x)
+        return x
+
+    def _solved(self, normals: Mapping[str, _Normal], free: Indices, x: Array) -> Array:
+        """Most likely values of the free unknowns, others as in x."""
         model, count = self.model, len(x)
-        matrix, held, moment = np.zeros((count, count)), np.zeros((count, count)), np.zeros(count)
+        matrix, moment = np.diag(model.sd**-2.0), model.mean * model.sd**-2.0
         for name, one in normals.items():
-            at = np.ix_(model.members[name].numbers, model.members[name].numbers)
-            np.add.at(matrix, at, one.matrix)
-            np.add.at(held, at, one.held)
-            np.add.at(moment, model.members[name].numbers, one.moment)
+            numbers = model.members[name].numbers
+            np.add.at(matrix, np.ix_(numbers, numbers), one.matrix)
+            np.add.at(moment, numbers, one.moment)
         fixed = np.setdiff1d(np.arange(count), free)
-        precision = np.diag(model.sd[free] ** -2.0)
         drive = moment[free] - matrix[np.ix_(free, fixed)] @ x[fixed]
-        drive = drive + model.mean[free] * model.sd[free] ** -2.0
-        inside = np.ix_(free, free)
-        found = _bounded(matrix[inside] + precision, drive, model.low[free], model.high[free])
-        return found, np.linalg.inv(held[inside] + precision)
+        return _bounded(matrix[np.ix_(free, free)], drive, model.low[free], model.high[free])
 
     def _normal(self, specimen: str, part: Part) -> _Normal:
         one = self.model.members[specimen]
@@ -124,11 +129,11 @@ class LinearFolds:
         x, z = slice(0, m), slice(m, m + k)
         inner = np.eye(k) + gram[z, z]
         outer, drive = gram[z, x], gram[z, -1]
-        gain = np.linalg.solve(inner, outer).T
+        gain = solve(inner, outer, assume_a="pos").T
         matrix = gram[x, x] - gain @ outer
         return _Normal(gram[x, x], matrix, gram[x, -1] - gain @ drive, inner, outer, drive)
 
-    def _gram(self, specimen: str, test: int, steps: Array) -> Array:
+    def _gram(self, specimen: str, test: int, steps: Flags) -> Array:
         """Products of unknowns' and nuisances' columns and the misfit, whitened."""
         key = (specimen, test, steps.tobytes())
         if key not in self._grams:
@@ -141,15 +146,22 @@ class LinearFolds:
         return self._grams[key]
 
 
+def own_unknowns(numbers: Mapping[str, Indices], specimen: str) -> Indices:
+    """Unknowns of no other specimen."""
+    others = [own for name, own in numbers.items() if name != specimen]
+    return np.setdiff1d(numbers[specimen], np.concatenate(others))
+
+
 def _bounded(matrix: Array, drive: Array, low: Array, high: Array) -> Array:
     """Minimum of ``x' matrix x / 2 - drive' x`` inside bounds."""
-    factor = cho_factor(matrix, lower=True)
-    found: Array = cho_solve(factor, drive)
+    scale = 1.0 / np.sqrt(np.diagonal(matrix))  # unknowns of different units become alike
+    lower = cholesky(matrix * np.outer(scale, scale), lower=True)
+    target = solve_triangular(lower, scale * drive, lower=True)
+    found: Array = scale * solve_triangular(lower.T, target)
     if np.all((low <= found) & (found <= high)):
         return found
-    lower = np.tril(factor[0])
-    target = solve_triangular(lower, drive, lower=True)
-    bounded: Array = lsq_linear(lower.T, target, bounds=(low, high)).x
+    inside = lsq_linear(lower.T, target, bounds=(low / scale, high / scale), method="bvls")
+    bounded: Array = scale * inside.x
     return bounded
 
 

@@ -42,14 +42,16 @@ class Fold:
     parts: tuple[Part, ...]
 
 
-def test_folds(readings: Mapping[str, SpecimenReadings], tests: Sequence[str]) -> tuple[Fold, ...]:
+def folds_by_test(
+    readings: Mapping[str, SpecimenReadings], tests: Sequence[str]
+) -> tuple[Fold, ...]:
     """One test left out in all specimens; none where there is only one."""
     if len(tests) < 2:
         return ()
     return tuple(Fold(name, TEST, (_without(readings, name),)) for name in tests)
 
 
-def specimen_folds(readings: Mapping[str, SpecimenReadings]) -> tuple[Fold, ...]:
+def folds_by_specimen(readings: Mapping[str, SpecimenReadings]) -> tuple[Fold, ...]:
     """One specimen left out, but for half of its load steps; none where there is only one."""
     if len(readings) < 2:
         return ()

@@ -1,17 +1,25 @@
-"""The verdict of a search: named, a set, nothing, or something that is none of the known effects."""
+"""The verdict of a search: named, a set, nothing, or something no known effect is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from spinepipe.discrepancy.held_out import HeldOut
 from spinepipe.discrepancy.screen import LEAST_THRESHOLD
 from spinepipe.discrepancy.search import Found, Standing
+from spinepipe.discrepancy.suspected import SuspectedError
 
 UNEXPLAINED_SHARE = 0.1
-"""Of what effects and generic basis explain together: more than this left to the basis is unknown."""
+"""Of what effects and generic basis explain together: more left to the basis is unknown."""
 
 GAP_LEFT = 0.5
 """Share of the base's excess chi2 that named effects may leave, if it is above the noise."""
+
+ALONE = 0.25
+"""Share of its evidence that an effect must have without the others.
+
+One that has less only mends what another gets wrong: together they imitate something else.
+"""
 
 
 class Verdict(StrEnum):
@@ -38,9 +46,19 @@ class Outcome:
     tied: tuple[str, ...]
 
 
-def outcome(found: Found, margin: float) -> Outcome:
-    """What a search's end means."""
-    unexplained = _unexplained(found)
+def outcome(
+    found: Found,
+    margin: float,
+    proof: HeldOut | None = None,
+    errors: Sequence[SuspectedError] = (),
+) -> Outcome:
+    """What a search's end means.
+
+    Parameters
+    ----------
+    proof : on data held out; None where none was asked for. errors : suspected in the data.
+    """
+    unexplained = _mistaken(errors) or _unexplained(found) or _unproven(found, proof)
     if unexplained:
         return Outcome(Verdict.UNKNOWN, unexplained, (), ())
     if not found.standing:
@@ -54,6 +72,22 @@ def outcome(found: Found, margin: float) -> Outcome:
     names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
     why = f"{names}: evidence above the null's and {margin:g} above every rival's"
     return Outcome(Verdict.NAMED, why, sure, ())
+
+
+def _mistaken(errors: Sequence[SuspectedError]) -> str:
+    """Data errors are not physics: nothing is named before they are looked at."""
+    if not errors:
+        return ""
+    places = "; ".join(f"{one.what} ({one.where})" for one in errors[:3])
+    return f"the data look wrong, so nothing is named: {places}"
+
+
+def _unproven(found: Found, proof: HeldOut | None) -> str:
+    """What is named must predict better than the base what it has not seen."""
+    if not found.standing or proof is None or proof.over_base is None or proof.beats_base:
+        return ""
+    names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
+    return f"{names} would explain these readings, but predicts held-out ones no better"
 
 
 def _tied(standing: Sequence[Standing], margin: float) -> tuple[str, ...]:
@@ -80,6 +114,11 @@ def _unexplained(found: Found) -> str:
     if lack.log_evidence > threshold and left > UNEXPLAINED_SHARE * (gain + left):
         names = _listed([one.name for one in found.standing], "and")
         return f"{names} would explain a part, but {100 * left / (gain + left):.0f} % stays"
+    props = [one.name for one in found.standing if one.alone < ALONE * one.log_evidence]
+    if props and len(found.standing) > 1:
+        names = _listed([one.name for one in found.standing], "and")
+        alone = _listed(list(dict.fromkeys(props)), "and")
+        return f"{names} imitate it together, but by itself nothing speaks for {alone}"
     excess = found.final_gap.excess
     if found.final_gap.interval[0] > 0.0 and excess > GAP_LEFT * found.base_gap.excess:
         return "most of the discrepancy stays whatever known effect is added"

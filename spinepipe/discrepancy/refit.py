@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from spinepipe.discrepancy.evidence import SIZES
-from spinepipe.discrepancy.forms import Form, Trials
+from spinepipe.discrepancy.forms import Form, Trials, Variant
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Supposed
 from spinepipe.discrepancy.joint_fit import JointFit, joint_fit
@@ -20,8 +20,8 @@ from spinepipe.effects.contract import Array
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
 
-MOST_EFFECTS, MOST_FORMS = 4, 3
-"""Effects that lead the screen, and forms of each, that are refitted."""
+MOST_EFFECTS, MOST_FORMS = 4, 2
+"""Effects that lead the screen, and forms of each, that are refitted; of the first one more."""
 
 SCREEN_SHARE, SCREEN_MARGIN = 0.6, 6.0
 """The screen is linear: an effect may trail the leader by this share of its evidence and more."""
@@ -56,31 +56,59 @@ def refits(
     found = [
         refit(grounds, started(tried), by_name[tried.form.name], run) for tried in leading(screen)
     ]
-    usable = [one for one in found if one.fit.usable]
-    return tuple(sorted(usable, key=lambda one: -one.log_evidence))
+    found += [
+        refit(grounds, simple, by_name[simple.form.name], run)
+        for simple in _simpler(found, screen, standing(grounds.fit))
+    ]
+    return tuple(sorted(found, key=lambda one: -one.log_evidence))
+
+
+def _simpler(
+    found: Sequence[Refit], screen: Screen, before: Sequence[Supposed]
+) -> Iterator[Supposed]:
+    """The leading refits of two effects with values the same everywhere, where not tried yet."""
+    ranked = sorted(found, key=lambda one: -one.log_evidence)
+    best = list({one.name: one for one in reversed(ranked)}.values())[::-1][:2]
+    tried = {one.form for one in found}
+    for one in best:
+        possible = next(e for e in screen.effects if e.effect == one.name).forms
+        for form in (t.form for t in possible):
+            simple = form.variant == one.form.variant and form.spread is Spread.SHARED
+            if simple and form not in tried and np.isfinite(one.log_evidence):
+                fitted = standing(one.fit)[len(before)]
+                yield replace(fitted, form=form)
 
 
 def leading(screen: Screen) -> Iterator[Tried]:
     """Forms worth a refit."""
-    best = screen.effects[0].log_evidence
-    least = max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
-    for one in screen.effects[:MOST_EFFECTS]:
+    least = _least(screen.effects[0].log_evidence)
+    for place, one in enumerate(screen.effects[:MOST_EFFECTS]):
         if one.log_evidence > least:
-            yield from _forms(one)
+            yield from _forms(one, MOST_FORMS if place else MOST_FORMS + 1)
 
 
-def _forms(one: Screened) -> list[Tried]:
-    """The best forms, and of the best variant the one whose values are the same everywhere."""
-    near = [t for t in one.forms if t.log_evidence > one.forms[0].log_evidence - SCREEN_MARGIN]
+def _forms(one: Screened, most: int) -> list[Tried]:
+    """The best form of each leading variant, and that of equal values where it is another.
+
+    Variants that are alike while weak (shapes of stiffening) part only in the refit.
+    """
     best = one.forms[0]
-    chosen = near[:MOST_FORMS]
-    simple = [
-        t for t in one.forms
-        if t.form.variant == best.form.variant and t.form.spread is Spread.SHARED
-    ]  # fmt: skip
-    if simple and simple[0] not in chosen:
-        chosen = [*chosen[: MOST_FORMS - 1], simple[0]]
+    least = _least(best.log_evidence)
+    by_variant: dict[Variant, Tried] = {}
+    for tried in one.forms:
+        if tried.log_evidence > least:
+            by_variant.setdefault(tried.form.variant, tried)
+    chosen = list(by_variant.values())[:most]
+    for tried in one.forms:
+        same = tried.form.variant == best.form.variant and tried.form.spread is Spread.SHARED
+        if same and tried not in chosen and tried.log_evidence > least:
+            chosen.append(tried)
     return chosen
+
+
+def _least(best: float) -> float:
+    """Evidence on the screen from which a refit may still win."""
+    return max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
 
 
 def started(tried: Tried) -> Supposed:
@@ -109,11 +137,20 @@ def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
     before = grounds.fit
     supposed = (*standing(before), one)
     fit = run(joint_fit, grounds.suppose(supposed), grounds.setting)
-    if not fit.usable:
+    if not fit.usable or _degenerate(fit, len(supposed) - 1):
         return Refit(one.form, fit, -np.inf, -np.inf)
     gain = before.chi2 - fit.chi2
     log_evidence = laplace(fit, len(supposed) - 1, gain) + trials.log_share(one.form)
     return Refit(one.form, fit, log_evidence, gain)
+
+
+def _degenerate(fit: JointFit, number: int) -> bool:
+    """Whether a shape has run to its bound: the effect is then no more what its name says.
+
+    A neutral zone as wide as the motion is a softer joint, a stop without a gap an asymmetry.
+    """
+    shapes = [u.supposed == number and not u.is_strength for u in fit.hypothesis.unknowns]
+    return bool(fit.at_bound[shapes].any())
 
 
 def standing(fit: JointFit) -> tuple[Supposed, ...]:

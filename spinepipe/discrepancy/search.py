@@ -9,6 +9,8 @@ all others are tried in its place.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from spinepipe.discrepancy.forms import Trials
 from spinepipe.discrepancy.gaps import Gap, whole_gap
 from spinepipe.discrepancy.grounds import Grounds
@@ -23,8 +25,8 @@ from spinepipe.discrepancy.tasks import Run
 REAL_SHARE = 0.03
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
 
-MOST_FORMS_NAMED = 6
-MOST_SWAPS = 3
+MOST_FORMS_NAMED = 4
+MOST_SWAPS = 2
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,16 @@ class Rival:
 
 @dataclass(frozen=True)
 class Standing:
-    """A form that stands in the final model: its evidence beside the others, and its rivals."""
+    """A form that stands in the final model.
+
+    Attributes
+    ----------
+    log_evidence : beside the others. alone : of its effect on the first screen, beside none.
+    """
 
     supposed: Supposed
     log_evidence: float
+    alone: float
     gain: float
     rivals: tuple[Rival, ...]
 
@@ -188,13 +196,14 @@ def _examined(
         tried = refits(without, screen, rules.trials, run) if others else log.stages[0].refits
         own = _own(without, one, tried, rules, run)
         log.stages.append(Stage(f"in the place of {one.form.name}", screen, tried))
-        if own.log_evidence <= screen.threshold:
+        if not own.log_evidence > screen.threshold:
             return without, (), True
         best = max(tried, key=lambda other: other.log_evidence, default=own)
         if best.name != one.form.name and best.log_evidence > own.log_evidence:
             return without.at(best.fit), (), True
         rivals = _rivals(own, tried, screen)
-        stood.append(Standing(one, own.log_evidence, own.gain, rivals))
+        alone = next(e for e in log.stages[0].screen.effects if e.effect == one.form.name)
+        stood.append(Standing(one, own.log_evidence, alone.log_evidence, own.gain, rivals))
     return current, tuple(stood), False
 
 
@@ -216,14 +225,17 @@ def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], rules: Rules, 
 
 
 def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, ...]:
-    """Other effects by their evidence: of the best refit, else of the screen."""
+    """Other effects by their evidence: of the best refit, else of the screen.
+
+    Effects whose every refit was impossible are none.
+    """
     evidence = {one.effect: one.log_evidence for one in screen.effects}
     refitted: dict[str, float] = {}
     for other in tried:
-        refitted[other.name] = max(refitted.get(other.name, -1e300), other.log_evidence)
+        refitted[other.name] = max(refitted.get(other.name, -np.inf), other.log_evidence)
     evidence |= refitted
-    evidence.pop(own.name)
-    ranked = sorted(evidence.items(), key=lambda item: -item[1])
+    possible = [(n, v) for n, v in evidence.items() if n != own.name and np.isfinite(v)]
+    ranked = sorted(possible, key=lambda item: -item[1])
     return tuple(Rival(name, own.log_evidence - value) for name, value in ranked)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.hypothesis import Unknown
 from spinepipe.discrepancy.whitening import Whitening
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Tangent:
 
     predicted: tuple[Array, ...]
     by_x: tuple[Array, ...]
-    numbers: Array
+    numbers: Indices
     nuisances: tuple[Array, ...]
 
 
@@ -71,7 +71,8 @@ def lengthened(white: Whitening, rows: Array) -> Array:
 
 def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
     """(T, J, 6, m) per test, of noise-whitened rows (N, m): the inverse of ``noise_only``."""
-    found, at = [], 0
+    found: list[Array] = []
+    at = 0
     for root, used in zip(plain.roots, plain.used, strict=True):
         rows = np.zeros((*used.shape, white.shape[1]))
         count = int(used.sum())
@@ -79,5 +80,6 @@ def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
         at += count
         empty = ~used.transpose(1, 2, 0)  # (J, 6, T)
         square = root + empty[..., None] * np.eye(used.shape[0])
-        found.append(np.linalg.solve(square, rows.transpose(1, 2, 0, 3)).transpose(2, 0, 1, 3))
+        raw = np.asarray(np.linalg.solve(square, rows.transpose(1, 2, 0, 3)), dtype=np.float64)
+        found.append(raw.transpose(2, 0, 1, 3))
     return tuple(found)

@@ -1,5 +1,6 @@
 """Follower load: compression along the spine, carried by a cable, that the model leaves out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,7 +17,21 @@ from spinepipe.effects.contract import (
 )
 from spinepipe.effects.registry import register
 from spinepipe.effects.trial import Spread, Trial
-from spinepipe.effects.vertebra_points import nothing_applied, upper_ends
+from spinepipe.effects.vertebra_points import centres, nothing_applied, upper_ends
+
+
+def _at_joints(motion: Motion) -> Array:
+    """(1 + J, 3) guides of ground and of each vertebra, m."""
+    return np.vstack([motion.joint_origins[0], upper_ends(motion)])
+
+
+def _at_centres(motion: Motion) -> Array:
+    """(1 + J, 3) guides of ground and of each vertebra, m."""
+    points = centres(motion)
+    return np.vstack([2.0 * motion.joint_origins[0] - points[0], points])
+
+
+GUIDES: dict[str, Callable[[Motion], Array]] = {"joints": _at_joints, "centres": _at_centres}
 
 
 @register("follower_load")
@@ -24,13 +39,18 @@ from spinepipe.effects.vertebra_points import nothing_applied, upper_ends
 class FollowerLoad:
     """A cable under tension ``force`` from the top vertebra to ground; off at 0.
 
-    Each vertebra guides it at the origin of the joint above (the top one 30 mm above its joint),
-    ground at that of the lowest joint. It spans the joints in scope: at each it pulls the guide of
-    the upper vertebra towards that of the lower one, and the lower one back. Without translation
-    it passes through every joint's centre, as a follower load is meant to (Patwardhan 2003,
-    doi 10.1016/S0736-0266(02)00202-4).
+    It spans the joints in scope: at each it pulls the guide of the upper vertebra towards that of
+    the lower one, and the lower one back. Guides are
+
+    - joints: the origin of the joint above each vertebra (of the top one 30 mm above its joint),
+      of ground that of the lowest joint. Without translation the cable passes through every
+      joint's centre, as a follower load is meant to (Patwardhan 2003,
+      doi 10.1016/S0736-0266(02)00202-4);
+    - centres: the centre of each vertebra, of ground as far below the lowest joint as the lowest
+      vertebra's centre is above it. The cable then passes beside the joints' centres.
     """
 
+    guides: str = "joints"
     name: ClassVar[str] = "follower_load"
     kind: ClassVar[Kind] = Kind.LOAD
     per_joint: ClassVar[bool] = False
@@ -48,32 +68,35 @@ class FollowerLoad:
         ),
     )
     trial: ClassVar[Trial] = Trial(
-        variants=({},),
+        variants=({"guides": "joints"}, {"guides": "centres"}),
         spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
         told_by="measured translations: a compression through the joints' centres turns nothing",
     )
+
+    def __post_init__(self) -> None:
+        if self.guides not in GUIDES:
+            raise ValueError(f"{self.name}: guides {self.guides!r}, allowed: {', '.join(GUIDES)}")
 
     def apply(
         self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> AppliedLoad:
         """Load of the cable and its tangent."""
-        one = _of_1_n(motion, joints)
+        one = self._of_1_n(motion, joints)
         return AppliedLoad(parameters[0, 0] * one.load, parameters[0, 0] * one.tangent)
 
     def by_parameter(
         self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> Array:
         """(n, 1, 1): the load is linear in the tension."""
-        return _of_1_n(motion, joints).load[:, None, None]
+        return self._of_1_n(motion, joints).load[:, None, None]
 
-
-def _of_1_n(motion: Motion, joints: Indices) -> AppliedLoad:
-    load, tangent = nothing_applied(motion)
-    guides = np.vstack([motion.joint_origins[0], upper_ends(motion)])
-    for joint in joints.tolist():
-        pull = _segment(motion, joint, guides[joint + 1], guides[joint])
-        load, tangent = load + pull.load, tangent + pull.tangent
-    return AppliedLoad(load, tangent)
+    def _of_1_n(self, motion: Motion, joints: Indices) -> AppliedLoad:
+        load, tangent = nothing_applied(motion)
+        guides = GUIDES[self.guides](motion)
+        for joint in joints.tolist():
+            pull = _segment(motion, joint, guides[joint + 1], guides[joint])
+            load, tangent = load + pull.load, tangent + pull.tangent
+        return AppliedLoad(load, tangent)
 
 
 def _segment(motion: Motion, body: int, upper: Array, lower: Array) -> AppliedLoad:

@@ -15,6 +15,9 @@ from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 ROUNDED = 0.1
 """Share of the width, to each side of the corner, over which the corner is rounded."""
 
+WIDEST = 5.0
+"""Times the usual width at most: beyond, all motion lies inside and the joint is but softer."""
+
 # Half widths near those of lumbar joints: Yamamoto 1989 (Spine 14:1256), 1 to 2 deg in bending
 # of either kind and less in axial rotation. Translations: a tenth of a millimetre.
 _HALF_WIDTH_DEG = {"extension": 1.5, "right_bending": 1.5, "left_rotation": 0.5}
@@ -55,7 +58,7 @@ class NeutralZone(CarriedShare):
         if self.coordinate in TRANSLATIONS:
             return ratio, Parameter("width", "m", 1e-6, 0.02, 1e-4, 1.0, True, meaning)
         width = float(np.deg2rad(_HALF_WIDTH_DEG[self.coordinate]))
-        return ratio, Parameter("width", "rad", 1e-4, 0.5, width, 0.7, True, meaning)
+        return ratio, Parameter("width", "rad", 1e-4, WIDEST * width, width, 0.7, True, meaning)
 
     @property
     def columns(self) -> list[int]:

@@ -1,4 +1,7 @@
-"""`python -m tests.validation [PART ...]`: measure, print, write tests/validation/results."""
+"""`python -m tests.validation [PART ...]`: measure, print, write tests/validation/results.
+
+`python -m tests.validation discrepancy --help` tells the options of that part.
+"""
 
 import sys
 from datetime import date
@@ -7,13 +10,17 @@ from pathlib import Path
 import pandas as pd
 
 from tests.validation import coverage, findings
+from tests.validation.discrepancy import command as discrepancy
 
 RESULTS = Path(__file__).parent / "results"
 
 
 def main() -> None:
     """Run the parts that are asked for, or all."""
-    parts = {"coverage": _coverage, "findings": _findings}
+    if sys.argv[1:2] == ["discrepancy"]:
+        discrepancy.main(sys.argv[2:])
+        return
+    parts = {"coverage": _coverage, "findings": _findings, "discrepancy": discrepancy.main}
     for name in sys.argv[1:] or parts:
         if name not in parts:
             sys.exit(f"no validation {name!r}: {', '.join(parts)}")

@@ -21,8 +21,6 @@ SMALL_STEP = 0.02
 """Of log stiffness: the motion's curvature over such a step is 1e-4 of the motion."""
 LOG_SD = 3.0
 """A loose prior on log stiffness, so that one that nothing tells of stays where it is."""
-CLOSE = 0.04
-MOST_TRIALS = 12
 
 
 def readings(q: np.ndarray, recipe: Recipe) -> np.ndarray:
@@ -82,14 +80,15 @@ class Base:
 
 
 class Meter:
-    """Measures and sets the gap of effects on a scene; keeps models and poses warm."""
+    """Measures the gap of effects on a scene; keeps models and poses warm."""
 
     def __init__(self, scene: Scene, recipe: Recipe) -> None:
         self.scene, self.recipe = scene, recipe
         numbers = range(len(scene.bones))
+        steps = len(scene.tests[0].moments)
+        self.rest = np.zeros((len(scene.tests), steps, N_JOINTS, 6))
         self.spines = [Spine(bones) for bones in scene.bones]
         self.plain = [self._plain(number) for number in numbers]
-        self.last = list(self.plain)
         self.bases = [self._base(number) for number in numbers]
 
     def gap(self, effects: list[tuple[Hidden, float]]) -> float:
@@ -98,37 +97,14 @@ class Meter:
         return float(np.sqrt(np.mean(np.square(left))))
 
     def motion(self, world: World) -> np.ndarray:
-        """(T, S, J, 6) reported without noise."""
-        return world.reported(self.true_motion(world))
+        """(T, S, J, 6) reported without noise.
 
-    def true_motion(self, world: World) -> np.ndarray:
-        """(T, S, J, 6) coordinates of the true joints."""
+        Each test from rest and each step from the one before, as the loads were applied: a start
+        from elsewhere might find another branch of a law that snaps.
+        """
         same = world.bones is self.scene.bones[world.number]
         spine = self.spines[world.number] if same else Spine(world.bones)
-        self.last[world.number] = solve(world, spine, self.last[world.number]).q
-        return self.last[world.number]
-
-    def strength(self, hidden: Hidden, wanted: float, start: float, top: float):
-        """Strength whose gap is the wanted one, or the largest plausible and solvable; its gap.
-
-        A secant in the logarithms of strength and gap.
-        """
-        (now, power), tried = (min(start, top), 1.0), []
-        for _ in range(MOST_TRIALS):
-            try:
-                found = max(self.gap([(hidden, now)]), 1e-9)
-            except NoEquilibriumError:
-                top = now = 0.7 * now
-                continue
-            tried.append((np.log(now), np.log(found)))
-            if abs(found / wanted - 1.0) < CLOSE or (now >= top and found < wanted):
-                break
-            if len(tried) > 1 and tried[-1][0] != tried[-2][0]:
-                (x, y), (x0, y0) = tried[-1], tried[-2]
-                power = float(np.clip((y - y0) / (x - x0), 0.3, 3.0))
-            ratio = np.clip((wanted / found) ** (1.0 / power), 0.05, 8.0)
-            now = float(min(now * ratio, top))
-        return now, found
+        return world.reported(solve(world, spine, self.rest).q)
 
     def _left(self, number, effects):
         world = self.scene.plain(number)
@@ -136,12 +112,15 @@ class Meter:
             world = with_effect(world, hidden, strength)
         if not effects_here(effects, number):
             return np.zeros_like(readings(self.plain[number], self.recipe))
-        return self.bases[number].left(readings(self.motion(world), self.recipe))
+        target = readings(self.motion(world), self.recipe)
+        try:
+            return self.bases[number].left(target)
+        except NoEquilibriumError:
+            self.bases[number] = self._base(number)  # the next refit must not start where this fell
+            raise
 
     def _plain(self, number):
-        case = self.scene.tests[0]
-        rest = np.zeros((len(self.scene.tests), len(case.moments), N_JOINTS, 6))
-        return solve(self.scene.plain(number), self.spines[number], rest).q
+        return solve(self.scene.plain(number), self.spines[number], self.rest).q
 
     def _base(self, number):
         spine, q = self.spines[number], self.plain[number]

@@ -13,6 +13,7 @@ from .dirt import soiled
 from .errors import ERRORS
 from .gap import Meter
 from .recipe import Hidden, Recipe
+from .scale import scaled
 from .scene import DIRT, NOISE, Scene, scene, stream, with_effect
 from .scene import ERRORS as ERRORS_STREAM
 from .world import World
@@ -72,8 +73,7 @@ def _scaled(meter: Meter, hidden: Hidden, recipe: Recipe) -> tuple[Hidden, float
     """The effect with its strength, and its gap."""
     if hidden.strength is not None:
         return hidden, meter.gap([(hidden, hidden.strength)])
-    entry = CATALOGUE[hidden.name]
-    strength, found = meter.strength(hidden, recipe.gap, entry.start, entry.top)
+    strength, found = scaled(meter, hidden, recipe.gap, CATALOGUE[hidden.name])
     return replace(hidden, strength=strength), found
 
 

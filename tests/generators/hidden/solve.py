@@ -11,7 +11,7 @@ TOLERANCE = 1e-11
 """m and rad, last step; the next would be smaller by the tangent's error, 1e-6."""
 DIFFERENCE = 1e-7
 LARGEST_STEP = 0.15
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 40
 DAMPED_AFTER = 12
 """Newton may jump to and fro over a corner of a law; half steps end that."""
 

@@ -1,0 +1,197 @@
+"""Which effects a design of tests can show, before residuals are looked at.
+
+Everything is linear in the strengths at the base fit, with normal noise: an effect of s times its
+typical strength f has moments s G f + N(0, G) on the screen, G the products of its signatures with
+base and nuisances taken out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from spinepipe.discrepancy.forms import Trials, Variant, shape_grid
+from spinepipe.discrepancy.seen import Design, Seen, candidates
+from spinepipe.discrepancy.typical import NO_TRACE, Typical, typical
+from spinepipe.discrepancy.values import border
+from spinepipe.effects import Spread
+from spinepipe.effects.contract import Array
+
+ABSORBED = 0.98
+"""Effects of which the base takes up more than this share are no effects beside it."""
+
+CLEAR = 0.9
+"""A test is worth doing for an effect if the base takes up no more than this share of it there."""
+
+OFTEN = 0.9
+"""Probability with which an effect that counts as detectable is found."""
+
+LARGEST = 3.0
+"""Effects that only show beyond this many times their typical strength count as not testable."""
+
+SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN)
+"""How a typical effect may differ between places; one place only if a trial knows none of these."""
+
+DRAWS = 200
+WEAKEST, STRONGEST = 1e-6, 1e3
+"""Times the typical strength, between which the weakest is sought that is found."""
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The weakest effect of a form that would be found with probability `OFTEN`.
+
+    Attributes
+    ----------
+    times : its typical strength. gap : that it makes after the base is refitted, in noise SD.
+    strengths : (parameter, value, unit) of its strengths, in the units of tables.
+    """
+
+    times: float
+    gap: float
+    strengths: tuple[tuple[str, float, str], ...]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a design could tell of one effect.
+
+    Attributes
+    ----------
+    testable : whether the tests can show it. why : they cannot, in words; empty where they can.
+    best : its form that shows best. absorbed, absorbed_by_base : shares of its squared signature
+        taken up by base and nuisances, and by the base alone.
+    detectable : the smallest over variants; None where nothing is ever found.
+    """
+
+    effect: str
+    testable: bool
+    why: str
+    best: Typical
+    absorbed: float
+    absorbed_by_base: float
+    detectable: Detectable | None
+
+    @property
+    def clear(self) -> bool:
+        """Whether the tests show it at its typical strength, and much of it beside the base."""
+        typical = self.detectable is not None and self.detectable.times <= 1.0
+        return self.testable and typical and self.absorbed_by_base <= CLEAR
+
+
+def judgements(
+    trials: Sequence[Trials],
+    of: Mapping[str, Seen],
+    joints: int,
+    tests: Sequence[str],
+    needed: float,
+    seed: int,
+) -> tuple[Judgement, ...]:
+    """What the tests could tell of each effect.
+
+    Parameters
+    ----------
+    of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
+    """
+    design = Design(candidates(trials, joints, tests), of)
+    return tuple(judged(design, number, needed, seed) for number in range(len(trials)))
+
+
+def judged(design: Design, number: int, needed: float, seed: int) -> Judgement:
+    """What a design could tell of one effect: by the variant that shows best."""
+    trials = design.those.trials[number]
+    variants = [_best_spread(design, number, variant) for variant in trials.variants]
+    found = [(one, _detectable(one, trials, design.freedom, needed, seed)) for one in variants]
+    best, weakest = min(found, key=lambda pair: _rank(*pair))
+    shown = _shown(best, weakest)
+    gaps = [least for one, least in found if least is not None and _shown(one, least) == shown]
+    least = min(gaps, key=lambda one: one.gap, default=None)
+    why = "" if shown else _why(best, weakest)
+    return Judgement(trials.effect, shown, why, best, best.absorbed, best.absorbed_by_base, least)
+
+
+def _best_spread(design: Design, number: int, variant: Variant) -> Typical:
+    """The form of a variant of which least is absorbed (to 1 %, then as declared first); of places,
+    the one that shows most.
+    """
+    forms = [form for form in design.those.trials[number].forms if form.variant == variant]
+    usual = [form for form in forms if form.spread in SPREADS]
+    ones = [typical(design, number, form) for form in usual or forms]
+    if usual:
+        return min(ones, key=lambda one: round(one.absorbed, 2))
+    return max(ones, key=lambda one: one.squared(one.left))
+
+
+def _rank(one: Typical, least: Detectable | None) -> tuple[bool, float, float]:
+    """Smaller is better: shown, then little absorbed; a trace before none."""
+    return not _shown(one, least), one.absorbed, -one.squared(one.raw)
+
+
+def _shown(one: Typical, least: Detectable | None) -> bool:
+    return one.absorbed_by_base <= ABSORBED and least is not None and least.times <= LARGEST
+
+
+def _detectable(
+    one: Typical, trials: Trials, freedom: int, needed: float, seed: int
+) -> Detectable | None:
+    share = trials.log_share(one.form) - float(np.log(len(shape_grid(one.form.variant))))
+    times = _least(one, needed - share, seed) if one.seen else None
+    if times is None:
+        return None
+    gap = times * float(np.sqrt(one.squared(one.refitted) / freedom))
+    return Detectable(times, gap, _values(one.form.variant, times))
+
+
+def _least(one: Typical, needed: float, seed: int) -> float | None:
+    """Times the typical strength at which all but a few draws have the evidence needed."""
+    rng, count = np.random.default_rng(seed), len(one.mean)
+    if one.squared(one.left) <= NO_TRACE:
+        return None
+    moved = one.left @ _patterns(one, rng.standard_normal((count, DRAWS)))
+    group = one.group
+    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
+    noise = group.vectors @ noise
+
+    def short(log_times: float) -> float:
+        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
+        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
+
+    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
+    if short(ends[1]) <= 0.0:
+        return None
+    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
+
+
+def _patterns(one: Typical, normal: Array) -> Array:
+    """(k, D) strengths in random proportion, each of the squared size that is expected."""
+    patterns = one.mean[:, None] + one.sd[:, None] * normal
+    sizes = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
+    result: Array = patterns * np.sqrt(one.squared(one.left) / np.maximum(sizes, NO_TRACE))
+    return result
+
+
+def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
+    """Strengths that many times as far from off as their defaults, in the units of tables."""
+    found = []
+    for column in variant.strengths:
+        p = variant.create().parameters[column]
+        assert p.off is not None
+        if p.logarithmic:
+            value = p.off * (p.default / p.off) ** times
+        else:
+            value = p.off + times * (p.default - p.off)
+        outside, unit = border(p.unit, float(value))
+        found.append((p.name, outside, unit))
+    return tuple(found)
+
+
+def _why(one: Typical, least: Detectable | None) -> str:
+    if not one.seen:
+        return "it leaves no trace in these readings"
+    if one.absorbed_by_base > ABSORBED:
+        return f"the base takes up {100.0 * one.absorbed_by_base:.1f} % of what it would do"
+    taken = f"base and nuisances take up {100.0 * one.absorbed:.1f} % of what it would do"
+    if least is None:
+        return f"{taken}, and the rest is never evident"
+    return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"

@@ -1,0 +1,150 @@
+"""The verdict as plain data, in the keys of the result format."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.discrepancy.forms import Form
+from spinepipe.discrepancy.gaps import Gap
+from spinepipe.discrepancy.held_out import HeldOut
+from spinepipe.discrepancy.noise import Noise
+from spinepipe.discrepancy.outcome import Outcome, Verdict
+from spinepipe.discrepancy.search import Found, Standing
+from spinepipe.discrepancy.suspected import SuspectedError
+from spinepipe.discrepancy.told_apart import ToldApart
+from spinepipe.discrepancy.values import fitted_values
+from spinepipe.discrepancy.where import Place, worst
+from spinepipe.units import BORDER_PER_SI, ROTATIONS
+
+Data = dict[str, Any]
+
+EVERY = ["*"]
+MOST_RIVALS = 5
+
+
+def verdict_data(
+    cohort: Cohort,
+    found: Found,
+    ended: Outcome,
+    proof: HeldOut,
+    told: ToldApart,
+    places: Sequence[Place],
+    errors: Sequence[SuspectedError],
+) -> Data:
+    """All keys of ``verdict.json``."""
+    screen = found.stages[0].screen
+    return {
+        "cohort": cohort.name,
+        "verdict": ended.verdict.value,
+        "why": ended.why,
+        "effects": [_effect(found, one, cohort) for one in ended.named],
+        "candidates_in_set": list(ended.tied),
+        "not_testable": [vars(one) for one in told.not_testable],
+        "noise": _noise(found.base.noise),
+        "rms_residual": {"unit": "noise sd", **_pairs(found, proof, "rms")},
+        "gap": {"unit": "noise sd", **_pairs(found, proof, "gap"), "held_out_closed": proof.closed},
+        "smallest_detectable": [vars(one) for one in told.smallest_detectable],
+        "unknown": _unknown(found, ended, places),
+        "suspected_data_errors": [vars(one) for one in errors],
+        "threshold": {
+            "log_evidence": screen.threshold,
+            "false_alarm": None,
+            "draws": screen.draws,
+        },
+        "families": [list(one) for one in told.families],
+    }
+
+
+def no_base_data(cohort: Cohort, why: str, errors: Sequence[SuspectedError]) -> Data:
+    """The verdict where the base has no fit."""
+    return {
+        "cohort": cohort.name,
+        "verdict": Verdict.UNKNOWN.value,
+        "why": f"the base model cannot be fitted: {why}",
+        "effects": [],
+        "candidates_in_set": [],
+        "not_testable": [],
+        "unknown": {"where": "everywhere", "shape": why},
+        "suspected_data_errors": [vars(one) for one in errors],
+    }
+
+
+def _effect(found: Found, one: Standing, cohort: Cohort) -> Data:
+    number = next(
+        k for k, s in enumerate(found.final.fit.hypothesis.supposed) if s.form == one.supposed.form
+    )
+    variant = one.supposed.form.variant
+    return {
+        "name": one.name,
+        "kind": variant.create().kind.value,
+        "scope": _scope(one.supposed.form, cohort),
+        "variant": dict(variant.options),
+        "spread": one.supposed.form.spread.value,
+        "parameters": [
+            {
+                "name": "@".join([value.name, *value.place]),
+                "value": value.value,
+                "unit": value.unit,
+                "ci95": [value.low, value.high],
+                "at_bound": value.at_bound,
+            }
+            for value in fitted_values(found.final.fit, number)
+        ],
+        "log_evidence": one.log_evidence,
+        "rivals": [
+            {"name": rival.name, "log_evidence_margin": rival.margin}
+            for rival in one.rivals[:MOST_RIVALS]
+        ],
+    }
+
+
+def _scope(form: Form, cohort: Cohort) -> Data:
+    options = dict(form.variant.options)
+    coordinate = options.get("coordinate")
+    if coordinate is None:
+        coordinates = list(options.get("pair", EVERY))
+    else:
+        coordinates = list(ROTATIONS) if coordinate == "rotations" else [coordinate]
+    return {
+        "joints": EVERY if form.joint is None else [cohort.joint_names[form.joint]],
+        "coordinates": coordinates,
+        "specimens": EVERY if form.specimen is None else [form.specimen],
+    }
+
+
+def _noise(noise: Noise) -> Data:
+    sd = noise.sd * BORDER_PER_SI
+    data: Data = {"source": noise.source}
+    for name, part in (("rotation_sd_deg", sd[3:]), ("translation_sd_mm", sd[:3])):
+        read = part[np.isfinite(part)]
+        data[name] = float(np.sqrt(np.mean(read**2))) if len(read) else None
+    return data | {"serial_correlation": noise.correlation, "outliers_left_out": noise.outliers}
+
+
+def _pairs(found: Found, proof: HeldOut, name: str) -> Data:
+    """In sample and held out, base and with effects."""
+    gaps = {
+        "base": found.base_gap,
+        "with_effects": found.final_gap,
+        "held_out_base": proof.base,
+        "held_out_with_effects": proof.with_effects,
+    }
+    return {key: _size(gap, name) for key, gap in gaps.items()}
+
+
+def _size(gap: Gap | None, name: str) -> float | None:
+    return None if gap is None else float(getattr(gap, name))
+
+
+def _unknown(found: Found, ended: Outcome, places: Sequence[Place]) -> Data | None:
+    if ended.verdict is not Verdict.UNKNOWN:
+        return None
+    largest = worst(places, 3)
+    where = "; ".join(
+        f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
+        f"(gap {p.gap.gap:.1f})"
+        for p in largest
+    )
+    return {"where": where or "no single place stands out", "shape": found.lack.shape}

@@ -1,0 +1,59 @@
+"""Additions to a plan of tests: loads, times and readings, by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+from testable_cases import case_of
+
+from spinepipe.discrepancy.additions import MENU
+from spinepipe.discrepancy.load_changes import comes_back
+from spinepipe.discrepancy.plans import Plan, Planned, thinned
+from spinepipe.model import LoadCase
+
+
+def plan_of(*cases: LoadCase, zeroed: bool = True) -> Plan:
+    count = np.tile([0, 0, 0, 3, 3, 3], (2, 1))
+    return Plan(tuple(Planned(case, count) for case in cases), zeroed, "per_joint")
+
+
+def added(words: str, plan: Plan) -> Plan | None:
+    (addition,) = [one for one in MENU if words in one.words]
+    return addition.to(plan)
+
+
+def levels(case: LoadCase) -> list[float]:
+    return [-float(step.wrenches[0].moment[2]) for step in case.steps]
+
+
+def test_additions_change_loads_and_times_as_they_say():
+    case = case_of("flexion", 2, (0.0, 2.0, 4.0), 5.0)
+    plan = plan_of(case)
+    back = added("unloading", plan).tests[0].case
+    assert levels(back) == [0.0, 2.0, 4.0, 2.0, 0.0]
+    assert [step.time for step in back.steps] == [0.0, 5.0, 10.0, 15.0, 20.0]
+    assert comes_back(back)
+    assert not comes_back(case)
+    assert levels(added("opposite", plan).tests[1].case) == [0.0, -2.0, -4.0]
+    assert levels(added("1.5 times", plan).tests[0].case) == [0.0, 3.0, 6.0]
+    assert [s.time for s in added("10 times", plan).tests[0].case.steps] == [0.0, 50.0, 100.0]
+    held = added("held", plan).tests[0].case
+    assert levels(held)[3:] == [4.0] * (len(held.steps) - 3)
+    assert held.steps[-1].time == 610.0
+    read = added("translations", plan).repeats()[0].count
+    assert (read[1:] == 3).all()
+    assert (read[0] == 0).all()
+    assert (added("not zeroed", plan).repeats()[0].count[0, :, 3:] == 3).all()
+
+
+def test_what_a_plan_has_is_not_added():
+    both_ways = case_of("flexion", 2, (0.0, 2.0, 4.0, 2.0, 0.0, -2.0, -4.0), 5.0)
+    plan = replace(plan_of(both_ways, zeroed=False), grouping="per_specimen")
+    for words in ("unloading", "opposite", "not zeroed", "times recorded, 10", "base that shares"):
+        assert added(words, plan) is None
+
+
+def test_a_thinned_plan_keeps_first_farthest_and_last_step():
+    moments = [*np.linspace(0.0, 7.0, 18), *np.linspace(6.5, 1.0, 23)]
+    kept = levels(thinned(plan_of(case_of("flexion", 2, moments)), 10).tests[0].case)
+    assert len(kept) <= 11
+    assert [kept[0], max(kept), kept[-1]] == [0.0, 7.0, 1.0]

@@ -1,0 +1,225 @@
+"""Held-out folds of chains whose motion is known: moment over stiffness at every joint."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from held_out_cases import (
+    CYCLES,
+    JOINTS,
+    MOMENTS_NM,
+    SD,
+    found,
+    grounds,
+    read,
+    serial,
+)
+
+from spinepipe.discrepancy.gaps import Gap
+from spinepipe.discrepancy.held_out import Asked, held_out, together
+from spinepipe.discrepancy.held_out_rows import NO_FIT, NOT_DETERMINED, SCORED, FoldRow
+from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.discrepancy.prediction import Simulated
+from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
+from spinepipe.discrepancy.surrogate import surrogate
+from spinepipe.discrepancy.tangent import tangent
+from spinepipe.discrepancy.tasks import at_once
+from spinepipe.effects.contract import Array
+from spinepipe.statics import moved
+
+STEPS = len(MOMENTS_NM)
+EXTENSION, BENDING = 3, 4
+GAIN = NuisancePriors(0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 0.0)
+
+
+def compliance(mean: Array, moments: Array) -> float:
+    """Least squares of readings (T, J) over moments (T,), by hand."""
+    weight = np.linalg.inv(serial(len(moments)))
+    return float((moments @ weight @ mean).sum() / (JOINTS * moments @ weight @ moments))
+
+
+def only_driven(one: SpecimenReadings) -> SpecimenReadings:
+    """Only the driven coordinate was read, and not in the first step."""
+    driven = {"flexion": EXTENSION, "extension": EXTENSION, "bending": BENDING}
+    tests = []
+    for test in one.tests:
+        cycles = np.full_like(test.cycles, np.nan)
+        at = driven[test.case.test]
+        cycles[:, 1:, :, at] = test.cycles[:, 1:, :, at]
+        tests.append(Repeats(test.case, cycles))
+    return replace(one, tests=tuple(tests))
+
+
+@pytest.mark.parametrize("refit", [False, True])
+def test_unseen_flexion_follows_the_stiffness_in_extension(refit: bool) -> None:
+    readings = read({"a": 40.0}, ("flexion", "extension", "bending"), zone=False)
+    result = held_out(found(grounds(readings), False), Asked(refit=refit), at_once)
+    flexion, extension = (test.mean for test in readings[0].tests[:2])
+    by_hand = -MOMENTS_NM * compliance(extension[..., EXTENSION], MOMENTS_NM)
+    predicted = result.motion["a"].base[0]
+    assert predicted[..., EXTENSION] == pytest.approx(np.tile(by_hand[:, None], JOINTS), rel=2e-4)
+    missed = flexion[..., 3:] - np.stack([by_hand, 0 * by_hand, 0 * by_hand], -1)[:, None]
+    precision = CYCLES / SD**2 * np.linalg.inv(serial(STEPS))
+    chi2 = np.einsum("tjk,tu,ujk->", missed, precision, missed)
+    row = result.folds[0]
+    assert (row.name, row.kind, row.status) == ("flexion", "test", SCORED)
+    assert row.base is not None
+    assert row.base.chi2 == pytest.approx(chi2, rel=1e-3)
+    assert row.readings == row.left_out == STEPS * JOINTS * 3
+
+
+def test_a_reading_that_no_other_test_determines_is_not_scored() -> None:
+    readings = read({"a": 40.0, "b": 60.0}, ("flexion", "extension", "bending"), zone=False)
+    result = held_out(found(grounds(readings), False), Asked(specimens=False), at_once)
+    row = result.folds[2]
+    loaded = (STEPS - 1) * JOINTS * 2  # bending under load, in two specimens
+    assert (row.left_out, row.readings) == (STEPS * JOINTS * 6, STEPS * JOINTS * 6 - loaded)
+    held = result.motion["a"]
+    assert (held.fold[2][1:, :, BENDING] == -1).all()
+    assert np.isnan(held.base[2][1:, :, BENDING]).all()
+    assert (held.fold[2][:, :, EXTENSION] == 2).all()
+    assert "determine" in row.message
+
+
+def test_steps_are_halved_where_one_specimen_has_no_test_that_others_determine() -> None:
+    readings = [only_driven(one) for one in read({"a": 40.0}, ("flexion", "bending"), zone=False)]
+    result = held_out(found(grounds(readings), False), Asked(), at_once)
+    kinds = [(row.kind, row.status, row.readings) for row in result.folds]
+    test = ("test", NOT_DETERMINED, 0)
+    assert kinds == [test, test, ("steps", SCORED, 2 * JOINTS * (STEPS - 1))]
+    mean = readings[0].tests[0].mean[..., EXTENSION]
+    odd, even = np.arange(1, STEPS, 2), np.arange(2, STEPS, 2)  # none of step 0
+    weight = np.linalg.inv(serial(STEPS)[np.ix_(even, even)])
+    m = -MOMENTS_NM[even]
+    by_hand = (m @ weight @ mean[even]).sum() / (JOINTS * m @ weight @ m)
+    predicted = result.motion["a"].base[0][odd, :, EXTENSION]
+    assert predicted == pytest.approx(np.outer(-MOMENTS_NM[odd], [by_hand] * JOINTS), rel=2e-4)
+
+
+def test_a_left_out_specimen_has_the_others_zone_and_its_own_stiffness() -> None:
+    specimens = {"a": 40.0, "b": 60.0}
+    readings = read(specimens, ("flexion", "extension", "bending"), zone=True)
+    base = grounds(readings)
+    result = held_out(found(base, True), Asked(tests=False), at_once)
+    assert [(row.kind, row.name) for row in result.folds] == [("specimen", n) for n in specimens]
+    assert all(row.readings == 3 * STEPS * JOINTS * 3 for row in result.folds)
+    assert result.base is not None
+    assert result.base.rms > 2.0
+    assert result.with_effects is not None
+    assert result.with_effects.rms < 1.15
+    assert result.closed is not None
+    assert result.closed > 0.9
+    assert result.beats_base
+    assert result.beats_surrogate
+    other = held_out(found(base, True), Asked(tests=False, refit=True), at_once)
+    assert other.with_effects is not None
+    assert result.with_effects.rms == pytest.approx(other.with_effects.rms, abs=0.05)
+
+
+def test_with_nothing_named_the_base_stands_in_for_the_model_with_effects() -> None:
+    readings = read({"a": 40.0, "b": 60.0}, ("flexion", "extension"), zone=False)
+    result = held_out(found(grounds(readings), False), Asked(), at_once)
+    assert len(result.folds) == 4
+    assert all(row.with_effects == row.base for row in result.folds)
+    assert (result.closed, result.beats_base) == (None, False)
+    assert result.over_base is not None
+    assert result.over_base.chi2 == 0.0
+    assert (result.motion["b"].fold[0][..., 3:] == 0).all()  # the test's fold, not the specimen's
+
+
+def test_a_load_gain_found_in_one_test_says_nothing_of_another() -> None:
+    readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
+    result = held_out(found(grounds(readings, GAIN), False), Asked(), at_once)
+    assert result.motion["a"].base_nuisances[0][..., 3:] == pytest.approx(0.0)
+    # a gain of 5 % in the unseen test: 0.05 x motion, in noise SDs of the mean
+    motion = 0.05 * MOMENTS_NM * compliance(readings[0].tests[1].mean[..., 3], MOMENTS_NM)
+    precision = CYCLES / SD**2 * np.linalg.inv(serial(STEPS))
+    left_open = JOINTS * motion @ precision @ motion
+    row = result.folds[0]
+    assert row.expected - row.readings == pytest.approx(left_open, rel=0.05)
+
+
+def test_the_tangent_is_the_slope_of_re_solved_motion() -> None:
+    readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=True)
+    final = found(grounds(readings, NuisancePriors()), True).final
+    near = tangent(final).members["b"]
+    member, size = final.fit.hypothesis.members["b"], 1e-5
+    x = final.fit.x[list(member.numbers)]
+    for number in range(len(x)):
+        ends = []
+        for sign in (1.0, -1.0):
+            model = moved(member.model, member.free, x + sign * size * np.eye(len(x))[number])
+            ends.append(Simulated(model, readings[1].cases, False, ()).at(np.zeros(0)).readings)
+        for by_x, high, low in zip(near.by_x, *ends, strict=True):
+            slope = (high - low) / (2.0 * size)
+            assert by_x[..., 3:, number] == pytest.approx(slope[..., 3:], abs=1e-6)
+            assert (by_x[..., :3, number] == 0.0).all()  # not read
+
+
+def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
+    readings = read({"a": 40.0}, ("flexion", "bending"), zone=False)
+    priors = NuisancePriors()
+    base = grounds(readings, priors)
+    columns = np.concatenate(
+        [one[..., 3:, :].reshape(-1, one.shape[-1]) for one in tangent(base).members["a"].nuisances]
+    )
+    moved_by = nuisance_signatures(base.fit.models["a"], readings[0].cases, False, priors)
+    given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])
+    assert columns @ columns.T == pytest.approx(given @ given.T, abs=(1e-2 * SD) ** 2 + 1e-9)
+
+
+def test_the_surrogate_is_the_base_with_terms_of_all_joints_and_of_each() -> None:
+    readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=False)
+    base = grounds(readings)
+    model = surrogate(base)
+    known = len(base.fit.x)
+    one = model.members["a"]
+    first, added = one.by_x[0], len(model.mean) - known
+    own = added * JOINTS // (JOINTS + 1)
+    # terms of a kind stand together, a column for each joint
+    each = first[..., 3 : 3 + own].reshape(STEPS, JOINTS, 6, -1, JOINTS)
+    assert first[..., 3 + own :] == pytest.approx(each.sum(axis=-1))
+    assert (model.sd[known:] == 1.0).all()
+    assert np.isinf(model.high[known:]).all()
+    assert one.numbers[3:].tolist() == model.members["b"].numbers[3:].tolist()
+
+
+def test_a_fold_without_a_fit_says_why() -> None:
+    def refused(function: Any, /, *args: Any, **kwargs: Any) -> Any:
+        return replace(function(*args, **kwargs), residuals={}, status="no stable pose")
+
+    readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
+    result = held_out(found(grounds(readings), False), Asked(refit=True), refused)
+    assert [(one.status, one.message) for one in result.folds[:2]] == [
+        (NO_FIT, "no stable pose")
+    ] * 2
+    assert result.base is None
+    assert (result.motion["a"].fold[0] == -1).all()
+
+
+def row(name: str, base: float, effects: float, other: float) -> FoldRow:
+    gaps = [Gap(chi2, 10.0, 10) for chi2 in (base, effects, other)]
+    return FoldRow(name, "test", 10, 10, *gaps, 12.0, SCORED, "")
+
+
+def test_folds_are_pooled_by_their_sums() -> None:
+    rows = [row("a", 100.0, 12.0, 30.0), row("b", 60.0, 9.0, 8.0), row("c", 80.0, 15.0, 40.0)]
+    result = together(rows, {})
+    assert result.base == Gap(240.0, 30.0, 30)
+    assert result.closed == pytest.approx((240.0 - 36.0) / (240.0 - 30.0))
+    assert rows[1].closed == 1.0  # no more than all of it
+    assert result.over_base is not None
+    assert result.over_surrogate is not None
+    assert result.over_base.chi2 == 204.0
+    drops = np.array([88.0, 51.0, 65.0])
+    se = np.sqrt(3.0 * np.sum((drops - 68.0) ** 2) / 2.0)
+    assert result.over_base.se == pytest.approx(se)
+    assert result.over_surrogate.chi2 == 42.0
+    assert together(rows[:2], {}).over_base.se is None  # type: ignore[union-attr]
+    assert together([], {}).over_base is None
+
+
+def test_nothing_is_closed_where_the_base_misses_no_more_than_it_may() -> None:
+    assert row("a", 11.0, 9.0, 9.0).closed is None  # noise
+    assert replace(row("a", 100.0, 12.0, 30.0), expected=101.0).closed is None  # nuisances

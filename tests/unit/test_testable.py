@@ -1,0 +1,146 @@
+"""What tests could tell apart: closed forms of one joint, and what is known by algebra."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+from testable_cases import (
+    NEEDED,
+    NO_NUISANCE,
+    STIFFNESS,
+    grounds_of,
+    judged,
+    only,
+    revealed,
+    tried_in,
+)
+
+from spinepipe.discrepancy.additions import MENU
+from spinepipe.discrepancy.confusions import Confusion, confusions, families
+from spinepipe.discrepancy.evidence import SIZES
+from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.seen import Design, candidates, seen_in
+from spinepipe.discrepancy.tasks import at_once
+from spinepipe.discrepancy.testable import judgements
+from spinepipe.discrepancy.told_apart import told_apart
+from spinepipe.effects import Spread
+
+ASYMMETRY = only("flexion_extension_asymmetry", coordinate="extension")
+
+
+def one_joint(moments, sd: float = 1e-6) -> Grounds:
+    return grounds_of(1, moments, ("flexion",), zeroed=False, sd=sd, priors=NO_NUISANCE)
+
+
+@pytest.mark.parametrize("moments", [(0.0, 2.0, 4.0, -2.0), (0.0, 1.0, 3.0, -3.0, -1.0)])
+def test_base_takes_up_what_a_straight_line_explains_of_an_absolute_value(moments):
+    """One joint: motion M/k, base moves it by -M/k, asymmetry by -|M|/k."""
+    m = np.array(moments)
+    expected = np.sum(m * np.abs(m)) ** 2 / np.sum(m**2) ** 2
+    found = judged(one_joint(moments), [ASYMMETRY])[ASYMMETRY.effect]
+    assert found.absorbed == pytest.approx(expected, abs=1e-3)
+    assert found.absorbed_by_base == pytest.approx(expected, abs=1e-3)
+
+
+def test_detectable_effects_have_the_evidence_needed_nine_times_in_ten():
+    """Evidence of one strength is the ratio of two normal densities of its moment."""
+    moments = np.array([0.0, 1.0, 2.0, 4.0, -4.0, -2.0])
+    found = judged(one_joint(moments, 2e-3), [ASYMMETRY])[ASYMMETRY.effect].detectable
+    motion = moments / STIFFNESS[3] / 2e-3
+    per_prior_sd = 0.2 * np.abs(motion)
+    left = per_prior_sd - motion * (motion @ per_prior_sd) / (motion @ motion)
+    gram = left @ left
+    z = np.random.default_rng(1).standard_normal(20_000)
+    b = found.times * gram + np.sqrt(gram) * z  # typical: one prior SD
+    there = np.mean([norm.pdf(b, scale=np.sqrt(gram + t**2 * gram**2)) for t in SIZES], axis=0)
+    often = np.mean(np.log(there) - norm.logpdf(b, scale=np.sqrt(gram)) > NEEDED)
+    assert often == pytest.approx(0.9, abs=0.04)
+    assert found.gap == pytest.approx(found.times * np.sqrt(gram / (3 * 6 - 1)), rel=0.01)
+    assert found.strengths == (("asymmetry", pytest.approx(0.2 * found.times), "1"),)
+
+
+def test_an_offset_explains_what_a_constant_does_of_an_absolute_value():
+    """Moments on both sides alike: base is orthogonal to both effects."""
+    m = np.array([1.0, 2.0, 4.0, -1.0, -2.0, -4.0])
+    expected = np.sum(np.abs(m)) ** 2 / (len(m) * np.sum(m**2))
+    grounds = one_joint(m)
+    tried = (ASYMMETRY, only("load_offset"))
+    of = {"a": seen_in(grounds, "a", tried)}
+    found = judgements(tried, of, 1, grounds.tests, NEEDED, 0)
+    pairs = confusions(Design(candidates(tried, 1, grounds.tests), of), found)
+    share = {(one.effect, one.other): one.share for one in pairs}
+    assert share["flexion_extension_asymmetry", "load_offset"] == pytest.approx(expected, abs=2e-3)
+    about_z = (1.0 / STIFFNESS[3]) ** 2 / np.sum(1.0 / STIFFNESS[3:] ** 2)
+    back = share["load_offset", "flexion_extension_asymmetry"]
+    assert back == pytest.approx(expected * about_z, abs=0.02)
+
+
+def test_families_explain_each_other_both_ways():
+    pairs = [("a", "b", 0.97), ("b", "a", 0.96), ("a", "c", 0.99), ("c", "a", 0.5)]
+    pairs += [("b", "c", 0.1), ("c", "b", 0.1)]
+    assert families([Confusion(*pair) for pair in pairs]) == (("a", "b"),)
+
+
+def test_pure_moments_and_rotations_do_not_tell_where_the_centre_is():
+    grounds = grounds_of()
+    found = judged(grounds, ["joint_centre_offset"])["joint_centre_offset"]
+    assert not found.testable
+    assert found.why == "it leaves no trace in these readings"
+    assert revealed(grounds, "joint_centre_offset") == MENU[0].words
+    assert "translations" in MENU[0].words
+
+
+def test_preload_stiffening_takes_a_second_preload():
+    words = revealed(grounds_of(), "preload_stiffening")
+    assert "follower load of 400 N" in words
+
+
+def test_levels_differ_only_against_a_base_that_shares_stiffness():
+    free = grounds_of(grouping="per_joint")
+    found = judged(free, ["level_dependence"])["level_dependence"]
+    assert not found.testable
+    assert found.absorbed_by_base > 0.999
+    assert "per_specimen" in revealed(free, "level_dependence")
+    assert judged(grounds_of(), ["level_dependence"])["level_dependence"].testable
+
+
+def test_a_laxity_is_looked_for_in_one_place():
+    grounds = grounds_of(specimens=2)
+    found = judged(grounds, ["local_laxity"])["local_laxity"]
+    assert found.testable
+    assert found.best.form.spread is Spread.ONE
+
+
+def test_unloading_leaves_more_of_hysteresis():
+    up = (0.0, 1.5, 3.0, 4.5, 6.0)
+    one_way = judged(grounds_of(moments=up), ["hysteresis"])["hysteresis"]
+    both = judged(grounds_of(moments=(*up, *up[-2::-1])), ["hysteresis"])["hysteresis"]
+    assert both.absorbed < 0.5 * one_way.absorbed
+
+
+def test_creep_takes_times():
+    grounds = grounds_of(seconds=None)
+    found = judged(grounds, ["creep"])["creep"]
+    assert not found.testable
+    assert "times recorded" in revealed(grounds, "creep")
+    assert judged(grounds_of(), ["creep"])["creep"].testable
+
+
+def test_what_is_told_apart_holds_every_effect_once():
+    grounds = grounds_of(joints=2, tests=("flexion",))
+    effects = ["facet_contact", "joint_centre_offset", "neutral_zone"]
+    told = told_apart(grounds, tried_in(grounds, effects), NEEDED, None, 0, at_once)
+    hidden = {one.name for one in told.not_testable}
+    assert hidden == {"joint_centre_offset"}
+    assert {one.name for one in told.smallest_detectable} == set(effects) - hidden
+    assert all(one.gap > 0.0 for one in told.smallest_detectable)
+    assert {(one.effect, one.other) for one in told.confusions} == {
+        ("facet_contact", "neutral_zone"),
+        ("neutral_zone", "facet_contact"),
+    }
+    assert all(0.0 <= one.share <= 1.0 for one in told.confusions)
+
+
+def test_where_nothing_on_the_menu_helps_the_effect_says_what_would():
+    """A test nearly without load shows no stop, whatever single thing is added."""
+    grounds = grounds_of(joints=1, moments=(0.0, 1e-3), tests=("flexion",))
+    assert "no single addition" in revealed(grounds, "facet_contact")

@@ -1,0 +1,43 @@
+"""`python -m tests.validation discrepancy`: its options."""
+
+import argparse
+import os
+from collections.abc import Sequence
+
+from tests.validation.discrepancy.report import write
+from tests.validation.discrepancy.run import run
+from tests.validation.discrepancy.store import folder, kept
+from tests.validation.discrepancy.targets import AT_THE_END, KINDS, Target, of_seeds, targets
+
+
+def main(arguments: Sequence[str] = ()) -> None:
+    """Score what is not scored yet, then write the tables of all rows there are."""
+    asked = _options(arguments)
+    place = folder()
+    if not asked.report:
+        run(_chosen(asked), place, asked.jobs)
+    write(kept(targets(), place), "python -m tests.validation discrepancy")
+
+
+def _chosen(asked: argparse.Namespace) -> list[Target]:
+    usual = tuple(kind for kind in KINDS if asked.full or kind not in AT_THE_END)
+    found = targets(tuple(asked.kind) if asked.kind else usual)
+    if asked.seeds:
+        found = list(of_seeds(found, *asked.seeds))
+    return found[: asked.limit]
+
+
+def _range(text: str) -> tuple[int, int]:
+    first, last = text.split(":")
+    return int(first), int(last)
+
+
+def _options(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser("python -m tests.validation discrepancy")
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("--kind", action="append", choices=KINDS, help="one kind; may be repeated")
+    parser.add_argument("--limit", type=int, help="only the first so many, a fair sample of all")
+    parser.add_argument("--seeds", type=_range, metavar="FIRST:LAST", help="both ends included")
+    parser.add_argument("--full", action="store_true", help="also cohorts of real size, last")
+    parser.add_argument("--report", action="store_true", help="only the tables, of rows there are")
+    return parser.parse_args(list(arguments))

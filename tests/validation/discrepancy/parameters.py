@@ -1,0 +1,106 @@
+"""Fitted parameters beside true ones, where both stand for the same thing at the same place."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tests.generators.hidden.anatomy import JOINTS
+from tests.validation.discrepancy.parameter_truth import TRUTHS, VECTORS, Values, levels, tilts
+from tests.validation.discrepancy.row import Row
+
+PER_UNIT = {"deg": np.pi / 180.0, "mm": 1e-3, "mm/deg": 1e-3 * 180.0 / np.pi}
+"""SI per unit of tables; other units are SI."""
+
+CLOSE = 0.1
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One parameter, SI. ``size`` : what an error counts against. ``inside`` : None without one."""
+
+    effect: str
+    name: str
+    truth: float
+    fitted: float
+    size: float
+    inside: bool | None
+
+    @property
+    def error(self) -> float:
+        """Share of the size."""
+        return abs(self.fitted - self.truth) / self.size
+
+    @property
+    def close(self) -> bool:
+        """Within ten percent."""
+        return self.error <= CLOSE
+
+
+def compared(row: Row) -> list[Compared]:
+    """All parameters of a row's named effects that have a counterpart."""
+    hidden = {one["name"]: one for one in row["recipe"]["hidden"]}
+    found: list[Compared] = []
+    for one in row["standing"]:
+        truth = hidden.get(one["name"])
+        if truth is not None and _same_coordinate(one, truth):
+            found += _of_levels(one, truth) if _by_level(one) else _of(one, truth)
+    return found
+
+
+def _same_coordinate(one: dict[str, Any], truth: dict[str, Any]) -> bool:
+    return one["options"].get("coordinate") in (None, truth["coordinate"])
+
+
+def _by_level(one: dict[str, Any]) -> bool:
+    return bool(one["name"] == "level_dependence")
+
+
+def _of(one: dict[str, Any], truth: dict[str, Any]) -> Iterator[Compared]:
+    for value in one["values"]:
+        true = _true(one, truth, value["place"])
+        if true is not None and _same_place(one, truth, value["place"]):
+            size = _size(one["name"], true, value["name"])
+            factor = PER_UNIT.get(value["unit"], 1.0)
+            fitted, low, high = (factor * value[key] for key in ("value", "low", "high"))
+            at = true[value["name"]]
+            yield Compared(one["name"], value["name"], at, fitted, size, low <= at <= high)
+
+
+def _true(one: dict[str, Any], truth: dict[str, Any], place: list[str]) -> Values | None:
+    if one["name"] == "load_misalignment":
+        return tilts(truth, place[-1]) if one["spread"] == "by test" else None
+    return TRUTHS[one["name"]](truth, one["options"])
+
+
+def _size(effect: str, true: Values, name: str) -> float:
+    if effect in VECTORS:
+        return float(np.linalg.norm(list(true.values())))
+    return abs(true[name])
+
+
+def _same_place(one: dict[str, Any], truth: dict[str, Any], place: list[str]) -> bool:
+    """Whether a value is of the joint and specimen that truly have the effect, and of no other."""
+    joint, specimen = truth["joint"], truth["specimen"]
+    if joint is None:
+        same_joint = one["joint"] is None
+    else:
+        same_joint = one["joint"] == joint or JOINTS[joint] in place
+    if specimen is None:
+        return same_joint and one["specimen"] is None
+    name = f"s{specimen + 1:02d}"
+    return same_joint and (one["specimen"] == name or name in place)
+
+
+def _of_levels(one: dict[str, Any], truth: dict[str, Any]) -> Iterator[Compared]:
+    """Ratios of levels against their geometric mean: a common factor belongs to the base.
+
+    Intervals are of the ratios themselves and hold that common factor too: none is scored.
+    """
+    fitted = {value["place"][-1]: value["value"] for value in one["values"] if value["place"]}
+    if set(fitted) != set(JOINTS):
+        return
+    mean = float(np.exp(np.mean(np.log(list(fitted.values())))))
+    for joint, ratio in zip(JOINTS, levels(truth), strict=True):
+        yield Compared(one["name"], "ratio", ratio, fitted[joint] / mean, ratio, None)

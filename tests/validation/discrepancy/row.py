@@ -1,0 +1,127 @@
+"""One scored cohort: what was true and what the search said, as plain values of JSON."""
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from spinepipe import cohort as cohorts
+from spinepipe.discrepancy.grounds import NoBase
+from spinepipe.discrepancy.outcome import Outcome, outcome
+from spinepipe.discrepancy.prepared import prepared
+from spinepipe.discrepancy.search import Found, Standing, search
+from spinepipe.discrepancy.tasks import at_once
+from spinepipe.discrepancy.values import fitted_values
+from spinepipe.studies import Discrepancy
+from spinepipe.studies.discrepancy import DiscrepancyBase
+from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make
+from tests.validation.discrepancy.further import held_out_told, suspected_told, testable_told
+
+STUDY = Discrepancy(
+    study="hidden",
+    kind="discrepancy",
+    cohort="hidden",
+    base=DiscrepancyBase(stiffness="per_specimen"),
+    bootstrap=300,
+)
+RIVALS_KEPT = 5
+
+Row = dict[str, Any]
+
+
+def scored(recipe: Recipe) -> Row:
+    """The row of one cohort; trouble is a row with another status than ``scored``."""
+    started = time.perf_counter()
+    row: Row = {"recipe": recipe.as_dict(), "status": "scored", "message": ""}
+    try:
+        with TemporaryDirectory() as place:
+            truth = make(recipe, Path(place) / "hidden")
+            row |= _truth(truth)
+            row["seconds"] = {"make": time.perf_counter() - started}
+            cohort = cohorts.read(Path(place) / "hidden")
+        row |= _searched(cohort, truth, row["seconds"])
+    except NoEquilibriumError as trouble:
+        row |= {"status": "no data", "message": str(trouble)}
+    except NoBase as trouble:
+        row |= {"status": "no base", "message": str(trouble)}
+    except Exception as trouble:
+        row |= {"status": "failed", "message": f"{type(trouble).__name__}: {trouble}"}
+    return row
+
+
+def _truth(truth: Truth) -> Row:
+    names = [hidden.name for hidden in truth.recipe.hidden]
+    return {
+        "recipe": truth.recipe.as_dict(),
+        "truth": {"names": names, "gap": truth.gap, "gaps": list(truth.gaps)},
+        "mistakes": truth.errors,
+    }
+
+
+def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
+    """What the search says, then what is asked besides."""
+    started = time.perf_counter()
+    grounds, rules = prepared(STUDY, cohort, None, at_once)
+    found = search(grounds, rules, at_once)
+    said = outcome(found, STUDY.margin)
+    row = _said(found, said)
+    seconds["search"] = time.perf_counter() - started
+    started = time.perf_counter()
+    row["held_out"] = held_out_told(found) if found.standing else None
+    names = [hidden.name for hidden in truth.recipe.hidden]
+    row["testable"] = testable_told(found, rules, names)
+    row["suspected"] = suspected_told(found, cohort, STUDY) if truth.errors else None
+    seconds["besides"] = time.perf_counter() - started
+    return row
+
+
+def _said(found: Found, said: Outcome) -> Row:
+    return {
+        "verdict": str(said.verdict),
+        "why": said.why,
+        "named": list(dict.fromkeys(one.name for one in said.named)),
+        "tied": list(said.tied),
+        "standing": [_standing(found, number) for number in range(len(found.standing))],
+        "gap": {
+            "base": found.base_gap.gap,
+            "final": found.final_gap.gap,
+            "base_rms": found.base_gap.rms,
+            "final_rms": found.final_gap.rms,
+        },
+        "lack": found.lack.log_evidence,
+        "lack_threshold": found.generic_threshold,
+        "threshold": found.stages[0].screen.threshold,
+        "noise_correlation": float(found.base.noise.correlation),
+        "screen": [
+            [one.effect, one.log_evidence] for one in found.stages[0].screen.effects[:RIVALS_KEPT]
+        ],
+    }
+
+
+def _standing(found: Found, number: int) -> Row:
+    """A form that stands, with its values in the units of tables."""
+    one: Standing = found.standing[number]
+    form = one.supposed.form
+    values = fitted_values(found.final.fit, number)
+    return {
+        "name": one.name,
+        "options": dict(form.variant.options),
+        "spread": str(form.spread.value),
+        "joint": form.joint,
+        "specimen": form.specimen,
+        "log_evidence": one.log_evidence,
+        "gain": one.gain,
+        "rivals": [[rival.name, rival.margin] for rival in one.rivals[:RIVALS_KEPT]],
+        "values": [
+            {
+                "name": value.name,
+                "place": list(value.place),
+                "value": value.value,
+                "low": value.low,
+                "high": value.high,
+                "unit": value.unit,
+                "at_bound": value.at_bound,
+            }
+            for value in values
+        ],
+    }
