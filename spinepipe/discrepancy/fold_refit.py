@@ -35,14 +35,18 @@ def refitted(grounds: Grounds, linear: LinearModel, part: Part, run: Run) -> Pla
         When a fit has no start.
     """
     hypothesis = grounds.fit.hypothesis
-    everyone = [name for name in hypothesis.members if name != part.apart]
     count = len(hypothesis.unknowns)
-    x, fit = _fitted(grounds, linear, part, everyone, np.arange(count), np.zeros(count), run)
-    if part.apart is not None:
+    free, x = np.arange(count), np.zeros(count)
+    if part.apart is None:
+        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x, run)
+    else:
         numbers = {
             name: np.array(one.numbers, dtype=np.int64) for name, one in hypothesis.members.items()
         }
         own = own_unknowns(numbers, part.apart)
+        others = [name for name in hypothesis.members if name != part.apart]
+        # own values stay at the full fit: no training tells them yet, priors would switch them off
+        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x, run)
         _, fit = _fitted(grounds, linear, part, [part.apart], own, x, run)
     nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
     return Placed({name: fit.predicted[name] for name in part.scored}, nuisances)

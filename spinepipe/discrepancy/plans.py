@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.discrepancy.load_changes import farthest
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
+from spinepipe.effects.contract import Indices
 from spinepipe.model import LoadCase
 
 PER_SPECIMEN = "per_specimen"
@@ -20,7 +20,7 @@ class Planned:
     """
 
     case: LoadCase
-    count: NDArray[np.int64]
+    count: Indices
     preload: float = 0.0
 
 
@@ -38,9 +38,17 @@ class Plan:
 
 
 def as_made(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
-    """The tests that a specimen has had."""
-    tests = tuple(Planned(test.case, test.count.max(axis=0)) for test in one.tests)
-    return Plan(tests, zeroed, grouping)
+    """The tests that a specimen has had; cycles whose loads differ a little are one test."""
+    planned: dict[str, Planned] = {}
+    for test in one.tests:
+        name, count = test.case.test, test.count.max(axis=0)
+        known = planned.get(name)
+        planned[name] = Planned(test.case, count) if known is None else _again(known, count)
+    return Plan(tuple(planned.values()), zeroed, grouping)
+
+
+def _again(known: Planned, count: Indices) -> Planned:
+    return replace(known, count=known.count + count)
 
 
 def _repeats(one: Planned, zeroed: bool) -> Repeats:

@@ -22,6 +22,10 @@ from spinepipe.discrepancy.rounds import look
 from spinepipe.discrepancy.screen import Screen, exceeded
 from spinepipe.discrepancy.tasks import Run
 
+HOPELESS_SHARE, GENERIC_TIMES = 0.25, 2.0
+"""The first effect closes less of the base's excess chi2, and the generic basis that much more:
+no known effect is what is missing, and adding them up would only imitate it."""
+
 REAL_SHARE = 0.03
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
 
@@ -107,18 +111,34 @@ class _Log:
     stages: list[Stage] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class _Limits:
+    """Excess chi2 of the base, and the drop of chi2 by the generic basis there."""
+
+    excess: float
+    generic: float
+
+    def admit(self, one: Refit, first: bool) -> bool:
+        """Whether a refit closes enough to enter."""
+        if not first:
+            return one.gain >= REAL_SHARE * self.excess
+        hopeless = one.gain < HOPELESS_SHARE * self.excess
+        return not (hopeless and self.generic > GENERIC_TIMES * one.gain)
+
+
 def search(base: Grounds, rules: Rules, run: Run) -> Found:
     """Effects that the base lacks."""
     log = _Log()
     base_gap = whole_gap(base, base.fit)
-    current, entered = _forward(base, base, rules, run, log, base_gap)
+    lack_of_base = run(lack_of_fit, base, rules.coordinates, rules.draws, rules.seed)
+    limits = _Limits(base_gap.excess, lack_of_base.explained)
+    current = _forward(base, rules, run, log, limits)
     standing_now: tuple[Standing, ...] = ()
     for _ in range(MOST_SWAPS):
-        current, standing_now, changed = _examined(base, current, entered, rules, run, log)
+        current, standing_now, changed = _examined(base, current, rules, run, log)
         if not changed:
             break
-        current, entered = _forward(base, current, rules, run, log, base_gap)
-    lack_of_base = run(lack_of_fit, base, rules.coordinates, rules.draws, rules.seed)
+        current = _forward(current, rules, run, log, limits)
     lack = lack_of_base
     if standing_now:
         lack = run(lack_of_fit, current, rules.coordinates, rules.draws, rules.seed)
@@ -143,48 +163,41 @@ def _look(grounds: Grounds, rules: Rules, run: Run, log: _Log) -> Screen:
 
 
 def _forward(
-    base: Grounds, current: Grounds, rules: Rules, run: Run, log: _Log, base_gap: Gap
-) -> tuple[Grounds, Refit | None]:
-    """Let effects enter; the grounds that are left, and the last that entered."""
-    last: Refit | None = None
-    while len(current.fit.hypothesis.supposed) < MOST_FORMS_NAMED:
+    current: Grounds, rules: Rules, run: Run, log: _Log, limits: _Limits
+) -> Grounds:
+    """Let effects enter; the grounds that are left."""
+    while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
         screen = _look(current, rules, run, log)
-        number = len(current.fit.hypothesis.supposed) + 1
+        name = f"round {number + 1}"
         if screen.effects[0].log_evidence <= screen.threshold:
-            log.stages.append(Stage(f"round {number}", screen))
+            log.stages.append(Stage(name, screen))
             break
         tried = refits(current, screen, rules.trials, run)
-        log.stages.append(Stage(f"round {number}", screen, tried))
-        best = _admitted(current, tried, screen, rules, base_gap)
+        log.stages.append(Stage(name, screen, tried))
+        best = _admitted(current, tried, screen, rules, limits)
         if best is None:
             break
-        current, last = current.at(best.fit), best
-    return current, last
+        current = current.at(best.fit)
+    return current
 
 
 def _admitted(
-    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, base_gap: Gap
+    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, limits: _Limits
 ) -> Refit | None:
     """The best refit, if it may enter."""
     supposed = current.fit.hypothesis.supposed
     names = {one.form.name for one in supposed}
     for one in tried:
-        if one.log_evidence <= screen.threshold:
+        if not one.log_evidence > screen.threshold:
             return None
-        if supposed and one.gain < REAL_SHARE * base_gap.excess:
-            continue
-        if one.name in names or len(names) < rules.most_effects:
+        known = one.name in names or len(names) < rules.most_effects
+        if known and limits.admit(one, first=not supposed):
             return one
     return None
 
 
 def _examined(
-    base: Grounds,
-    current: Grounds,
-    entered: Refit | None,
-    rules: Rules,
-    run: Run,
-    log: _Log,
+    base: Grounds, current: Grounds, rules: Rules, run: Run, log: _Log
 ) -> tuple[Grounds, tuple[Standing, ...], bool]:
     """Each effect against its rivals; whether one left or gave way to a better one."""
     stood: list[Standing] = []
@@ -192,8 +205,10 @@ def _examined(
     for number, one in enumerate(supposed):
         others = tuple(other for k, other in enumerate(supposed) if k != number)
         without = _without(base, others, run)
-        screen = _look(without, rules, run, log) if others else log.stages[0].screen
-        tried = refits(without, screen, rules.trials, run) if others else log.stages[0].refits
+        screen, tried = log.stages[0].screen, log.stages[0].refits
+        if others:
+            screen = _look(without, rules, run, log)
+            tried = refits(without, screen, rules.trials, run)
         own = _own(without, one, tried, rules, run)
         log.stages.append(Stage(f"in the place of {one.form.name}", screen, tried))
         if not own.log_evidence > screen.threshold:
@@ -201,8 +216,8 @@ def _examined(
         best = max(tried, key=lambda other: other.log_evidence, default=own)
         if best.name != one.form.name and best.log_evidence > own.log_evidence:
             return without.at(best.fit), (), True
-        rivals = _rivals(own, tried, screen)
         alone = next(e for e in log.stages[0].screen.effects if e.effect == one.form.name)
+        rivals = _rivals(own, tried, screen)
         stood.append(Standing(one, own.log_evidence, alone.log_evidence, own.gain, rivals))
     return current, tuple(stood), False
 

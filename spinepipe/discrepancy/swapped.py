@@ -20,7 +20,7 @@ from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.discrepancy.suspected import SuspectedError
 from spinepipe.discrepancy.tasks import Run
 
-LEAST_EXCESS = 5.0
+LEAST_EXCESS = 3.0
 """SDs of chi2 (sqrt of twice the readings) by which both specimens must fail to be looked at."""
 
 LEAST_SHARE = 0.6

@@ -72,7 +72,7 @@ def _advance(
     if not step.advances:
         return {}
     placed = system.placed(step.equilibrium.q, with_parameters=True)
-    joints_by_x = np.einsum("jab,jbm->jam", placed.by_coordinate, dq.reshape(-1, 6, len(free)))
+    joints_by_x = np.einsum("jab,jbm->jam", placed.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free)))
     joints_by_x += _placement_by_x(system, placed.by_parameter, free)
     carried_by_x = _carried(system, step, free, placed.q, joints_by_x, state_by_x)
     following = {}
@@ -150,7 +150,7 @@ def observed_by_parameters(
 ) -> Array:
     """(J, 6, m) derivative of the reported coordinates by the unknowns, at pose q (n,)."""
     joints = q.reshape(-1, 6).copy()
-    by_x = dq.reshape(len(joints), 6, -1).copy()
+    by_x = dq.reshape(len(joints), 6, dq.shape[1]).copy()
     for active in system.measurement:
         here = joints[active.joints]
         seen = active.effect.observe(here, active.values)

@@ -138,7 +138,8 @@ CONFUSIONS = Table(
 
 
 def _rms(name: str, of: str, null: str) -> Column:
-    return _of_noise(name, f"root mean square residual of {of}: 1 is noise", null)
+    meaning = f"root mean square residual of {of}: 1 is noise and what training leaves open"
+    return _of_noise(name, meaning, null)
 
 
 HELD_OUT = Table(
@@ -147,7 +148,7 @@ HELD_OUT = Table(
     ("fold",),
     (
         Column("fold", "text", "specimen or test left out"),
-        Column("kind", "text", "what is left out", allowed=("specimen", "test")),
+        Column("kind", "text", "what is left out", allowed=("specimen", "test", "steps")),
         Column("readings", "integer", "readings left out", low=0),
         _rms("rms_base", "the base model", "no result, see status"),
         _rms("rms_with_effects", "the model with the named effects", "no result, see status"),

@@ -1,6 +1,7 @@
 """Small cohorts for held-out folds: coaxial chains of two joints in pure moments."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -109,11 +110,11 @@ def grounds(readings: Sequence[SpecimenReadings], priors: NuisancePriors = NONE)
     return laid(readings, noise(), priors, Start(models, base, 100.0), at_once)
 
 
-def found(base: Grounds, zone: bool) -> Found:
+def found(base: Grounds, zone: bool, spread: Spread = Spread.SHARED) -> Found:
     """A search that ended with a neutral zone, or with nothing."""
     final = base
     if zone:
-        guess = Supposed(ZONE, np.array([0.4, 0.04]))
+        guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
     lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0)
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)

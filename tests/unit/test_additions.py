@@ -7,7 +7,8 @@ from testable_cases import case_of
 
 from spinepipe.discrepancy.additions import MENU
 from spinepipe.discrepancy.load_changes import comes_back
-from spinepipe.discrepancy.plans import Plan, Planned, thinned
+from spinepipe.discrepancy.plans import Plan, Planned, as_made, thinned
+from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.model import LoadCase
 
 
@@ -57,3 +58,13 @@ def test_a_thinned_plan_keeps_first_farthest_and_last_step():
     kept = levels(thinned(plan_of(case_of("flexion", 2, moments)), 10).tests[0].case)
     assert len(kept) <= 11
     assert [kept[0], max(kept), kept[-1]] == [0.0, 7.0, 1.0]
+
+
+def test_cycles_whose_loads_differ_a_little_are_one_test():
+    cases = [case_of("flexion", 2, (0.0, 2.0, 4.0 + extra)) for extra in (0.0, 0.01, 0.02)]
+    read = np.zeros((1, 3, 2, 6))
+    read[..., :3] = np.nan
+    readings = SpecimenReadings("a", (), tuple(Repeats(case, read) for case in cases))
+    (one,) = as_made(readings, True, "per_joint").tests
+    assert one.case == cases[0]
+    assert one.count.tolist() == [[0, 0, 0, 3, 3, 3]] * 2

@@ -1,5 +1,7 @@
 """What tests could tell apart: closed forms of one joint, and what is known by algebra."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -14,13 +16,14 @@ from testable_cases import (
     tried_in,
 )
 
+from spinepipe.discrepancy import extra_tests
 from spinepipe.discrepancy.additions import MENU
 from spinepipe.discrepancy.confusions import Confusion, confusions, families
 from spinepipe.discrepancy.evidence import SIZES
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.seen import Design, candidates, seen_in
 from spinepipe.discrepancy.tasks import at_once
-from spinepipe.discrepancy.testable import judgements
+from spinepipe.discrepancy.testable import Detectable, judgements
 from spinepipe.discrepancy.told_apart import told_apart
 from spinepipe.effects import Spread
 
@@ -43,7 +46,7 @@ def test_base_takes_up_what_a_straight_line_explains_of_an_absolute_value(moment
 
 def test_detectable_effects_have_the_evidence_needed_nine_times_in_ten():
     """Evidence of one strength is the ratio of two normal densities of its moment."""
-    moments = np.array([0.0, 1.0, 2.0, 4.0, -4.0, -2.0])
+    moments = np.array([0.0, 1.0, 2.0, 4.0, -3.0, -1.0])
     found = judged(one_joint(moments, 2e-3), [ASYMMETRY])[ASYMMETRY.effect].detectable
     motion = moments / STIFFNESS[3] / 2e-3
     per_prior_sd = 0.2 * np.abs(motion)
@@ -110,11 +113,38 @@ def test_a_laxity_is_looked_for_in_one_place():
     assert found.best.form.spread is Spread.ONE
 
 
+def test_a_test_that_shows_an_effect_clearly_goes_before_one_that_hardly_does(monkeypatch):
+    grounds = grounds_of()
+    (one,) = judged(grounds, ["level_dependence"]).values()
+    faint = replace(one, detectable=Detectable(2.0, 0.2, ()))
+    clear = replace(one, detectable=Detectable(0.5, 0.2, ()))
+    answers = iter([(faint,), (faint,), (clear,)])
+    monkeypatch.setattr(extra_tests, "judged_under", lambda *_: next(answers))
+    tried = tried_in(grounds, ["level_dependence"])
+    hidden = [replace(one, testable=False)]
+    (told,) = extra_tests.not_testable(extra_tests.bench(grounds, None), tried, hidden, NEEDED, 0)
+    assert told.test_that_would_tell == MENU[3].words  # times are recorded already
+
+
 def test_unloading_leaves_more_of_hysteresis():
     up = (0.0, 1.5, 3.0, 4.5, 6.0)
     one_way = judged(grounds_of(moments=up), ["hysteresis"])["hysteresis"]
     both = judged(grounds_of(moments=(*up, *up[-2::-1])), ["hysteresis"])["hysteresis"]
     assert both.absorbed < 0.5 * one_way.absorbed
+
+
+def test_unloading_tells_hysteresis_from_a_neutral_zone():
+    """Known from a trial: on the loading branch alone one explains 0.9 of the other."""
+    up = (0.0, 0.75, 1.5, 3.0, 4.5, 6.0, 7.5)
+    pair = "hysteresis", "neutral_zone"
+
+    def share(moments: tuple[float, ...]) -> float:
+        grounds = grounds_of(2, moments, ("flexion",))
+        told = told_apart(grounds, tried_in(grounds, pair), NEEDED, None, 0, at_once)
+        return next(c.share for c in told.confusions if (c.effect, c.other) == pair)
+
+    assert share(up) > 0.85
+    assert share((*up, *up[-2::-1])) < 0.5
 
 
 def test_creep_takes_times():

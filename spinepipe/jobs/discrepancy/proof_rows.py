@@ -9,6 +9,7 @@ from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.held_out import FoldRow, HeldOut
 from spinepipe.discrepancy.told_apart import ToldApart
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.discrepancy.verdict import against_expected
 from spinepipe.statics import Status
 from spinepipe.tables.discrepancy import NOT_TESTABLE
 
@@ -25,17 +26,18 @@ def _fold_row(row: FoldRow) -> Row:
         "fold": row.name,
         "kind": row.kind,
         "readings": row.readings,
-        "rms_base": _rms(row.base),
-        "rms_with_effects": _rms(row.with_effects),
-        "rms_surrogate": _rms(row.surrogate),
+        "rms_base": _rms(row.base, row.expected),
+        "rms_with_effects": _rms(row.with_effects, row.expected),
+        "rms_surrogate": _rms(row.surrogate, row.expected),
         "closed": row.closed,
         "status": Status.CONVERGED if row.base is not None else Status.NOT_CONVERGED,
         "message": row.message,
     }
 
 
-def _rms(gap: Gap | None) -> float | None:
-    return None if gap is None else gap.rms
+def _rms(gap: Gap | None, expected: float) -> float | None:
+    sized = against_expected(gap, expected)
+    return None if sized is None else sized.rms
 
 
 def held_out_readings(
@@ -78,7 +80,7 @@ def design_rows(told: ToldApart) -> list[Row]:
             "delta_chi2": None,
             "gap_share": None,
             "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
-            "detectable_gap": one.detectable_gap,
+            "detectable_gap": one.detectable.gap if one.detectable else None,
             "threshold": None,
             "status": Status.CONVERGED if one.testable else NOT_TESTABLE,
             "message": one.why,

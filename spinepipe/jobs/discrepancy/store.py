@@ -25,7 +25,7 @@ R = TypeVar("R")
 _WAITING: dict[str, Callable[[], Any]] = {}
 
 
-@python.define(outputs=["result"])
+@python.define(outputs=["result"])  # type: ignore[untyped-decorator]
 def Piece(token: str) -> Any:
     """The piece of that digest; its result is kept under it."""
     from spinepipe.jobs.discrepancy.store import waiting

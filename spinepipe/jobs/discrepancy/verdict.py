@@ -128,10 +128,15 @@ def _pairs(found: Found, proof: HeldOut, name: str) -> Data:
     gaps = {
         "base": found.base_gap,
         "with_effects": found.final_gap,
-        "held_out_base": proof.base,
-        "held_out_with_effects": proof.with_effects,
+        "held_out_base": against_expected(proof.base, proof.expected),
+        "held_out_with_effects": against_expected(proof.with_effects, proof.expected),
     }
     return {key: _size(gap, name) for key, gap in gaps.items()}
+
+
+def against_expected(gap: Gap | None, expected: float) -> Gap | None:
+    """A held-out gap beside what a right model leaves: noise, and nuisances left open."""
+    return None if gap is None else Gap(gap.chi2, expected, gap.readings)
 
 
 def _size(gap: Gap | None, name: str) -> float | None:

@@ -16,7 +16,7 @@ def main(arguments: Sequence[str] = ()) -> None:
     place = folder()
     if not asked.report:
         run(_chosen(asked), place, asked.jobs)
-    write(kept(targets(), place), "python -m tests.validation discrepancy")
+    write(kept(targets(), place), "python -m tests.validation discrepancy", place.name)
 
 
 def _chosen(asked: argparse.Namespace) -> list[Target]:

@@ -138,4 +138,4 @@ VECTORS = ("joint_centre_offset", "joint_centre_migration", "load_offset", "mark
 
 def levels(hidden: Hidden) -> list[float]:
     """Ratio of each joint to the geometric mean of all."""
-    return np.exp(hidden["strength"] * np.array(hidden["shape"]["pattern"])).tolist()
+    return [float(np.exp(hidden["strength"] * step)) for step in hidden["shape"]["pattern"]]

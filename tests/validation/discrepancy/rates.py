@@ -45,8 +45,8 @@ def median(name: str, values: Sequence[float], goal: Goal | None = None) -> dict
     """A median with the interval of its order statistics; ends are None where too few."""
     if not values:
         return _row(name, 0, None, None, None, None, goal)
-    ends = quantile_test(np.array(values), q=0.0, p=0.5).confidence_interval(0.95)
-    low, high = (float(end) if np.isfinite(end) else None for end in ends)
+    ends: Any = quantile_test(np.array(values), q=0.0, p=0.5).confidence_interval(0.95)
+    low, high = (float(end) if np.isfinite(end) else None for end in (ends.low, ends.high))
     return _row(name, len(values), None, float(np.median(values)), low, high, goal)
 
 
@@ -59,7 +59,9 @@ def _row(
     high: float | None,
     goal: Goal | None,
 ) -> dict[str, Any]:
-    known = low is not None and high is not None
+    reached = "undecided" if goal else ""
+    if goal and low is not None and high is not None:
+        reached = goal.reached(low, high)
     return {
         "what": name,
         "n": n,
@@ -69,5 +71,5 @@ def _row(
         "high": high,
         "goal": str(goal) if goal else "",
         "met": ("yes" if goal.met(value) else "no") if goal and value is not None else "",
-        "reached": goal.reached(low, high) if goal and known else ("undecided" if goal else ""),  # type: ignore[arg-type]
+        "reached": reached,
     }

@@ -24,8 +24,8 @@ whole interval. Gaps are those truly there, in SD of one reading. The detection 
 stiffness that grows with compression needs two preloads."""
 
 
-def write(rows: Sequence[Row], command: str, folder: Path = RESULTS) -> None:
-    """All tables as CSV, and the goals as Markdown too."""
+def write(rows: Sequence[Row], command: str, code: str, folder: Path = RESULTS) -> None:
+    """All tables as CSV, and the goals as Markdown too; ``code`` : digest that made the rows."""
     if not rows:
         print("discrepancy: no rows of this code", flush=True)
         return
@@ -41,7 +41,7 @@ def write(rows: Sequence[Row], command: str, folder: Path = RESULTS) -> None:
     }
     for name, table in found.items():
         shown(table).to_csv(folder / f"discrepancy_{name}.csv", index=False)
-    text = markdown(shown(found["goals"]), rows, command)
+    text = markdown(shown(found["goals"]), rows, command, code)
     (folder / "discrepancy.md").write_text(text, encoding="utf-8")
     print(text, flush=True)
 
@@ -57,8 +57,8 @@ def _cell(cell: object) -> object:
     return f"{cell:.4g}" if isinstance(cell, float) else cell
 
 
-def markdown(table: pd.DataFrame, rows: Sequence[Row], command: str) -> str:
-    """The goals with what was scored, by which command and when."""
+def markdown(table: pd.DataFrame, rows: Sequence[Row], command: str, code: str) -> str:
+    """The goals with what was scored, by which command and code, and when."""
     seeds = [row["target"]["seed"] for row in rows]
     status = Counter(row["status"] for row in rows)
     counts = ", ".join(f"{number} {name}" for name, number in status.most_common())
@@ -70,7 +70,7 @@ def markdown(table: pd.DataFrame, rows: Sequence[Row], command: str) -> str:
         f"{len(rows)} cohorts of seeds {min(seeds)} to {max(seeds)}: {counts}. "
         "Those without an answer are in discrepancy_sets.csv and count nowhere else.",
         "",
-        f"`{command}`, {date.today().isoformat()}",
+        f"`{command}`, code {code}, {date.today().isoformat()}",
         "",
         "| " + " | ".join(table.columns) + " |",
         "|" + "---|" * len(table.columns),

@@ -28,13 +28,14 @@ def run(targets: Sequence[Target], place: Path, jobs: int) -> None:
     """Rows of all targets, each in its file."""
     place.mkdir(parents=True, exist_ok=True)
     open_ones = [(t, path_of(t, place)) for t in targets if not path_of(t, place).exists()]
-    print(f"discrepancy: {len(targets)} cohorts, {len(open_ones)} to score", flush=True)
+    said = f"{len(targets)} cohorts, {len(open_ones)} to score by code {place.name}"
+    print(f"discrepancy: {said}", flush=True)
     if not open_ones:
         return
     before = signal.signal(signal.SIGTERM, _end)
     try:
         with get_context("spawn").Pool(min(jobs, len(open_ones)), _begin) as workers:
-            _follow(workers.imap_unordered(_one, open_ones), len(open_ones))
+            _follow(workers.imap_unordered(keep_one, open_ones), len(open_ones))
     finally:
         signal.signal(signal.SIGTERM, before)
 
@@ -69,7 +70,8 @@ def _too_long(number: int, frame: FrameType | None) -> None:
     raise TooLongError
 
 
-def _one(task: Task) -> tuple[Target, Row]:
+def keep_one(task: Task) -> tuple[Target, Row]:
+    """Score a target and keep its row; in the process it is called in."""
     target, path = task
     signal.alarm(MOST_SECONDS.get(target.kind, MOST_SECONDS_ELSE))
     try:

@@ -137,9 +137,15 @@ def _line(row: Row, one: Judged | None) -> dict[str, Any]:
         "gap_final": row.get("gap", {}).get("final"),
         "held_out_closed": held_out.get("closed"),
         "held_out_rms": held_out.get("rms"),
-        "seconds": row.get("seconds", {}).get("search"),
-        "message": row["message"],
+        "cpu_seconds": row.get("seconds", {}).get("search_cpu"),
+        "message": row["message"] or _why_not(row, one),
     }
+
+
+def _why_not(row: Row, one: Judged | None) -> str:
+    """What the search says for itself where it is not right."""
+    right = one is not None and (one.top1 or (not one.truth and one.verdict == "NULL"))
+    return "" if right else str(row.get("why", ""))
 
 
 def _design(recipe: dict[str, Any]) -> str:

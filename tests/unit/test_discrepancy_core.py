@@ -1,0 +1,360 @@
+"""The pieces of the search against dense linear algebra, scipy's densities and closed forms."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+import spring_chain_cases as chains
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.linalg import block_diag
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal, ncx2, norm
+from spring_chain_cases import SD, readings
+
+from spinepipe.discrepancy.evidence import SIZES, Group
+from spinepipe.discrepancy.forms import Form, Variant, trials
+from spinepipe.discrepancy.gaps import Gap
+from spinepipe.discrepancy.grounds import Grounds, laid
+from spinepipe.discrepancy.groups import Index, summed
+from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Hypothesis, Member, Supposed, Unknown
+from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.discrepancy.noise import Noise
+from spinepipe.discrepancy.nuisance import NuisancePriors
+from spinepipe.discrepancy.projected import Linearised, drawn, linearised, products, taken_out
+from spinepipe.discrepancy.refit import laplace
+from spinepipe.discrepancy.rounds import look
+from spinepipe.discrepancy.screen import Screen, exceeded
+from spinepipe.discrepancy.signatures import EVERY_TEST, Column
+from spinepipe.discrepancy.tasks import at_once
+from spinepipe.effects import Spread
+from spinepipe.model import SpineModel
+from spinepipe.units import ROTATIONS
+
+Array = NDArray[np.float64]
+
+NO_NUISANCE = NuisancePriors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def log_normal(residual: Array, covariance: Array) -> float:
+    return float(multivariate_normal.logpdf(residual, cov=covariance))
+
+
+# Evidence of a group -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_evidence_is_the_ratio_of_marginal_likelihoods(count: int) -> None:
+    rng = np.random.default_rng(1)
+    f, r = rng.normal(size=(25, count)), 2.0 * rng.normal(size=(25, 4))
+    group = Group.of(f.T @ f, np.zeros(count))
+    expected = []
+    for residual in r.T:
+        nothing = log_normal(residual, np.eye(25))
+        logs = [log_normal(residual, np.eye(25) + t**2 * f @ f.T) - nothing for t in SIZES]
+        expected.append(logsumexp(logs) - np.log(len(SIZES)))
+    np.testing.assert_allclose(group.log_evidence(f.T @ r), expected, rtol=1e-9)
+
+
+def test_strengths_without_a_signature_change_no_evidence() -> None:
+    f = np.random.default_rng(2).normal(size=(25, 2))
+    wide = np.column_stack([f, np.zeros(25), f[:, 0]])
+    r = np.ones((25, 1))
+    only = Group.of(f.T @ f, np.zeros(2)).log_evidence(f.T @ r)
+    padded = np.column_stack([f, np.zeros(25)])
+    same = Group.of(padded.T @ padded, np.zeros(3)).log_evidence(padded.T @ r)
+    np.testing.assert_allclose(same, only)
+    twice = Group.of(wide.T @ wide, np.zeros(4)).log_evidence(wide.T @ r)
+    nothing = log_normal(r[:, 0], np.eye(25))
+    logs = [log_normal(r[:, 0], np.eye(25) + t**2 * wide @ wide.T) - nothing for t in SIZES]
+    assert twice[0] == pytest.approx(logsumexp(logs) - np.log(len(SIZES)))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("size", [0.7, -0.7])
+def test_one_sided_evidence_is_the_integral_over_half_a_normal(side: float, size: float) -> None:
+    rng = np.random.default_rng(3)
+    f = 0.6 * rng.normal(size=(20, 1))
+    r = size * f[:, 0] + rng.normal(size=20)
+    group = Group.of(f.T @ f, np.array([side]))
+
+    def likelihood(b: float) -> float:
+        return float(np.exp(b * f[:, 0] @ r - 0.5 * b**2 * f[:, 0] @ f[:, 0]))
+
+    ratios = [
+        quad(lambda b, t=t: 2.0 * norm.pdf(b, 0.0, t) * likelihood(side * b), 0.0, 12.0 * t)[0]
+        for t in SIZES
+    ]
+    found = group.log_evidence(f.T @ r[:, None])[0]
+    assert found == pytest.approx(np.log(np.mean(ratios)), rel=1e-6)
+
+
+# The linearised problem ----------------------------------------------------------------------
+
+LAXITY = Variant("local_laxity", ())
+COUPLING = Variant("bending_rotation_coupling", ())
+
+
+def unknown(number: int | None, sd: float, is_strength: bool = False) -> Unknown:
+    return Unknown("", number, 0, (), is_strength, -100.0, 100.0, 0.0, sd)
+
+
+def made_up_fit(jacobians: dict[str, Array], members: dict[str, tuple[int, ...]]) -> JointFit:
+    """A fit with given whitened Jacobians; ``members`` number their columns."""
+    rng = np.random.default_rng(11)
+    count = 1 + max(max(numbers) for numbers in members.values())
+    nothing = cast(SpineModel, None)
+    hypothesis = Hypothesis(
+        {name: Member(nothing, (), numbers) for name, numbers in members.items()},
+        tuple(unknown(None, 3.0) for _ in range(count)),
+        (),
+    )
+    residuals = {name: rng.normal(size=len(j)) for name, j in jacobians.items()}
+    x = np.zeros(count)
+    bound = np.zeros(count, dtype=bool)
+    return JointFit(hypothesis, x, {}, 1.0, residuals, jacobians, {}, bound, "")
+
+
+def problem_of(fit: JointFit, signatures: dict[str, Array], draws: int) -> Linearised:
+    """Everything that one effect's evidence is made of."""
+    rng, found = np.random.default_rng(0), {}
+    for name, taken in taken_out(fit).items():
+        f = signatures[name]
+        found[name] = products(taken, f, np.sum(f**2, axis=0), drawn(taken, draws, rng))
+    return linearised(found)
+
+
+def left_of(columns: Array, taken: Array) -> Array:
+    """Columns without what least squares explains of them."""
+    return columns - taken @ np.linalg.lstsq(taken, columns)[0]
+
+
+@pytest.mark.parametrize("spread", [Spread.SHARED, Spread.BY_JOINT, Spread.EACH])
+@pytest.mark.parametrize("shared", [0, 1, 2])
+def test_products_are_those_of_dense_projections(spread: Spread, shared: int) -> None:
+    """Two specimens with two unknowns of their own and some that they share; three joints."""
+    rng = np.random.default_rng(4)
+    common = tuple(range(4, 4 + shared))
+    members = {"a": (0, 1, *common), "b": (*common, 2, 3)}
+    jacobians = {name: rng.normal(size=(30, 2 + shared)) for name in members}
+    fit = made_up_fit(jacobians, members)
+    signatures = {name: rng.normal(size=(30, 3)) for name in members}
+    problem = problem_of(fit, signatures, 5)
+    columns = [Column(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(3)]
+    form = Form(LAXITY, spread)
+    one = summed(Index(columns), problem, form, (), list(members), ())
+
+    a, b = jacobians["a"], jacobians["b"]
+    own = block_diag(a[:, :2], b[:, shared:])
+    taken = np.column_stack([own, np.vstack([a[:, 2:], b[:, :shared]])])
+    stacked = np.vstack([signatures["a"], signatures["b"]])
+    dense = {
+        Spread.SHARED: stacked.sum(axis=1, keepdims=True),
+        Spread.BY_JOINT: stacked,
+        Spread.EACH: block_diag(signatures["a"], signatures["b"]),
+    }[spread]
+    left = left_of(dense, taken)
+    residual = -np.concatenate([fit.residuals["a"], fit.residuals["b"]])
+    np.testing.assert_allclose(one.gram, left.T @ left, atol=1e-9)
+    np.testing.assert_allclose(one.moments[:, 0], left.T @ residual, atol=1e-9)
+    if spread is not Spread.SHARED:
+        np.testing.assert_allclose(one.raw, np.sum(dense**2, axis=0))
+
+
+def test_draws_of_the_null_have_the_covariance_of_the_products() -> None:
+    """Moments of noise have covariance F'F, with what is shared taken out too."""
+    rng = np.random.default_rng(5)
+    members = {"a": (0, 2), "b": (1, 2)}
+    fit = made_up_fit({name: rng.normal(size=(40, 2)) for name in members}, members)
+    signatures = {name: rng.normal(size=(40, 2)) for name in members}
+    problem = problem_of(fit, signatures, 20000)
+    columns = [Column(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(2)]
+    form = Form(LAXITY, Spread.BY_JOINT)
+    one = summed(Index(columns), problem, form, (), list(members), ())
+    found = np.cov(one.moments[:, 1:])
+    np.testing.assert_allclose(found, one.gram, atol=5.0 * np.sqrt(2.0 / 20000) * one.gram.max())
+    np.testing.assert_allclose(one.moments[:, 1:].mean(axis=1), 0.0, atol=5.0 * np.sqrt(80 / 20000))
+
+
+def test_what_the_base_explains_is_no_signature() -> None:
+    rng = np.random.default_rng(6)
+    jacobian = rng.normal(size=(40, 3))
+    fit = made_up_fit({"a": jacobian}, {"a": (0, 1, 2)})
+    f = np.column_stack([jacobian @ [1.0, 2.0, 3.0], rng.normal(size=40)])
+    found = problem_of(fit, {"a": f}, 3).of["a"]
+    np.testing.assert_array_equal(found.gram[0], 0.0)
+    np.testing.assert_array_equal(found.moments[0], 0.0)
+    assert found.gram[1, 1] > 1.0
+
+
+# Laplace evidence ----------------------------------------------------------------------------
+
+
+def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Array, Array, Array]:
+    """One effect's strength beside two base unknowns; the exact optimum of chi2, and its gain."""
+    rng = np.random.default_rng(7)
+    base, f = 20.0 * rng.normal(size=(60, 2)), 4.0 * rng.normal(size=60)
+    scale = variant.create().parameters[variant.strengths[0]].prior_scale
+    y = base @ [0.1, -0.2] + f * size + rng.normal(size=60)
+    whole = np.column_stack([base, f / scale])
+    x = np.linalg.lstsq(whole, y)[0]
+    off = y - base @ np.linalg.lstsq(base, y)[0]
+    on = y - whole @ x
+    form = Form(variant, Spread.SHARED)
+    unknowns = (unknown(None, 3.0), unknown(None, 3.0), unknown(0, STRENGTH_SDS * scale, True))
+    member = Member(cast(SpineModel, None), (), (0, 1, 2))
+    supposed = (Supposed(form, np.zeros(1)),)
+    hypothesis = Hypothesis({"a": member}, unknowns, supposed)
+    bound = np.zeros(3, dtype=bool)
+    fit = JointFit(hypothesis, x, {}, float(on @ on), {"a": -on}, {"a": -whole}, {}, bound, "")
+    return fit, float(off @ off - on @ on), base, f, y
+
+
+@pytest.mark.parametrize("size", [0.0, 0.2, 1.0])
+def test_laplace_is_the_exact_evidence_of_a_linear_problem(size: float) -> None:
+    fit, gain, base, f, y = linear_problem(COUPLING, size)
+    without = np.eye(60) + 9.0 * base @ base.T
+    logs = [log_normal(y, without + t**2 * np.outer(f, f)) for t in SIZES]
+    expected = logsumexp(logs) - np.log(len(SIZES)) - log_normal(y, without)
+    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("size", [0.15, 0.2, 1.0])
+def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float) -> None:
+    fit, gain, base, f, y = linear_problem(LAXITY, size)
+    without = np.eye(60) + 9.0 * base @ base.T
+    inverse = np.linalg.inv(without)
+    slope, bend = f @ inverse @ y, f @ inverse @ f
+    ratios = [
+        quad(
+            lambda b, t=t: 2.0 * norm.pdf(b, 0.0, t) * np.exp(b * slope - 0.5 * b**2 * bend - 20.0),
+            0.0,
+            10.0 * t,
+            points=[min(max(slope / bend, 1e-3), 9.0 * t)],
+        )[0]
+        for t in SIZES
+    ]
+    expected = np.log(np.mean(ratios)) + 20.0
+    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
+
+
+# Fits, screens and gaps of chains in closed form -----------------------------------------------
+
+
+def noise() -> Noise:
+    sd = np.array([np.nan] * 3 + [SD] * 3)
+    return Noise(sd, 0.0, "repeats", np.zeros(6, dtype=np.int64), 0, False)
+
+
+def grounds_of(given: list, priors: NuisancePriors) -> Grounds:  # type: ignore[type-arg]
+    return laid(given, noise(), priors, chains.start(given), at_once)
+
+
+def test_a_fit_of_linear_springs_is_that_of_least_squares() -> None:
+    """Angles are moment times compliance: compliance by lstsq over joints, steps and cycles."""
+    given = readings(5)
+    fit = grounds_of(given, NO_NUISANCE).fit
+    levels = np.array(chains.SWEEP)
+    chi2 = 0.0
+    for one in given:
+        stiffness = []
+        for test in one.tests:
+            driven = chains.AXES[test.case.test][1]
+            mean = test.cycles[..., 3:].mean(axis=0)
+            angles = mean[:, :, driven - 3]
+            design = np.repeat(levels, angles.shape[1])[:, None]
+            compliance = np.linalg.lstsq(design, angles.ravel())[0][0]
+            stiffness.append(1.0 / compliance)
+            mean[:, :, driven - 3] -= compliance * levels[:, None]
+            chi2 += 3.0 * np.sum(mean**2) / SD**2
+        values = fit.models[one.specimen].effects[0].values
+        np.testing.assert_allclose(values[:, 3:], np.tile(stiffness, (6, 1)), rtol=1e-6)
+    assert fit.chi2 == pytest.approx(chi2, rel=1e-6)
+    assert fit.status == ""
+
+
+def shown(screen: Screen) -> dict[str, float]:
+    return {one.effect: one.log_evidence for one in screen.effects}
+
+
+EFFECTS = (
+    "neutral_zone", "flexion_extension_asymmetry", "level_dependence", "load_offset", "marker_bias"
+)  # fmt: skip
+
+
+def stiffer_one_way(joint: int, moments: Array, k: float) -> Array:
+    return moments / np.where(moments > 0.0, k, 1.15 * k)
+
+
+def test_the_screen_favours_no_effect_and_no_specimen_by_its_place() -> None:
+    given = readings(6, stiffer_one_way)
+    names = [one.specimen for one in given]
+    tried = trials(EFFECTS, ROTATIONS, names, 6)
+    one_way = look(grounds_of(given, NO_NUISANCE), tried, 50, 0.01, 0)
+    other_way = look(
+        grounds_of(given[::-1], NO_NUISANCE),
+        trials(EFFECTS, ROTATIONS, names[::-1], 6)[::-1],
+        50,
+        0.01,
+        0,
+    )
+    assert shown(one_way)["flexion_extension_asymmetry"] > 3.0
+    assert [e.effect for e in one_way.effects] == [e.effect for e in other_way.effects]
+    for name, found in shown(one_way).items():
+        assert shown(other_way)[name] == pytest.approx(found, rel=1e-4, abs=1e-3)
+
+
+def test_the_screen_favours_no_joint_by_its_place() -> None:
+    """The laxity of one joint is as evident at whichever joint it is (upright, weightless)."""
+    found = []
+    for place in (0, 2, 5):
+
+        def lax(joint: int, moments: Array, k: float, place: int = place) -> Array:
+            return moments / (0.8 * k if joint == place else k)
+
+        given = readings(7, lax, specimens=("a", "b"), sd=0.0)
+        tried = trials(["local_laxity"], ROTATIONS, ["a", "b"], 6)
+        (best,) = look(grounds_of(given, NO_NUISANCE), tried, 10, 0.01, 0).effects
+        of_place = [t.log_evidence for t in best.forms if t.form.joint == place]
+        assert best.forms[0].form.joint == place
+        found.append([best.log_evidence, *of_place])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+    np.testing.assert_allclose(found[2], found[0], rtol=1e-6)
+
+
+def test_the_threshold_is_exceeded_by_fresh_draws_as_seldom_as_asked() -> None:
+    """Largest evidence of several effects: 300 draws set the threshold, 4000 others judge it."""
+    given = readings(8)
+    grounds = grounds_of(given, NuisancePriors())
+    tried = trials(EFFECTS, ROTATIONS, [one.specimen for one in given], 6)
+    fresh = look(grounds, tried, 4000, 0.01, 99)
+    largest = np.max(np.stack([one.null for one in fresh.effects]), axis=0)
+    for draws, asked in ((300, 0.01), (300, 0.05), (1000, 0.01)):
+        few = look(grounds, tried, draws, asked, 3)
+        assert np.mean(largest > few.threshold) <= 2.0 * asked
+        own = np.max(np.stack([one.null for one in few.effects]), axis=0)
+        share = float(np.mean(largest > exceeded(own, asked)))
+        assert 0.3 * asked <= share <= 2.0 * asked
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.2, 1.0])
+def test_the_interval_of_a_gap_covers_as_often_as_it_says(gap: float) -> None:
+    dof, draws = 400.0, 200
+    rng = np.random.default_rng(9)
+    shares = (np.arange(draws) + rng.random(draws)) / draws
+    drawn = ncx2.ppf(shares, dof, max(gap**2 * dof, 1e-9))
+    covered = []
+    for chi2 in drawn:
+        low, high = Gap(float(chi2), dof, 400).interval
+        covered.append(low <= gap <= high)
+    assert 0.93 <= np.mean(covered) <= (0.98 if gap == 0.0 else 0.97)
+
+
+def test_figures_of_a_gap() -> None:
+    gap = Gap(500.0, 400.0, 420)
+    assert (gap.rms, gap.gap, gap.excess) == pytest.approx((np.sqrt(1.25), 0.5, 100.0))
+    assert replace(gap, chi2=300.0).gap == 0.0
+    low, high = gap.interval
+    assert ncx2.cdf(500.0, 400.0, 400.0 * low**2) == pytest.approx(0.975, abs=1e-4)
+    assert ncx2.cdf(500.0, 400.0, 400.0 * high**2) == pytest.approx(0.025, abs=1e-4)
