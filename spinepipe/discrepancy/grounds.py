@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 from spinepipe.discrepancy.hypothesis import Hypothesis, Supposed, hypothesis
 from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.discrepancy.noise import Noise
+from spinepipe.discrepancy.noise import REPEATS, Noise
+from spinepipe.discrepancy.noise_of_residuals import noise_of_residuals
 from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
 from spinepipe.discrepancy.readings import SpecimenReadings
 from spinepipe.discrepancy.tasks import Run
@@ -65,19 +66,21 @@ def laid(
 ) -> Grounds:
     """Fit the base, first with noise alone, then with nuisances where they then stand.
 
+    Where cycles of a test differ in their loads, the noise is what their residuals differ by.
+
     Raises
     ------
     NoBase
         When the base has no fit.
     """
     by_name = {one.specimen: one for one in readings}
-    plain = {name: whitening(one.tests, noise) for name, one in by_name.items()}
     tests = tuple(dict.fromkeys(case.test for one in readings for case in one.cases))
-    setting = Setting(by_name, plain, noise.zeroed)
+    plain = _plain(by_name, noise)
     models = hypothesis(start.models, start.base, (), tests, start.bound)
-    first = run(joint_fit, models, setting)
-    if not first.usable:
-        raise NoBase(first.status)
+    first = _base_fit(models, Setting(by_name, plain, noise.zeroed), run)
+    if noise.source != REPEATS:
+        by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
+        plain = _plain(by_name, noise)
     whitenings = {
         name: with_nuisances(
             plain[name], nuisance_signatures(first.models[name], one.cases, noise.zeroed, priors)
@@ -86,8 +89,17 @@ def laid(
     }
     setting = Setting(by_name, whitenings, noise.zeroed)
     again = hypothesis(first.models, start.base, (), tests, start.bound)
-    second = run(joint_fit, again, setting)
-    if not second.usable:
-        raise NoBase(second.status)
+    second = _base_fit(again, setting, run)
     start = replace(start, models=second.models)
     return Grounds(by_name, noise, priors, start, tests, plain, setting, second)
+
+
+def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
+    return {name: whitening(one.tests, noise) for name, one in readings.items()}
+
+
+def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
+    fit = run(joint_fit, models, setting)
+    if not fit.usable:
+        raise NoBase(fit.status)
+    return fit

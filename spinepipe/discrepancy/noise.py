@@ -22,6 +22,9 @@ CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
 FEWEST = 30
 """Independent differences between cycles from which an SD is taken for known."""
 
+REPEATS, DECLARED = "repeats", "declared"
+"""Where the noise is known from."""
+
 DECLARED_DOUBT = 1.2
 """Without repeats readings count as this much noisier than declared: a doubt kept on purpose."""
 
@@ -103,11 +106,11 @@ def estimated_noise(
     read = np.array([_is_read(specimens, k) for k in range(6)])
     if np.all(counts[read] >= FEWEST):
         sd, correlation = _most_likely(contrasts, zeroed)
-        return Noise(np.where(read, sd, np.nan), correlation, "repeats", counts, outliers, zeroed)
+        return Noise(np.where(read, sd, np.nan), correlation, REPEATS, counts, outliers, zeroed)
     if declared is None:
         return None
     sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
-    return Noise(sd, 0.0, "declared", counts, outliers, zeroed)
+    return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed)
 
 
 def _is_read(specimens: Sequence[SpecimenReadings], coordinate: int) -> bool:

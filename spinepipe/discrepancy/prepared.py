@@ -5,7 +5,7 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.base import base_model, base_parameters
 from spinepipe.discrepancy.forms import trials
-from spinepipe.discrepancy.grounds import Grounds, NoBase, Start, laid
+from spinepipe.discrepancy.grounds import Grounds, Start, laid
 from spinepipe.discrepancy.noise import Noise, estimated_noise, without_outliers
 from spinepipe.discrepancy.nuisance import NuisancePriors, as_si
 from spinepipe.discrepancy.readings import SpecimenReadings, specimen_readings
@@ -17,6 +17,9 @@ from spinepipe.studies import Discrepancy
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
 
 PER_SPECIMEN = "per_specimen"
+
+GUESSED_SD = np.array([1e-3] * 3 + [np.deg2rad(1.0)] * 3)
+"""For the first fit of a cohort that declares no SD and whose cycles differ in their loads."""
 
 
 def prepared(
@@ -86,8 +89,9 @@ def _noise(
     """Readings without outliers, and their noise."""
     kept, outliers = without_outliers(readings)
     noise = estimated_noise(kept, declared_sd(study, cohort), cohort.zeroed_at_step_0, outliers)
-    if noise is None:
-        raise NoBase("too few repeats to tell the noise, and no measurement_sd")
+    if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
+        noise = estimated_noise(kept, GUESSED_SD, cohort.zeroed_at_step_0, outliers)
+    assert noise is not None
     return kept, noise
 
 

@@ -162,9 +162,7 @@ def _look(grounds: Grounds, rules: Rules, run: Run, log: _Log) -> Screen:
     return run(look, grounds, rules.trials, *draws, threshold)
 
 
-def _forward(
-    current: Grounds, rules: Rules, run: Run, log: _Log, limits: _Limits
-) -> Grounds:
+def _forward(current: Grounds, rules: Rules, run: Run, log: _Log, limits: _Limits) -> Grounds:
     """Let effects enter; the grounds that are left."""
     while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
         screen = _look(current, rules, run, log)
