@@ -9,6 +9,7 @@ from spinepipe.discrepancy.fold_linear import LinearFolds, Placed
 from spinepipe.discrepancy.fold_refit import refitted
 from spinepipe.discrepancy.folds import TEST, Fold, Part
 from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.nuisance_size import nuisance_size
 from spinepipe.discrepancy.prediction import NoEquilibrium
 from spinepipe.discrepancy.surrogate import surrogate
 from spinepipe.discrepancy.tangent import tangent
@@ -46,13 +47,14 @@ class FoldModels:
         self.refit, self.run = refit, run
         self.named = bool(final.fit.hypothesis.supposed)
         self.chosen = Chosen(base.readings, base.noise)
-        self.base = LinearFolds(tangent(base), self.chosen)
-        self.final = LinearFolds(tangent(final), self.chosen) if self.named else self.base
-        self.surrogate, self.why_none = self._surrogate()
+        size = nuisance_size(final)
+        self.base = LinearFolds(tangent(base, size), self.chosen)
+        self.final = LinearFolds(tangent(final, size), self.chosen) if self.named else self.base
+        self.surrogate, self.why_none = self._surrogate(size)
 
-    def _surrogate(self) -> tuple[LinearFolds | None, str]:
+    def _surrogate(self, size: float) -> tuple[LinearFolds | None, str]:
         try:
-            return LinearFolds(surrogate(self.grounds[0]), self.chosen), ""
+            return LinearFolds(surrogate(self.grounds[0], size), self.chosen), ""
         except NoEquilibrium as trouble:
             return None, f"no surrogate: {trouble}"
 

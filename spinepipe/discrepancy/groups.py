@@ -24,7 +24,6 @@ class Summed:
     Attributes
     ----------
     strengths : (k,) column of the effect's values that each strength is of.
-    raw : (k,) squared norms of the signatures in noise SDs, before anything was taken out.
     """
 
     form: Form
@@ -32,7 +31,6 @@ class Summed:
     strengths: tuple[int, ...]
     gram: Array
     moments: Array
-    raw: Array
     group: Group
 
 
@@ -106,7 +104,7 @@ def summed(
     places, strengths = index.places(form, sds, specimens, tests)
     count = len(strengths)
     draws = problem.moments_shared.shape[1]
-    gram, moments, raw = np.zeros((count, count)), np.zeros((count, draws)), np.zeros(count)
+    gram, moments = np.zeros((count, count)), np.zeros((count, draws))
     coupled = np.zeros((count, len(problem.gram_shared)))
     for specimen, columns, owners in places:
         onto = np.zeros((count, len(columns)))
@@ -115,10 +113,9 @@ def summed(
         gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
         moments += onto @ part.moments[columns]
         coupled += onto @ part.shared[columns]
-        raw += onto @ part.raw[columns]
     if coupled.shape[1]:
         gain = coupled @ np.linalg.pinv(problem.gram_shared, rcond=1e-10, hermitian=True)
         gram = gram - gain @ coupled.T
         moments = moments - gain @ problem.moments_shared
     signs = index.signs(form, places, count)
-    return Summed(form, sds, strengths, gram, moments, raw, Group.of(gram, signs))
+    return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))

@@ -88,10 +88,10 @@ class HeldOut:
 
 
 def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
-    """(chi2 of base - chi2 of new) / (chi2 of base - readings), at most 1.
+    """(chi2 of base - chi2 of new) / (chi2 of base - expected), at most 1.
 
     None where noise, or nuisances that the training left open, may be all that the base misses.
     """
     if base is None or new is None or base.interval[0] <= 0.0 or base.chi2 <= expected:
         return None
-    return min((base.chi2 - new.chi2) / base.excess, 1.0)
+    return min((base.chi2 - new.chi2) / (base.chi2 - expected), 1.0)

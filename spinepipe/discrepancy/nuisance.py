@@ -20,15 +20,24 @@ from spinepipe.units import ROTATIONS
 
 @dataclass(frozen=True)
 class NuisancePriors:
-    """One prior SD of each imperfection, SI; zero leaves it out."""
+    """One prior SD of each imperfection, SI; zero leaves it out.
+
+    ``posture`` tilts laws and reported frames of a joint together, as a neutral pose that was told
+    wrongly does; ``law_axes`` and ``registration`` tilt them apart.
+    """
 
     joint_centre: float = 2e-3
-    law_axes: float = float(np.deg2rad(2.0))
+    posture: float = float(np.deg2rad(2.0))
+    law_axes: float = float(np.deg2rad(1.0))
     registration: float = float(np.deg2rad(1.0))
     load_axis: float = float(np.deg2rad(1.0))
     load_gain: float = 0.02
     off_diagonal: float = 1.0
     rotation_order: float = 0.5
+
+
+POSTURE = (Variant("axes_tilt", ()), Variant("marker_bias", (("form", "tilt"),)))
+"""What a wrongly told neutral pose tilts by the same angles."""
 
 
 def nuisance_columns(priors: NuisancePriors, joints: int, tests: Sequence[str]) -> list[Column]:
@@ -70,14 +79,26 @@ def nuisance_signatures(
     model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, priors: NuisancePriors
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
+    solved = Solved(model, cases, zeroed)
     columns = nuisance_columns(priors, model.n_joints, [case.test for case in cases])
-    return signatures(Solved(model, cases, zeroed), columns)
+    single = signatures(solved, columns)
+    if not priors.posture:
+        return single
+    together = [
+        signatures(solved, _columns(variant, priors.posture, model.n_joints, (EVERY_TEST,)))
+        for variant in POSTURE
+    ]
+    return tuple(
+        np.concatenate([one, np.sum(tilts, axis=0)], axis=-1)
+        for one, *tilts in zip(single, *together, strict=True)
+    )
 
 
 def as_si(settings: Mapping[str, float]) -> NuisancePriors:
     """Priors from a study's settings (mm, deg)."""
     return NuisancePriors(
         joint_centre=settings["joint_centre_mm"] / 1000.0,
+        posture=float(np.deg2rad(settings["posture_deg"])),
         law_axes=float(np.deg2rad(settings["law_axes_deg"])),
         registration=float(np.deg2rad(settings["registration_deg"])),
         load_axis=float(np.deg2rad(settings["load_axis_deg"])),

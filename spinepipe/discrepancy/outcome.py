@@ -13,7 +13,7 @@ UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""
 
 GAP_LEFT = 0.5
-"""Share of the base's excess chi2 that named effects may leave, if it is above the noise."""
+"""Share of the discrepancy that named effects may leave, if that is above the noise."""
 
 ALONE = 0.25
 """Share of its evidence that an effect must have without the others.
@@ -120,7 +120,7 @@ def _unexplained(found: Found) -> str:
         alone = _listed(list(dict.fromkeys(props)), "and")
         return f"{names} imitate it together, but by itself nothing speaks for {alone}"
     excess = found.final_gap.excess
-    if found.final_gap.interval[0] > 0.0 and excess > GAP_LEFT * found.base_gap.excess:
+    if found.final_gap.interval[0] > 0.0 and excess > GAP_LEFT * (gain + excess):
         return "most of the discrepancy stays whatever known effect is added"
     return ""
 

@@ -22,9 +22,11 @@ from spinepipe.discrepancy.rounds import look
 from spinepipe.discrepancy.screen import Screen, exceeded
 from spinepipe.discrepancy.tasks import Run
 
-HOPELESS_SHARE, GENERIC_TIMES = 0.25, 2.0
-"""The first effect closes less of the base's excess chi2, and the generic basis that much more:
-no known effect is what is missing, and adding them up would only imitate it."""
+HOPELESS = (4.0, 2.5, 1.5)
+"""Times the evidence of the first, second and further effect that the generic basis may have.
+
+With more, no known effect is what is missing, and adding them up would only imitate it.
+"""
 
 REAL_SHARE = 0.03
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
@@ -111,37 +113,21 @@ class _Log:
     stages: list[Stage] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """Excess chi2 of the base, and the drop of chi2 by the generic basis there."""
-
-    excess: float
-    generic: float
-
-    def admit(self, one: Refit, first: bool) -> bool:
-        """Whether a refit closes enough to enter."""
-        if not first:
-            return one.gain >= REAL_SHARE * self.excess
-        hopeless = one.gain < HOPELESS_SHARE * self.excess
-        return not (hopeless and self.generic > GENERIC_TIMES * one.gain)
-
-
 def search(base: Grounds, rules: Rules, run: Run) -> Found:
     """Effects that the base lacks."""
     log = _Log()
     base_gap = whole_gap(base, base.fit)
-    lack_of_base = run(lack_of_fit, base, rules.coordinates, rules.draws, rules.seed)
-    limits = _Limits(base_gap.excess, lack_of_base.explained)
-    current = _forward(base, rules, run, log, limits)
+    lack_of_base = _lack(base, rules, run)
+    current = _forward(base, rules, run, log, base_gap)
     standing_now: tuple[Standing, ...] = ()
     for _ in range(MOST_SWAPS):
         current, standing_now, changed = _examined(base, current, rules, run, log)
         if not changed:
             break
-        current = _forward(current, rules, run, log, limits)
+        current = _forward(current, rules, run, log, base_gap)
     lack = lack_of_base
     if standing_now:
-        lack = run(lack_of_fit, current, rules.coordinates, rules.draws, rules.seed)
+        lack = _lack(current, rules, run)
     return Found(
         base,
         current,
@@ -162,7 +148,11 @@ def _look(grounds: Grounds, rules: Rules, run: Run, log: _Log) -> Screen:
     return run(look, grounds, rules.trials, *draws, threshold)
 
 
-def _forward(current: Grounds, rules: Rules, run: Run, log: _Log, limits: _Limits) -> Grounds:
+def _lack(grounds: Grounds, rules: Rules, run: Run) -> LackOfFit:
+    return run(lack_of_fit, grounds, rules.coordinates, rules.draws, rules.seed)
+
+
+def _forward(current: Grounds, rules: Rules, run: Run, log: _Log, base_gap: Gap) -> Grounds:
     """Let effects enter; the grounds that are left."""
     while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
         screen = _look(current, rules, run, log)
@@ -172,15 +162,15 @@ def _forward(current: Grounds, rules: Rules, run: Run, log: _Log, limits: _Limit
             break
         tried = refits(current, screen, rules.trials, run)
         log.stages.append(Stage(name, screen, tried))
-        best = _admitted(current, tried, screen, rules, limits)
-        if best is None:
+        best = _admitted(current, tried, screen, rules, base_gap)
+        if best is None or _hopeless(best, number, _lack(current, rules, run)):
             break
         current = current.at(best.fit)
     return current
 
 
 def _admitted(
-    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, limits: _Limits
+    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, base_gap: Gap
 ) -> Refit | None:
     """The best refit, if it may enter."""
     supposed = current.fit.hypothesis.supposed
@@ -188,10 +178,16 @@ def _admitted(
     for one in tried:
         if not one.log_evidence > screen.threshold:
             return None
-        known = one.name in names or len(names) < rules.most_effects
-        if known and limits.admit(one, first=not supposed):
+        enough = not supposed or one.gain >= REAL_SHARE * base_gap.excess
+        if enough and (one.name in names or len(names) < rules.most_effects):
             return one
     return None
+
+
+def _hopeless(best: Refit, number: int, lack: LackOfFit) -> bool:
+    """Whether the generic basis has so much more evidence that no known effect is the one."""
+    times = HOPELESS[min(number, len(HOPELESS) - 1)]
+    return lack.log_evidence > times * best.log_evidence
 
 
 def _examined(

@@ -10,7 +10,7 @@ from spinepipe.discrepancy.tangent import LinearModel, tangent
 from spinepipe.units import COORDINATES
 
 
-def surrogate(grounds: Grounds) -> LinearModel:
+def surrogate(grounds: Grounds, nuisance_size: float) -> LinearModel:
     """The base to first order, with generic terms that are the same in all specimens.
 
     A term's strength is that of all joints together plus a part of each joint's own, both with
@@ -21,7 +21,7 @@ def surrogate(grounds: Grounds) -> LinearModel:
     NoEquilibrium
         When a load step has no stable pose.
     """
-    base = tangent(grounds)
+    base = tangent(grounds, nuisance_size)
     known = len(base.mean)
     read = np.any([used.any(axis=(0, 1)) for w in grounds.plain.values() for used in w.used], 0)
     coordinates = [name for name, there in zip(COORDINATES, read, strict=True) if there]

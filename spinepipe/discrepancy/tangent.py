@@ -39,19 +39,19 @@ class LinearModel:
     high: Array
 
 
-def tangent(grounds: Grounds) -> LinearModel:
-    """The grounds' fit to first order."""
+def tangent(grounds: Grounds, nuisance_size: float) -> LinearModel:
+    """The grounds' fit to first order; nuisances of that many prior SDs."""
     fit = grounds.fit
     unknowns: tuple[Unknown, ...] = fit.hypothesis.unknowns
     members = {}
     for name, member in fit.hypothesis.members.items():
         plain, full = grounds.plain[name], grounds.setting.whitenings[name]
-        sizes = np.sqrt(np.maximum((1.0 + full.shrink) ** -2.0 - 1.0, 0.0))
+        sizes = full.sizes
         members[name] = Tangent(
             fit.predicted[name],
             in_readings(plain, lengthened(full, fit.jacobians[name])),
             np.array(member.numbers, dtype=np.int64),
-            in_readings(plain, full.directions * sizes),
+            in_readings(plain, full.directions * (nuisance_size * sizes)),
         )
     return LinearModel(
         members,

@@ -58,6 +58,11 @@ class Whitening:
         result: Array = white + self.directions @ (shrink * inside)
         return result
 
+    @property
+    def sizes(self) -> Array:
+        """(k,) how far one prior SD of the nuisances moves each direction, in noise SD."""
+        return np.sqrt(np.maximum((1.0 + self.shrink) ** -2.0 - 1.0, 0.0))
+
     def left_over(self, white: Array) -> Array:
         """(N,) of noise-whitened residuals (N,) with nuisances at their most likely values."""
         result: Array = self.shortened(self.shortened(white))

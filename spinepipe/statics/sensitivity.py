@@ -72,7 +72,9 @@ def _advance(
     if not step.advances:
         return {}
     placed = system.placed(step.equilibrium.q, with_parameters=True)
-    joints_by_x = np.einsum("jab,jbm->jam", placed.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free)))
+    joints_by_x = np.einsum(
+        "jab,jbm->jam", placed.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free))
+    )
     joints_by_x += _placement_by_x(system, placed.by_parameter, free)
     carried_by_x = _carried(system, step, free, placed.q, joints_by_x, state_by_x)
     following = {}

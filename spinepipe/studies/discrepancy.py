@@ -57,8 +57,15 @@ class Nuisance(BaseModel):
     joint_centre_mm: float = Field(
         default=2.0, ge=0, le=50, description="joint centre per axis, mm"
     )
+    posture_deg: float = Field(
+        default=2.0,
+        ge=0,
+        le=45,
+        description="neutral orientation of a joint about each axis, deg: laws and reported motion "
+        "alike",
+    )
     law_axes_deg: float = Field(
-        default=2.0, ge=0, le=45, description="axes in which a joint's laws act, deg"
+        default=1.0, ge=0, le=45, description="axes in which a joint's laws act, by themselves, deg"
     )
     registration_deg: float = Field(
         default=1.0, ge=0, le=45, description="frame in which motion is reported, deg"

@@ -16,7 +16,7 @@ STEPS = len(MOMENTS_NM)
 def test_the_tangent_is_the_slope_of_re_solved_motion() -> None:
     readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=True)
     final = found(grounds(readings, NuisancePriors()), True).final
-    near = tangent(final).members["b"]
+    near = tangent(final, 1.0).members["b"]
     member, size = final.fit.hypothesis.members["b"], 1e-5
     x = final.fit.x[list(member.numbers)]
     for number in range(len(x)):
@@ -35,7 +35,7 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
     priors = NuisancePriors()
     base = grounds(readings, priors)
     columns = np.concatenate(
-        [one[..., 3:, :].reshape(-1, one.shape[-1]) for one in tangent(base).members["a"].nuisances]
+        [one[..., 3:, :].reshape(-1, one.shape[-1]) for one in tangent(base, 1.0).members["a"].nuisances]
     )
     moved_by = nuisance_signatures(base.fit.models["a"], readings[0].cases, False, priors)
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])

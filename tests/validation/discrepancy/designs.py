@@ -18,12 +18,12 @@ def plain(seed: int, **given: Any) -> Recipe:
     """A recipe without any effect, in a drawn design; given fields are kept."""
     rng = np.random.default_rng([seed, STREAM])
     drawn: dict[str, Any] = {
-        "unloading": bool(rng.random() < 0.5),
+        "unloading": bool(rng.random() < 0.35),
         "translations": bool(rng.random() < 0.25),
         "zeroed": bool(rng.random() < 0.25),
-        "preload_n": PRELOAD_N if rng.random() < 0.2 else 0.0,
+        "preload_n": PRELOAD_N if rng.random() < 0.15 else 0.0,
         "noise": str(rng.choice(["white", "serial", "outliers"], p=[0.6, 0.2, 0.2])),
-        "design": "directions" if rng.random() < 0.2 else "sweeps",
+        "design": "directions" if rng.random() < 0.1 else "sweeps",
     }
     drawn |= given
     if drawn["design"] == "directions":
