@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.discrepancy.data_errors import before_a_fit, suspected_errors
-from spinepipe.discrepancy.grounds import Grounds, NoBase
-from spinepipe.discrepancy.held_out import Asked, held_out
+from spinepipe.discrepancy.data_errors import before_a_fit
+from spinepipe.discrepancy.grounds import NoBase
+from spinepipe.discrepancy.investigation import Investigation, investigate
 from spinepipe.discrepancy.model_files import model_file
-from spinepipe.discrepancy.outcome import outcome
-from spinepipe.discrepancy.prepared import declared_sd, measured, prepared
-from spinepipe.discrepancy.search import Found, Rules, search
+from spinepipe.discrepancy.prepared import GUESSED_SD, declared_sd, measured
 from spinepipe.discrepancy.told_apart import told_apart
 from spinepipe.discrepancy.where import places, residual_frame
 from spinepipe.files import appearing
@@ -83,51 +81,41 @@ class _Results:
     def __init__(self, study: Discrepancy, cohort: Cohort, root: str, folder: Path) -> None:
         self.study, self.cohort = study, cohort
         store = Store(folder, f"spinepipe.jobs.{JOB}")
-        self.readings = measured(study, cohort)
-        self.grounds, self.rules = self._prepared(root, store)
-        self.found: Found = search(self.grounds, self.rules, store)
-        self.errors = suspected_errors(self.grounds, self.readings, store)
-        asked = Asked(study.held_out.tests, study.held_out.specimens)
-        self.proof = held_out(self.found, asked, store)
-        needed = self.found.stages[0].screen.threshold + study.margin
+        self.ended = self._investigated(root, store)
+        grounds, trials = self.ended.grounds, self.ended.rules.trials
+        needed = self.ended.found.stages[0].screen.threshold + study.margin
         declared = declared_sd(study, cohort)
-        trials, seed = self.rules.trials, study.seed
-        self.told = told_apart(self.grounds, trials, needed, declared, seed, store)
+        self.told = told_apart(grounds, trials, needed, declared, study.seed, store)
 
-    def _prepared(self, root: str, store: Store) -> tuple[Grounds, Rules]:
+    def _investigated(self, root: str, store: Store) -> Investigation:
         study, cohort = self.study, self.cohort
         try:
-            return prepared(study, cohort, _base_file(root, study), store)
+            return investigate(study, cohort, _base_file(root, study), store)
         except NoBase as trouble:
             sd = declared_sd(study, cohort)
-            zeroed = cohort.zeroed_at_step_0
-            errors = (
-                [] if sd is None
-                else before_a_fit(self.readings, cohort.joint_names, sd, zeroed=zeroed)
-            )  # fmt: skip
+            sd = GUESSED_SD if sd is None else sd
+            readings, zeroed = measured(study, cohort), cohort.zeroed_at_step_0
+            errors = before_a_fit(readings, cohort.joint_names, sd, zeroed=zeroed)
             seen = "; ".join(f"{e.what} ({e.where}): {e.evidence}" for e in errors)
             raise NoBase(f"{trouble}. {seen}".strip()) from None
 
     def verdict(self) -> tuple[Mapping[str, Any], Mapping[str, Sequence[Row]]]:
         """The verdict as plain data, and the rows of the tables by name."""
-        study, joints = self.study, self.cohort.joint_names
-        ended = outcome(self.found, study.margin, self.proof, self.errors)
-        final = places(residual_frame(self.grounds, self.found.final.fit, joints))
-        data = verdict_data(
-            self.cohort, self.found, ended, self.proof, self.told, final, self.errors
-        )
-        data["threshold"]["false_alarm"] = study.false_alarm
+        joints, ended, told = self.cohort.joint_names, self.ended, self.told
+        found = ended.found
+        final = places(residual_frame(ended.grounds, found.final.fit, joints))
+        data = verdict_data(self.cohort, ended, told, final, self.study.false_alarm)
         return data, {
-            GAP.name: gap_rows(self.found, joints, held_out_readings(self.proof)),
-            CANDIDATES.name: [*design_rows(self.told), *candidate_rows(self.found, joints)],
-            WHERE.name: where_rows(self.found, joints),
-            CONFUSIONS.name: confusion_rows(self.told),
-            HELD_OUT.name: held_out_rows(self.proof),
+            GAP.name: gap_rows(found, joints, held_out_readings(ended.proof)),
+            CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
+            WHERE.name: where_rows(found, joints),
+            CONFUSIONS.name: confusion_rows(told),
+            HELD_OUT.name: held_out_rows(ended.proof),
         }
 
     def models(self) -> tuple[ModelFile, ModelFile]:
         """The base and the model with effects."""
-        base, final = self.grounds.fit, self.found.final.fit
+        base, final = self.ended.grounds.fit, self.ended.found.final.fit
         count = len(next(iter(base.models.values())).effects)
         name, cohort = self.study.study, self.cohort.name
         return (

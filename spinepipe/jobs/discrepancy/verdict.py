@@ -9,10 +9,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.forms import Form
 from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.held_out import HeldOut
+from spinepipe.discrepancy.investigation import Investigation
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.outcome import Outcome, Verdict
 from spinepipe.discrepancy.search import Found, Standing
-from spinepipe.discrepancy.suspected import SuspectedError
 from spinepipe.discrepancy.told_apart import ToldApart
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.discrepancy.where import Place, worst
@@ -26,14 +26,13 @@ MOST_RIVALS = 5
 
 def verdict_data(
     cohort: Cohort,
-    found: Found,
-    ended: Outcome,
-    proof: HeldOut,
+    investigation: Investigation,
     told: ToldApart,
     places: Sequence[Place],
-    errors: Sequence[SuspectedError],
+    false_alarm: float,
 ) -> Data:
     """All keys of ``verdict.json``."""
+    found, proof, ended = investigation.found, investigation.proof, investigation.ended
     screen = found.stages[0].screen
     return {
         "cohort": cohort.name,
@@ -47,27 +46,13 @@ def verdict_data(
         "gap": {"unit": "noise sd", **_pairs(found, proof, "gap"), "held_out_closed": proof.closed},
         "smallest_detectable": [vars(one) for one in told.smallest_detectable],
         "unknown": _unknown(found, ended, places),
-        "suspected_data_errors": [vars(one) for one in errors],
+        "suspected_data_errors": [vars(one) for one in investigation.errors],
         "threshold": {
             "log_evidence": screen.threshold,
-            "false_alarm": None,
+            "false_alarm": false_alarm,
             "draws": screen.draws,
         },
         "families": [list(one) for one in told.families],
-    }
-
-
-def no_base_data(cohort: Cohort, why: str, errors: Sequence[SuspectedError]) -> Data:
-    """The verdict where the base has no fit."""
-    return {
-        "cohort": cohort.name,
-        "verdict": Verdict.UNKNOWN.value,
-        "why": f"the base model cannot be fitted: {why}",
-        "effects": [],
-        "candidates_in_set": [],
-        "not_testable": [],
-        "unknown": {"where": "everywhere", "shape": why},
-        "suspected_data_errors": [vars(one) for one in errors],
     }
 
 

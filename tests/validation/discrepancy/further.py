@@ -1,4 +1,4 @@
-"""What is asked besides the verdict: held-out motion, what the design could tell, mistakes.
+"""What is asked besides the verdict: held-out motion by kind, what the design could tell.
 
 A question that fails is a row with a message; it does not take the verdict with it.
 """
@@ -9,16 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort import Cohort
-from spinepipe.discrepancy.data_errors import suspected_errors
 from spinepipe.discrepancy.held_out import Asked, held_out
-from spinepipe.discrepancy.prepared import read_coordinates
-from spinepipe.discrepancy.readings import specimen_readings
 from spinepipe.discrepancy.search import Found, Rules
 from spinepipe.discrepancy.seen import seen_in
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.discrepancy.testable import judgements
-from spinepipe.studies import Discrepancy
 
 Told = dict[str, Any]
 
@@ -83,14 +78,3 @@ def _repeats(found: Found) -> float:
         test.count[test.count > 0] for one in found.base.readings.values() for test in one.tests
     ]
     return float(np.mean(np.concatenate(counts)))
-
-
-@_told
-def suspected_told(found: Found, cohort: Cohort, study: Discrepancy) -> Told:
-    """Mistakes that the study would point to."""
-    coordinates = read_coordinates(study, cohort)
-    measured = [
-        specimen_readings(cohort, name, cohort.tests, coordinates) for name in cohort.specimen_names
-    ]
-    errors = suspected_errors(found.base, measured, at_once)
-    return {"errors": [[one.where, one.what, one.evidence] for one in errors]}

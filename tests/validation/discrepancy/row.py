@@ -7,15 +7,15 @@ from typing import Any
 
 from spinepipe import cohort as cohorts
 from spinepipe.discrepancy.grounds import NoBase
-from spinepipe.discrepancy.outcome import Outcome, outcome
-from spinepipe.discrepancy.prepared import prepared
-from spinepipe.discrepancy.search import Found, Standing, search
+from spinepipe.discrepancy.investigation import investigate
+from spinepipe.discrepancy.outcome import Outcome
+from spinepipe.discrepancy.search import Found, Standing
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.studies import Discrepancy
 from spinepipe.studies.discrepancy import DiscrepancyBase
 from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make
-from tests.validation.discrepancy.further import held_out_told, suspected_told, testable_told
+from tests.validation.discrepancy.further import held_out_told, testable_told
 
 STUDY = Discrepancy(
     study="hidden",
@@ -61,17 +61,16 @@ def _truth(truth: Truth) -> Row:
 def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
     """What the search says, then what is asked besides."""
     started, cpu = time.perf_counter(), time.process_time()
-    grounds, rules = prepared(STUDY, cohort, None, at_once)
-    found = search(grounds, rules, at_once)
-    said = outcome(found, STUDY.margin)
-    row = _said(found, said)
+    ended = investigate(STUDY, cohort, None, at_once)
+    found = ended.found
+    row = _said(found, ended.ended)
     seconds["search"] = time.perf_counter() - started
     seconds["search_cpu"] = time.process_time() - cpu
     started = time.perf_counter()
     row["held_out"] = held_out_told(found) if found.standing else None
     names = [hidden.name for hidden in truth.recipe.hidden]
-    row["testable"] = testable_told(found, rules, names)
-    row["suspected"] = suspected_told(found, cohort, STUDY) if truth.errors else None
+    row["testable"] = testable_told(found, ended.rules, names)
+    row["suspected"] = {"errors": [[e.where, e.what, e.evidence] for e in ended.errors]}
     seconds["besides"] = time.perf_counter() - started
     return row
 
