@@ -4,7 +4,7 @@ A reading's error has one SD for all readings of a coordinate and the correlatio
 between load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +14,11 @@ from scipy.linalg import helmert
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.effects.contract import Array
 
-FAR = 5.0
-"""Deviations from the median of the cycles beyond this many SDs are outliers."""
+FAR, FAR_CYCLE = 4.0, 5.0
+"""Deviations from the median of the cycles beyond this many SDs are outliers.
+
+So are whole cycles, by their mean deviation: zeroing hands an outlier of step 0 to all the others.
+"""
 
 MAD_PER_SD = 0.67449
 CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
@@ -62,12 +65,15 @@ def without_outliers(
     specimens: Sequence[SpecimenReadings],
 ) -> tuple[tuple[SpecimenReadings, ...], int]:
     """The readings without those far from what the other cycles say, and how many were dropped."""
-    spread = _typical_deviation(specimens)
+    single = _typical(_deviations(test) for one in specimens for test in one.tests)
+    whole = _typical(_mean_deviations(test) for one in specimens for test in one.tests)
     dropped, kept = 0, []
     for specimen in specimens:
         tests = []
         for test in specimen.tests:
-            far = np.abs(_deviations(test)) > FAR * spread
+            shifted = np.abs(_mean_deviations(test)) > FAR_CYCLE * whole
+            far = (np.abs(_deviations(test)) > FAR * single) | shifted[:, None]
+            far &= np.isfinite(test.cycles)
             dropped += int(far.sum())
             tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
         kept.append(replace(specimen, tests=tuple(tests)))
@@ -81,10 +87,18 @@ def _deviations(test: Repeats) -> Array:
     return np.where(enough, cycles - np.nanmedian(cycles, axis=0), np.nan)
 
 
-def _typical_deviation(specimens: Sequence[SpecimenReadings]) -> Array:
-    """(6,) robust SD of the deviations from the median of the cycles."""
-    found = [_deviations(test).reshape(-1, 6) for one in specimens for test in one.tests]
-    stacked = np.concatenate([np.zeros((0, 6)), *found])
+def _mean_deviations(test: Repeats) -> Array:
+    """(C, J, 6) mean over the steps of the deviations, less the median of the cycles."""
+    deviations = _deviations(test)
+    count = np.isfinite(deviations).sum(axis=1)
+    mean = np.nansum(deviations, axis=1) / np.maximum(count, 1)
+    result: Array = np.where(count > 0, mean - np.median(mean, axis=0), np.nan)
+    return result
+
+
+def _typical(deviations: Iterable[Array]) -> Array:
+    """(6,) robust SD of deviations (..., 6) from the median of the cycles."""
+    stacked = np.concatenate([np.zeros((0, 6)), *(one.reshape(-1, 6) for one in deviations)])
     sizes = np.full(6, np.inf)
     for coordinate in range(6):
         values = stacked[np.isfinite(stacked[:, coordinate]), coordinate]

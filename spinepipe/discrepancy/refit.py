@@ -20,8 +20,8 @@ from spinepipe.effects.contract import Array
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
 
-MOST_EFFECTS, MOST_FORMS = 4, 2
-"""Effects that lead the screen, and forms of each, that are refitted; of the first one more."""
+MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 2, 2)
+"""Effects that lead the screen, and forms of each, that are refitted."""
 
 SCREEN_SHARE, SCREEN_MARGIN = 0.6, 6.0
 """The screen is linear: an effect may trail the leader by this share of its evidence and more."""
@@ -84,7 +84,7 @@ def leading(screen: Screen) -> Iterator[Tried]:
     least = _least(screen.effects[0].log_evidence)
     for place, one in enumerate(screen.effects[:MOST_EFFECTS]):
         if one.log_evidence > least:
-            yield from _forms(one, MOST_FORMS if place else MOST_FORMS + 1)
+            yield from _forms(one, MOST_FORMS[place])
 
 
 def _forms(one: Screened, most: int) -> list[Tried]:

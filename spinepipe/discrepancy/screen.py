@@ -15,8 +15,8 @@ from spinepipe.discrepancy.groups import Index, Summed, summed
 from spinepipe.discrepancy.projected import Linearised
 from spinepipe.effects.contract import Array
 
-LEAST_THRESHOLD = 3.0
-"""Evidence below this is weak whatever the null's draws say (a factor of 20)."""
+LEAST_THRESHOLD = 5.0
+"""Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 from tests.generators.hidden import ERRORS, KNOWN, LOAD_UNIT, UNKNOWN, USUAL, Recipe
 from tests.validation.discrepancy.designs import plain, soiled, suited, with_effects
 
-FIRST_SEED = 1000
+FIRST_SEED = 5000
+"""Seeds below were looked at while the search was made."""
 """Thresholds were tuned on seeds below."""
 
 GAPS = (0.1, 0.2, 0.5, 1.0)
