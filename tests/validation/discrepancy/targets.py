@@ -11,7 +11,6 @@ from tests.validation.discrepancy.designs import plain, soiled, suited, with_eff
 
 FIRST_SEED = 5000
 """Seeds below were looked at while the search was made."""
-"""Thresholds were tuned on seeds below."""
 
 GAPS = (0.1, 0.2, 0.5, 1.0)
 REPEATS = 8
