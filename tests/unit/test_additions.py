@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from testable_cases import case_of
 
-from spinepipe.discrepancy.additions import MENU
-from spinepipe.discrepancy.load_changes import comes_back
-from spinepipe.discrepancy.plans import Plan, Planned, as_made, thinned
+from spinepipe.discrepancy.design.additions import MENU
+from spinepipe.discrepancy.design.load_changes import comes_back
+from spinepipe.discrepancy.design.plans import Plan, Planned, as_made, thinned
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.model import LoadCase
 

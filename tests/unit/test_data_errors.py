@@ -11,12 +11,12 @@ from spring_chain_cases import JOINTS, SD, THERE_AND_BACK, Array, Yield, changed
 
 from spinepipe.cohort import read
 from spinepipe.discrepancy.base import base_model, base_parameters
-from spinepipe.discrepancy.data_errors import before_a_fit, suspected_errors
 from spinepipe.discrepancy.grounds import Grounds, Start, laid
+from spinepipe.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.nuisance import NuisancePriors
 from spinepipe.discrepancy.readings import SpecimenReadings, specimen_readings
-from spinepipe.discrepancy.suspected import SuspectedError
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.model import LoadStep
 from spinepipe.units import ROTATIONS

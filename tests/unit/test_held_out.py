@@ -17,9 +17,9 @@ from held_out_cases import (
 )
 
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.held_out import Asked, held_out, together
-from spinepipe.discrepancy.held_out_rows import NO_FIT, NOT_DETERMINED, SCORED, FoldRow
 from spinepipe.discrepancy.nuisance import NuisancePriors
+from spinepipe.discrepancy.proof.held_out import Asked, held_out, together
+from spinepipe.discrepancy.proof.held_out_rows import NO_FIT, NOT_DETERMINED, SCORED, FoldRow
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from held_out_cases import cases, noise, noisy, serial
 
-from spinepipe.discrepancy.chosen import Chosen
-from spinepipe.discrepancy.fold_linear import LinearFolds
-from spinepipe.discrepancy.folds import Part, folds_by_specimen, folds_by_test, step_fold
+from spinepipe.discrepancy.proof.chosen import Chosen
+from spinepipe.discrepancy.proof.fold_linear import LinearFolds
+from spinepipe.discrepancy.proof.folds import Part, folds_by_specimen, folds_by_test, step_fold
+from spinepipe.discrepancy.proof.tangent import LinearModel, Tangent
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.tangent import LinearModel, Tangent
 from spinepipe.effects.contract import Array
 
 TESTS = ("flexion", "bending")

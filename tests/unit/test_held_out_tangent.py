@@ -6,8 +6,8 @@ from held_out_cases import JOINTS, MOMENTS_NM, SD, found, grounds, read
 
 from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
 from spinepipe.discrepancy.prediction import Simulated
-from spinepipe.discrepancy.surrogate import surrogate
-from spinepipe.discrepancy.tangent import tangent
+from spinepipe.discrepancy.proof.surrogate import surrogate
+from spinepipe.discrepancy.proof.tangent import tangent
 from spinepipe.statics import moved
 
 STEPS = len(MOMENTS_NM)
@@ -35,7 +35,10 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
     priors = NuisancePriors()
     base = grounds(readings, priors)
     columns = np.concatenate(
-        [one[..., 3:, :].reshape(-1, one.shape[-1]) for one in tangent(base, 1.0).members["a"].nuisances]
+        [
+            one[..., 3:, :].reshape(-1, one.shape[-1])
+            for one in tangent(base, 1.0).members["a"].nuisances
+        ]
     )
     moved_by = nuisance_signatures(base.fit.models["a"], readings[0].cases, False, priors)
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])

@@ -16,15 +16,15 @@ from testable_cases import (
     tried_in,
 )
 
-from spinepipe.discrepancy import extra_tests
-from spinepipe.discrepancy.additions import MENU
-from spinepipe.discrepancy.confusions import Confusion, confusions, families
+from spinepipe.discrepancy.design import extra_tests
+from spinepipe.discrepancy.design.additions import MENU
+from spinepipe.discrepancy.design.confusions import Confusion, confusions, families
+from spinepipe.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.discrepancy.design.testable import Detectable, judgements
+from spinepipe.discrepancy.design.told_apart import told_apart
 from spinepipe.discrepancy.evidence import SIZES
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.seen import Design, candidates, seen_in
 from spinepipe.discrepancy.tasks import at_once
-from spinepipe.discrepancy.testable import Detectable, judgements
-from spinepipe.discrepancy.told_apart import told_apart
 from spinepipe.effects import Spread
 
 ASYMMETRY = only("flexion_extension_asymmetry", coordinate="extension")

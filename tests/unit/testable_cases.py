@@ -4,16 +4,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from spinepipe.discrepancy.base import BUSHING, DAMPING, base_parameters
-from spinepipe.discrepancy.extra_tests import bench, not_testable
+from spinepipe.discrepancy.design.extra_tests import bench, not_testable
+from spinepipe.discrepancy.design.seen import seen_in
+from spinepipe.discrepancy.design.testable import Judgement, judgements
 from spinepipe.discrepancy.forms import Form, Trials, Variant, trials
 from spinepipe.discrepancy.grounds import Grounds, Start, laid
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.nuisance import NuisancePriors
 from spinepipe.discrepancy.prediction import Simulated
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.seen import seen_in
 from spinepipe.discrepancy.tasks import at_once
-from spinepipe.discrepancy.testable import Judgement, judgements
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel

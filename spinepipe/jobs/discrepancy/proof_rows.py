@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from spinepipe.discrepancy.design.told_apart import ToldApart
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.held_out import FoldRow, HeldOut
-from spinepipe.discrepancy.told_apart import ToldApart
+from spinepipe.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.discrepancy.verdict import against_expected
 from spinepipe.statics import Status

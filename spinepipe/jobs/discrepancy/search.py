@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.discrepancy.data_errors import before_a_fit
+from spinepipe.discrepancy.design.told_apart import told_apart
 from spinepipe.discrepancy.grounds import NoBase
 from spinepipe.discrepancy.investigation import Investigation, investigate
+from spinepipe.discrepancy.mistakes.data_errors import before_a_fit
 from spinepipe.discrepancy.model_files import model_file
 from spinepipe.discrepancy.prepared import GUESSED_SD, declared_sd, measured
-from spinepipe.discrepancy.told_apart import told_apart
 from spinepipe.discrepancy.where import places, residual_frame
 from spinepipe.files import appearing
 from spinepipe.jobs.discrepancy.candidate_rows import candidate_rows

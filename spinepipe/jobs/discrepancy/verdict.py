@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.discrepancy.design.told_apart import ToldApart
 from spinepipe.discrepancy.forms import Form
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.held_out import HeldOut
 from spinepipe.discrepancy.investigation import Investigation
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.outcome import Outcome, Verdict
+from spinepipe.discrepancy.proof.held_out import HeldOut
 from spinepipe.discrepancy.search import Found, Standing
-from spinepipe.discrepancy.told_apart import ToldApart
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.discrepancy.where import Place, worst
 from spinepipe.units import BORDER_PER_SI, ROTATIONS

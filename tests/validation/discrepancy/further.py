@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.discrepancy.held_out import Asked, held_out
+from spinepipe.discrepancy.design.seen import seen_in
+from spinepipe.discrepancy.design.testable import judgements
+from spinepipe.discrepancy.proof.held_out import Asked, held_out
 from spinepipe.discrepancy.search import Found, Rules
-from spinepipe.discrepancy.seen import seen_in
 from spinepipe.discrepancy.tasks import at_once
-from spinepipe.discrepancy.testable import judgements
 
 Told = dict[str, Any]
 

@@ -14,7 +14,7 @@ from tests.validation.discrepancy.targets import Target
 
 ROOT = Path(__file__).resolve().parents[3]
 PLACE = ROOT / "results" / "validation" / "discrepancy"
-SEARCH = ("investigation", "values", "testable")
+SEARCH = ("investigation", "values", "design.testable")
 """Modules of the room spinepipe.discrepancy that a row hangs on, with all that they import."""
 
 SOURCES = ("generators/hidden/*.py", "validation/discrepancy/row.py")

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.discrepancy.design.seen import Design
 from spinepipe.discrepancy.evidence import Group
 from spinepipe.discrepancy.forms import Form, Variant
 from spinepipe.discrepancy.groups import Places
-from spinepipe.discrepancy.seen import Design
 from spinepipe.effects.contract import Array, Indices
 
 NO_TRACE = 1e-6

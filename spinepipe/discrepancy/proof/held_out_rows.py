@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.held_out_motion import HeldOutMotion
+from spinepipe.discrepancy.proof.held_out_motion import HeldOutMotion
 
 SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 

@@ -15,9 +15,9 @@ import numpy as np
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.hypothesis import Hypothesis, hypothesis
 from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.discrepancy.prediction import NoEquilibrium, Simulated
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.suspected import SuspectedError
 from spinepipe.discrepancy.tasks import Run
 
 LEAST_EXCESS = 3.0

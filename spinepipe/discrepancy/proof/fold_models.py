@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.discrepancy.chosen import Chosen, Flags, Masks
-from spinepipe.discrepancy.fold_linear import LinearFolds, Placed
-from spinepipe.discrepancy.fold_refit import refitted
-from spinepipe.discrepancy.folds import TEST, Fold, Part
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.nuisance_size import nuisance_size
 from spinepipe.discrepancy.prediction import NoEquilibrium
-from spinepipe.discrepancy.surrogate import surrogate
-from spinepipe.discrepancy.tangent import tangent
+from spinepipe.discrepancy.proof.chosen import Chosen, Flags, Masks
+from spinepipe.discrepancy.proof.fold_linear import LinearFolds, Placed
+from spinepipe.discrepancy.proof.fold_refit import refitted
+from spinepipe.discrepancy.proof.folds import TEST, Fold, Part
+from spinepipe.discrepancy.proof.nuisance_size import nuisance_size
+from spinepipe.discrepancy.proof.surrogate import surrogate
+from spinepipe.discrepancy.proof.tangent import tangent
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.effects.contract import Array
 

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.discrepancy.fold_models import FoldModels, Predictions
-from spinepipe.discrepancy.fold_refit import NoFold
-from spinepipe.discrepancy.fold_scores import pooled, scored_gap
-from spinepipe.discrepancy.folds import STEPS, Fold, folds_by_specimen, folds_by_test, step_fold
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.held_out_motion import HeldOutMotion, fill, nothing_held_out
-from spinepipe.discrepancy.held_out_rows import (
+from spinepipe.discrepancy.proof.fold_models import FoldModels, Predictions
+from spinepipe.discrepancy.proof.fold_refit import NoFold
+from spinepipe.discrepancy.proof.fold_scores import pooled, scored_gap
+from spinepipe.discrepancy.proof.folds import (
+    STEPS,
+    Fold,
+    folds_by_specimen,
+    folds_by_test,
+    step_fold,
+)
+from spinepipe.discrepancy.proof.held_out_motion import HeldOutMotion, fill, nothing_held_out
+from spinepipe.discrepancy.proof.held_out_rows import (
     NO_FIT,
     NOT_DETERMINED,
     SCORED,

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 from scipy.optimize import lsq_linear
 
-from spinepipe.discrepancy.chosen import Chosen, Flags
-from spinepipe.discrepancy.folds import Part
-from spinepipe.discrepancy.tangent import LinearModel
+from spinepipe.discrepancy.proof.chosen import Chosen, Flags
+from spinepipe.discrepancy.proof.folds import Part
+from spinepipe.discrepancy.proof.tangent import LinearModel
 from spinepipe.effects.contract import Array, Indices
 
 

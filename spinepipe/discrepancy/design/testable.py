@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from spinepipe.discrepancy.design.seen import Design, Seen, candidates
+from spinepipe.discrepancy.design.typical import NO_TRACE, Typical, typical
 from spinepipe.discrepancy.forms import Trials, Variant, shape_grid
-from spinepipe.discrepancy.seen import Design, Seen, candidates
-from spinepipe.discrepancy.typical import NO_TRACE, Typical, typical
 from spinepipe.discrepancy.values import border
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array

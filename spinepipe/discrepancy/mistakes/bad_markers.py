@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from spinepipe.discrepancy.driven import joint_moments
+from spinepipe.discrepancy.mistakes.driven import joint_moments
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError, of_specimens
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.suspected import SuspectedError, of_specimens
 from spinepipe.effects.contract import Array
 from spinepipe.units import COORDINATES, ROTATIONS
 

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.discrepancy.additions import MENU
 from spinepipe.discrepancy.base import base_parameters
+from spinepipe.discrepancy.design.additions import MENU
+from spinepipe.discrepancy.design.plans import PER_SPECIMEN, Plan, as_made, thinned
+from spinepipe.discrepancy.design.seen import Seen, candidates, seen
+from spinepipe.discrepancy.design.testable import Judgement, judgements
 from spinepipe.discrepancy.forms import Trials
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.nuisance import nuisance_columns
-from spinepipe.discrepancy.plans import PER_SPECIMEN, Plan, as_made, thinned
 from spinepipe.discrepancy.prediction import NoEquilibrium, Solved
-from spinepipe.discrepancy.seen import Seen, candidates, seen
 from spinepipe.discrepancy.signatures import signatures
-from spinepipe.discrepancy.testable import Judgement, judgements
 from spinepipe.discrepancy.whitening import whitening, with_nuisances
 from spinepipe.effects import Trial, create, registered
 from spinepipe.effects.contract import Array

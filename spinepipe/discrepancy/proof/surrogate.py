@@ -6,7 +6,7 @@ import numpy as np
 
 from spinepipe.discrepancy.generic import generic_columns
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.tangent import LinearModel, tangent
+from spinepipe.discrepancy.proof.tangent import LinearModel, tangent
 from spinepipe.units import COORDINATES
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.discrepancy.load_changes import farthest
+from spinepipe.discrepancy.design.load_changes import farthest
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.effects.contract import Indices
 from spinepipe.model import LoadCase

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.discrepancy.fold_models import Predictions
+from spinepipe.discrepancy.proof.fold_models import Predictions
 from spinepipe.discrepancy.readings import SpecimenReadings
 from spinepipe.effects.contract import Array
 

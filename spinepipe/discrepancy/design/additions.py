@@ -6,7 +6,7 @@ An addition turns a plan into a larger one, or into None where the plan has it a
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from spinepipe.discrepancy.load_changes import (
+from spinepipe.discrepancy.design.load_changes import (
     HELD_S,
     STEP_S,
     at_times,
@@ -19,7 +19,7 @@ from spinepipe.discrepancy.load_changes import (
     summed_loads,
     times,
 )
-from spinepipe.discrepancy.plans import PER_SPECIMEN, Plan, Planned
+from spinepipe.discrepancy.design.plans import PER_SPECIMEN, Plan, Planned
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase
 

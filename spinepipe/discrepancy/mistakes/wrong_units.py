@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from spinepipe.anatomy.published import published
-from spinepipe.discrepancy.driven import Answer, typical
-from spinepipe.discrepancy.suspected import ALL, SuspectedError
+from spinepipe.discrepancy.mistakes.driven import Answer, typical
+from spinepipe.discrepancy.mistakes.suspected import ALL, SuspectedError
 from spinepipe.units import ROTATIONS, STIFFNESS_COLUMNS
 
 DECADES = 1.0

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from spinepipe.discrepancy.design.seen import Design
+from spinepipe.discrepancy.design.testable import Judgement
+from spinepipe.discrepancy.design.typical import Typical, summing
 from spinepipe.discrepancy.evidence import SIZES
 from spinepipe.discrepancy.forms import Form, shape_grid
 from spinepipe.discrepancy.groups import Places
-from spinepipe.discrepancy.seen import Design
-from spinepipe.discrepancy.testable import Judgement
-from spinepipe.discrepancy.typical import Typical, summing
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 

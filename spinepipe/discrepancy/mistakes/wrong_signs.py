@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.discrepancy.driven import Answer, typical
-from spinepipe.discrepancy.suspected import SuspectedError, of_specimens
+from spinepipe.discrepancy.mistakes.driven import Answer, typical
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError, of_specimens
 from spinepipe.effects.contract import Array
 from spinepipe.units import COORDINATES, ROTATIONS
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.discrepancy.chosen import only
-from spinepipe.discrepancy.fold_linear import Placed, own_unknowns
-from spinepipe.discrepancy.folds import Part
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.hypothesis import Hypothesis, Member
 from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.discrepancy.tangent import LinearModel
+from spinepipe.discrepancy.proof.chosen import only
+from spinepipe.discrepancy.proof.fold_linear import Placed, own_unknowns
+from spinepipe.discrepancy.proof.folds import Part
+from spinepipe.discrepancy.proof.tangent import LinearModel
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.discrepancy.whitening import whitening, with_nuisances
 from spinepipe.effects.contract import Array, Indices

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.discrepancy.chosen import Chosen, Flags, Masks
-from spinepipe.discrepancy.fold_linear import Placed
 from spinepipe.discrepancy.gaps import Gap
+from spinepipe.discrepancy.proof.chosen import Chosen, Flags, Masks
+from spinepipe.discrepancy.proof.fold_linear import Placed
 from spinepipe.effects.contract import Array
 
 

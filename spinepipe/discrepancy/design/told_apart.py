@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spinepipe.discrepancy.confusions import Confusion, confusions, families
-from spinepipe.discrepancy.extra_tests import NotTestable, bench, not_testable
+from spinepipe.discrepancy.design.confusions import Confusion, confusions, families
+from spinepipe.discrepancy.design.extra_tests import NotTestable, bench, not_testable
+from spinepipe.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.discrepancy.design.testable import Judgement, judgements
 from spinepipe.discrepancy.forms import Trials
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.seen import Design, candidates, seen_in
 from spinepipe.discrepancy.tasks import Run
-from spinepipe.discrepancy.testable import Judgement, judgements
 from spinepipe.effects.contract import Array
 
 

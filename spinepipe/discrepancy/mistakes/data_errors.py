@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.discrepancy.bad_markers import bad_markers, beside_the_curve, between_cycles
-from spinepipe.discrepancy.driven import answers
 from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.mistakes.bad_markers import bad_markers, beside_the_curve, between_cycles
+from spinepipe.discrepancy.mistakes.driven import answers
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.discrepancy.mistakes.swapped import swapped
+from spinepipe.discrepancy.mistakes.wrong_signs import wrong_signs
+from spinepipe.discrepancy.mistakes.wrong_units import wrong_units
 from spinepipe.discrepancy.readings import SpecimenReadings
-from spinepipe.discrepancy.suspected import SuspectedError
-from spinepipe.discrepancy.swapped import swapped
 from spinepipe.discrepancy.tasks import Run
-from spinepipe.discrepancy.wrong_signs import wrong_signs
-from spinepipe.discrepancy.wrong_units import wrong_units
 from spinepipe.effects.contract import Array
 
 CLEAR = 5.0

@@ -1,0 +1,1 @@
+"""Mistakes in the files that no effect should explain."""
