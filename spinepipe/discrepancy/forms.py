@@ -77,7 +77,7 @@ class Trials:
         """Logarithm of a form's share of its effect: equal for variants, ways to differ, places."""
         spreads = len({one.spread for one in self.forms})
         like = [f for f in self.forms if (f.variant, f.spread) == (form.variant, form.spread)]
-        return -float(np.log(len(self.variants) * spreads * len(like)))
+        return -float(np.log(len(self.variants) * spreads * max(len(like), 1)))
 
 
 def shape_at(parameter: Parameter, sds: float) -> float:

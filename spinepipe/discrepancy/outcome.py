@@ -58,7 +58,12 @@ def outcome(
     ----------
     proof : on data held out; None where none was asked for. errors : suspected in the data.
     """
-    unexplained = _mistaken(errors) or _unexplained(found) or _unproven(found, proof)
+    unexplained = (
+        _mistaken(errors)
+        or _unexplained(found)
+        or _stiffness_of_each(found.standing, margin)
+        or _unproven(found, proof)
+    )
     if unexplained:
         return Outcome(Verdict.UNKNOWN, unexplained, (), ())
     if not found.standing:
@@ -80,6 +85,17 @@ def _mistaken(errors: Sequence[SuspectedError]) -> str:
         return ""
     places = "; ".join(f"{one.what} ({one.where})" for one in errors[:3])
     return f"the data look wrong, so nothing is named: {places}"
+
+
+def _stiffness_of_each(standing: Sequence[Standing], margin: float) -> str:
+    """Whether plain stiffness, another in each joint of each specimen, does as well."""
+    for one in standing:
+        if one.over_stiffness is not None and one.over_stiffness < margin:
+            return (
+                f"{one.name} explains no more than a stiffness of its own for each joint of each "
+                "specimen: try base per_joint"
+            )
+    return ""
 
 
 def _unproven(found: Found, proof: HeldOut | None) -> str:

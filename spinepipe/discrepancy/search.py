@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from spinepipe.discrepancy.forms import Trials
+from spinepipe.discrepancy.forms import Form, Trials, Variant
 from spinepipe.discrepancy.gaps import Gap, whole_gap
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.hypothesis import Supposed
@@ -21,6 +21,8 @@ from spinepipe.discrepancy.refit import Refit, refit, refits, standing
 from spinepipe.discrepancy.rounds import look
 from spinepipe.discrepancy.screen import Screen, exceeded
 from spinepipe.discrepancy.tasks import Run
+from spinepipe.effects import Spread
+from spinepipe.units import ROTATIONS
 
 HOPELESS = (4.0, 2.5, 1.5)
 """Times the evidence of the first, second and further effect that the generic basis may have.
@@ -30,6 +32,9 @@ With more, no known effect is what is missing, and adding them up would only imi
 
 REAL_SHARE = 0.03
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
+
+LEVELS = "level_dependence"
+"""The effect by which joints differ in stiffness."""
 
 MOST_FORMS_NAMED = 4
 MOST_SWAPS = 2
@@ -63,6 +68,8 @@ class Standing:
     Attributes
     ----------
     log_evidence : beside the others. alone : of its effect on the first screen, beside none.
+    over_stiffness : how far its evidence is above that of a stiffness of its own for each joint of
+        each specimen, where the form differs between joints as well; None elsewhere.
     """
 
     supposed: Supposed
@@ -70,6 +77,7 @@ class Standing:
     alone: float
     gain: float
     rivals: tuple[Rival, ...]
+    over_stiffness: float | None
 
     @property
     def name(self) -> str:
@@ -211,8 +219,10 @@ def _examined(
         if best.name != one.form.name and best.log_evidence > own.log_evidence:
             return without.at(best.fit), (), True
         alone = next(e for e in log.stages[0].screen.effects if e.effect == one.form.name)
+        over = _over_stiffness(without, own, rules, run)
         rivals = _rivals(own, tried, screen)
-        stood.append(Standing(one, own.log_evidence, alone.log_evidence, own.gain, rivals))
+        found = (own.log_evidence, alone.log_evidence, own.gain, rivals, over)
+        stood.append(Standing(one, *found))
     return current, tuple(stood), False
 
 
@@ -231,6 +241,22 @@ def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], rules: Rules, 
         return same[0]
     trials = next(t for t in rules.trials if t.effect == one.form.name)
     return refit(without, one, trials, run)
+
+
+def _over_stiffness(without: Grounds, own: Refit, rules: Rules, run: Run) -> float | None:
+    """Evidence above that of plain stiffness, joint by joint and specimen by specimen.
+
+    Forms that differ between joints can imitate it by their many strengths.
+    """
+    many = own.form.spread in (Spread.BY_JOINT, Spread.EACH)
+    levels = [t for t in rules.trials if t.effect == LEVELS]
+    coordinate = dict(own.form.variant.options).get("coordinate")
+    if not many or own.name == LEVELS or not levels or coordinate not in ROTATIONS:
+        return None
+    variant = Variant(LEVELS, (("coordinate", coordinate),))
+    start = variant.off(()) * np.exp(0.01)
+    plain = refit(without, Supposed(Form(variant, Spread.EACH), start), levels[0], run)
+    return own.log_evidence - plain.log_evidence if np.isfinite(plain.log_evidence) else None
 
 
 def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, ...]:
