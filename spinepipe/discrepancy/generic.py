@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from spinepipe.discrepancy.base import BUSHING
 from spinepipe.discrepancy.prediction import solved_steps
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
@@ -60,7 +61,7 @@ def generic_columns(
     shape = (-1, model.n_joints, 6)
     motions = [q.reshape(shape) for q in poses]
     reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
-    stiffness = model.effects[0].values
+    stiffness = _stiffness(model)
     terms: list[Term] = []
     moved: list[list[Array]] = [[] for _ in cases]
     for name in rotations:
@@ -79,6 +80,15 @@ def generic_columns(
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
     seen = [c - c[0] if zeroed else c for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
+
+
+def _stiffness(model: SpineModel) -> Array:
+    """(J, 6) of the bushings, the sum where there are several; 1 where a joint has none."""
+    total = np.zeros((model.n_joints, 6))
+    for scoped in model.effects:
+        if scoped.effect.name == BUSHING:
+            total[list(scoped.joints)] += scoped.values
+    return np.where(total > 0.0, total, 1.0)
 
 
 def _counts(rotations: int) -> dict[str, int]:

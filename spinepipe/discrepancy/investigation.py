@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
+from spinepipe.discrepancy.found import Found, Rules
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.discrepancy.outcome import Outcome, outcome
 from spinepipe.discrepancy.prepared import measured, prepared
 from spinepipe.discrepancy.proof.held_out import Asked, HeldOut, held_out
-from spinepipe.discrepancy.search import Found, Rules, search
+from spinepipe.discrepancy.search import search
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.model.file import ModelFile
 from spinepipe.studies import Discrepancy

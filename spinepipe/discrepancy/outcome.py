@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from spinepipe.discrepancy.found import Found, Standing
 from spinepipe.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.discrepancy.proof.held_out import HeldOut
 from spinepipe.discrepancy.screen import LEAST_THRESHOLD
-from spinepipe.discrepancy.search import Found, Standing
 
 UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""

@@ -5,11 +5,11 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.base import base_model, base_parameters
 from spinepipe.discrepancy.forms import trials
+from spinepipe.discrepancy.found import Rules
 from spinepipe.discrepancy.grounds import Grounds, Start, laid
 from spinepipe.discrepancy.noise import Noise, estimated_noise, without_outliers
 from spinepipe.discrepancy.nuisance import NuisancePriors, as_si
 from spinepipe.discrepancy.readings import SpecimenReadings, specimen_readings
-from spinepipe.discrepancy.search import Rules
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
@@ -37,7 +37,7 @@ def prepared(
         When there is no base fit, or nothing tells how large the noise is.
     """
     coordinates = read_coordinates(study, cohort)
-    readings, noise = _noise(study, cohort, measured(study, cohort))
+    readings, noise = with_noise(study, cohort, measured(study, cohort))
     start = np.array(study.stiffness.in_order(), dtype=float)
     models = {one.specimen: base_model(cohort, one, start, file) for one in readings}
     grouping = study.base.stiffness or PER_SPECIMEN
@@ -83,7 +83,7 @@ def measured(study: Discrepancy, cohort: Cohort) -> tuple[SpecimenReadings, ...]
     return tuple(one for one in found if one.tests)
 
 
-def _noise(
+def with_noise(
     study: Discrepancy, cohort: Cohort, readings: tuple[SpecimenReadings, ...]
 ) -> tuple[tuple[SpecimenReadings, ...], Noise]:
     """Readings without outliers, and their noise."""

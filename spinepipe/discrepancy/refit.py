@@ -4,18 +4,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import log_ndtr, logsumexp
 
-from spinepipe.discrepancy.evidence import SIZES
 from spinepipe.discrepancy.forms import Form, Trials, Variant
 from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Supposed
+from spinepipe.discrepancy.hypothesis import Supposed
 from spinepipe.discrepancy.joint_fit import JointFit, joint_fit
+from spinepipe.discrepancy.laplace import laplace
 from spinepipe.discrepancy.screen import Screen, Screened, Tried
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.effects import Parameter, Spread
-from spinepipe.effects.contract import Array
 
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
@@ -173,61 +170,3 @@ def standing(fit: JointFit) -> tuple[Supposed, ...]:
                 start[column] = np.clip(value, parameter.low, parameter.high)
         found.append(replace(one, start=start))
     return tuple(found)
-
-
-def laplace(fit: JointFit, number: int, gain: float) -> float:
-    """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
-
-    The likelihood is taken for normal around the fit; strengths are N(off, t^2), averaged over the
-    sizes t of the screen, shapes as their priors.
-    """
-    unknowns = fit.hypothesis.unknowns
-    own = np.array([u.supposed == number for u in unknowns])
-    curvature = curvature_of(fit, own)
-    chosen = [u for u in unknowns if u.supposed == number]
-    away = fit.x[own] - np.array([u.mean for u in chosen])
-    is_strength = np.array([u.is_strength for u in chosen])
-    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
-    sides = _sides(fit, chosen)
-    found = []
-    for size in SIZES:
-        sd = np.where(is_strength, size, 1.0) * declared
-        spread = np.eye(len(sd)) + curvature * sd**2
-        _, logdet = np.linalg.slogdet(spread)
-        fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
-        posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
-        mean = posterior @ (curvature @ away)
-        inside = sides * mean / np.sqrt(np.diagonal(posterior))
-        half = np.where(sides != 0.0, np.log(2.0) + log_ndtr(inside), 0.0)
-        found.append(-0.5 * (logdet + fit_to_prior) + float(half.sum()))
-    return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
-
-
-def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
-    """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
-    jacobian = fit.whole_jacobian()
-    priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
-    others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
-    mine = np.vstack([jacobian[:, own], np.zeros((int((~own).sum()), int(own.sum())))])
-    basis, _ = np.linalg.qr(others)
-    left = mine - basis @ (basis.T @ mine)
-    result: Array = left.T @ left
-    return result
-
-
-def _sides(fit: JointFit, unknowns: Sequence[object]) -> Array:
-    """(k,) the side of off that bounds allow a strength, 0 for both and for shapes."""
-    sides = []
-    for u in unknowns:
-        p = _parameter(fit, u)
-        if p.off is None:
-            sides.append(0.0)
-        else:
-            sides.append(1.0 if p.low >= p.off else -1.0 if p.high <= p.off else 0.0)
-    return np.array(sides)
-
-
-def _parameter(fit: JointFit, u: object) -> Parameter:
-    number, column = u.supposed, u.column  # type: ignore[attr-defined]
-    found: Parameter = fit.hypothesis.supposed[number].form.variant.create().parameters[column]
-    return found

@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.check_base_model import check_base_model
+from spinepipe.studies.check_cohort_base import check_cohort_base
 from spinepipe.studies.check_cohort_stiffness import check_cohort_stiffness
 from spinepipe.studies.check_discrepancy import check_discrepancy
 from spinepipe.studies.check_joint_pose_sensitivity import check_joint_pose_sensitivity
@@ -27,6 +28,7 @@ CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
 """What each kind of study demands of its cohort."""
 
 FILE_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
+    "cohort_stiffness": check_cohort_base,
     "discrepancy": check_base_model,
 }
 """What kinds of studies demand of further files, whose paths count from the Snakefile."""

@@ -2,12 +2,10 @@
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
-from spinepipe.studies.check_cohort_base import check_cohort_base
 from spinepipe.studies.cohort_stiffness import CohortStiffness
 from spinepipe.studies.fitted_to import ALL, ALL_BUT, NOBODY, NOTHING
 from spinepipe.studies.places import at, unknown_tests
@@ -20,20 +18,18 @@ _UNFIT = re.compile(r"[/={}\\\x00-\x1f]|^\.|^\s|\s$")
 
 
 def check_cohort_stiffness(
-    document: Document, study: CohortStiffness, cohort: Cohort, root: Path | None = None
+    document: Document, study: CohortStiffness, cohort: Cohort
 ) -> Iterator[Problem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
     ----------
     document : the study file, for the lines of its keys.
-    root : folder of the Snakefile; None for the working folder.
     """
     yield from _tests(document, study, cohort)
     yield from _specimens(cohort)
     yield from _levels(document, study, cohort)
     yield from _cost(document, study, cohort)
-    yield from check_cohort_base(document, study, cohort, root or Path.cwd())
 
 
 def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:

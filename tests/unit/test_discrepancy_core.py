@@ -20,10 +20,10 @@ from spinepipe.discrepancy.grounds import Grounds, laid
 from spinepipe.discrepancy.groups import Index, summed
 from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Hypothesis, Member, Supposed, Unknown
 from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.discrepancy.laplace import laplace
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.nuisance import NuisancePriors
 from spinepipe.discrepancy.projected import Linearised, drawn, linearised, products, taken_out
-from spinepipe.discrepancy.refit import laplace
 from spinepipe.discrepancy.rounds import look
 from spinepipe.discrepancy.screen import Screen, exceeded
 from spinepipe.discrepancy.signatures import EVERY_TEST, Column
@@ -34,7 +34,7 @@ from spinepipe.units import ROTATIONS
 
 Array = NDArray[np.float64]
 
-NO_NUISANCE = NuisancePriors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NUISANCE = NuisancePriors(*[0.0] * 8)
 
 
 def log_normal(residual: Array, covariance: Array) -> float:
@@ -158,8 +158,6 @@ def test_products_are_those_of_dense_projections(spread: Spread, shared: int) ->
     residual = -np.concatenate([fit.residuals["a"], fit.residuals["b"]])
     np.testing.assert_allclose(one.gram, left.T @ left, atol=1e-9)
     np.testing.assert_allclose(one.moments[:, 0], left.T @ residual, atol=1e-9)
-    if spread is not Spread.SHARED:
-        np.testing.assert_allclose(one.raw, np.sum(dense**2, axis=0))
 
 
 def test_draws_of_the_null_have_the_covariance_of_the_products() -> None:
@@ -220,8 +218,8 @@ def test_laplace_is_the_exact_evidence_of_a_linear_problem(size: float) -> None:
     assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
 
 
-@pytest.mark.parametrize("size", [0.15, 0.2, 1.0])
-def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float) -> None:
+@pytest.mark.parametrize(("size", "within"), [(0.0, 0.02), (0.15, 0.01), (0.2, 0.01), (1.0, 0.01)])
+def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float, within: float) -> None:
     fit, gain, base, f, y = linear_problem(LAXITY, size)
     without = np.eye(60) + 9.0 * base @ base.T
     inverse = np.linalg.inv(without)
@@ -236,7 +234,7 @@ def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float) -> N
         for t in SIZES
     ]
     expected = np.log(np.mean(ratios)) + 20.0
-    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
+    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=within)
 
 
 # Fits, screens and gaps of chains in closed form -----------------------------------------------

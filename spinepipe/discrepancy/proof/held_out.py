@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.discrepancy.found import Found
 from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.proof.fold_models import FoldModels, Predictions
 from spinepipe.discrepancy.proof.fold_refit import NoFold
@@ -28,7 +29,6 @@ from spinepipe.discrepancy.proof.held_out_rows import (
     HeldOut,
     Margin,
 )
-from spinepipe.discrepancy.search import Found
 from spinepipe.discrepancy.tasks import Run
 
 FEWEST_FOLDS = 3

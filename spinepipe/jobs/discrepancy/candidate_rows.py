@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from spinepipe.discrepancy.forms import Form, shape_at
+from spinepipe.discrepancy.found import Found, Stage
 from spinepipe.discrepancy.refit import Refit
 from spinepipe.discrepancy.screen import Tried
-from spinepipe.discrepancy.search import Found, Stage
 from spinepipe.discrepancy.values import border, fitted_values
 from spinepipe.effects import Effect
 from spinepipe.statics import Status

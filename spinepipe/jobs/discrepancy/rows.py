@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from spinepipe.discrepancy.found import Found
 from spinepipe.discrepancy.readings import SpecimenReadings
-from spinepipe.discrepancy.search import Found
 from spinepipe.discrepancy.where import KEYS, Place, places, residual_frame
 from spinepipe.effects.contract import Array
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES

@@ -8,12 +8,12 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.design.told_apart import ToldApart
 from spinepipe.discrepancy.forms import Form
+from spinepipe.discrepancy.found import Found, Standing
 from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.investigation import Investigation
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.outcome import Outcome, Verdict
 from spinepipe.discrepancy.proof.held_out import HeldOut
-from spinepipe.discrepancy.search import Found, Standing
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.discrepancy.where import Place, worst
 from spinepipe.units import BORDER_PER_SI, ROTATIONS
@@ -41,7 +41,7 @@ def verdict_data(
         "effects": [_effect(found, one, cohort) for one in ended.named],
         "candidates_in_set": list(ended.tied),
         "not_testable": [vars(one) for one in told.not_testable],
-        "noise": _noise(found.base.noise),
+        "noise": noise_data(found.base.noise),
         "rms_residual": {"unit": "noise sd", **_pairs(found, proof, "rms")},
         "gap": {"unit": "noise sd", **_pairs(found, proof, "gap"), "held_out_closed": proof.closed},
         "smallest_detectable": [vars(one) for one in told.smallest_detectable],
@@ -99,7 +99,8 @@ def _scope(form: Form, cohort: Cohort) -> Data:
     }
 
 
-def _noise(noise: Noise) -> Data:
+def noise_data(noise: Noise) -> Data:
+    """SDs of one reading in the units of tables, and how they are known."""
     sd = noise.sd * BORDER_PER_SI
     data: Data = {"source": noise.source}
     for name, part in (("rotation_sd_deg", sd[3:]), ("translation_sd_mm", sd[:3])):
