@@ -49,8 +49,16 @@ class Grounds:
         return hypothesis(start.models, start.base, supposed, self.tests, start.bound)
 
     def at(self, fit: JointFit) -> "Grounds":
-        """The same where another fit stands; nuisances stay as they move the base's readings."""
-        return replace(self, fit=fit)
+        """The same where another fit stands; nuisances stay as they move the base's readings.
+
+        Further fits start from the base as it is there: a load that was named may tip over a
+        spine as soft as the base was without it.
+        """
+        models = {
+            name: model.with_effects(model.effects[: len(self.start.models[name].effects)])
+            for name, model in fit.models.items()
+        }
+        return replace(self, fit=fit, start=replace(self.start, models=models))
 
 
 class NoBase(RuntimeError):

@@ -44,9 +44,9 @@ class Inquiry:
         trials = next(t for t in self.rules.trials if t.effect == one.form.name)
         return refit(grounds, one, trials, self.run)
 
-    def beside(self, base: Grounds, others: tuple[Supposed, ...]) -> Grounds:
-        """Grounds with these effects alone."""
+    def beside(self, base: Grounds, current: Grounds, others: tuple[Supposed, ...]) -> Grounds:
+        """Grounds with these of the current effects alone; the base where they have no fit."""
         if not others:
             return base
-        fit: JointFit = self.run(joint_fit, base.suppose(others), base.setting)
-        return base.at(fit)
+        fit: JointFit = self.run(joint_fit, current.suppose(others), base.setting)
+        return base.at(fit) if fit.usable else base

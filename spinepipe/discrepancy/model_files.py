@@ -13,15 +13,24 @@ from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values
 EVERY = ("*",)
 
 
-def model_file(fit: JointFit, name: str, cohort: str, base_effects: int) -> ModelFile:
+def model_file(
+    fit: JointFit, name: str, cohort: str, base: Sequence[tuple[str, ...]] = (EVERY,)
+) -> ModelFile:
     """The models of all specimens in one file.
 
     Parameters
     ----------
-    base_effects : number of effects that the base has, in front of the supposed ones.
+    base : specimens of each effect that the base has, in front of the supposed ones.
     """
-    entries = [_entry(fit.models, number, EVERY) for number in range(base_effects)]
-    after = dict.fromkeys(fit.models, base_effects)
+    entries = []
+    after = dict.fromkeys(fit.models, 0)
+    for specimens in base:
+        acting = {n: m for n, m in fit.models.items() if specimens == EVERY or n in specimens}
+        scoped = {n: m.effects[after[n]] for n, m in acting.items()}
+        if scoped:
+            entries.append(_of_scoped(acting, scoped, specimens))
+        for specimen in acting:
+            after[specimen] += 1
     for supposed in fit.hypothesis.supposed:
         acting = {n: m for n, m in fit.models.items() if supposed.form.acts_in(n)}
         copies = _copies(supposed.form, acting, after)
@@ -49,12 +58,6 @@ def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, in
 
 def _specimens(form: Form) -> tuple[str, ...]:
     return EVERY if form.specimen is None else (form.specimen,)
-
-
-def _entry(
-    models: Mapping[str, SpineModel], number: int, specimens: tuple[str, ...]
-) -> EffectEntry:
-    return _of_scoped(models, {n: m.effects[number] for n, m in models.items()}, specimens)
 
 
 def _of_scoped(

@@ -6,14 +6,18 @@ from enum import StrEnum
 
 from spinepipe.discrepancy.found import Found, Standing
 from spinepipe.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.discrepancy.proof.folds import TEST
 from spinepipe.discrepancy.proof.held_out import HeldOut
 from spinepipe.discrepancy.screen import LEAST_THRESHOLD
 
 UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""
 
-GAP_LEFT = 0.5
-"""Share of the discrepancy that named effects may leave, if that is above the noise."""
+GAP_LEFT, LEAST_LEFT = 0.5, 0.3
+"""Share of the discrepancy that named effects may leave, unless that may be a gap below this."""
+
+WORSE_SHARE, WORSE = 0.05, 30.0
+"""An unseen test may be predicted worse by this share of the base's excess chi2, or so much."""
 
 ALONE = 0.25
 """Share of its evidence that an effect must have without the others.
@@ -75,7 +79,10 @@ def outcome(
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
         return Outcome(Verdict.SET, why, sure, tied)
     names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
-    why = f"{names}: evidence above the null's and {margin:g} above every rival's"
+    why = (
+        f"{names}: more evidence than noise alone would show, and at least {margin:g} more than "
+        "any other effect has"
+    )
     return Outcome(Verdict.NAMED, why, sure, ())
 
 
@@ -100,10 +107,23 @@ def _stiffness_of_each(standing: Sequence[Standing], margin: float) -> str:
 
 def _unproven(found: Found, proof: HeldOut | None) -> str:
     """What is named must predict better than the base what it has not seen."""
-    if not found.standing or proof is None or proof.over_base is None or proof.beats_base:
+    if not found.standing or proof is None or proof.over_base is None:
+        return ""
+    if proof.beats_base and not _worse_on_tests(proof):
         return ""
     names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
-    return f"{names} would explain these readings, but predicts held-out ones no better"
+    return (
+        f"{names} would explain these readings, but predicts held-out ones no better than the base"
+    )
+
+
+def _worse_on_tests(proof: HeldOut) -> bool:
+    """Whether tests that no fit has seen are clearly worse with the effects than without."""
+    rows = [row for row in proof.folds if row.kind == TEST]
+    pairs = [(row.base, row.with_effects, row.expected) for row in rows]
+    drops = sum(b.chi2 - e.chi2 for b, e, _ in pairs if b is not None and e is not None)
+    excess = sum(b.chi2 - expected for b, _, expected in pairs if b is not None)
+    return drops < -max(WORSE, WORSE_SHARE * max(excess, 0.0))
 
 
 def _tied(standing: Sequence[Standing], margin: float) -> tuple[str, ...]:
@@ -136,7 +156,7 @@ def _unexplained(found: Found) -> str:
         alone = _listed(list(dict.fromkeys(props)), "and")
         return f"{names} imitate it together, but by itself nothing speaks for {alone}"
     excess = found.final_gap.excess
-    if found.final_gap.interval[0] > 0.0 and excess > GAP_LEFT * (gain + excess):
+    if found.final_gap.interval[0] > LEAST_LEFT and excess > GAP_LEFT * (gain + excess):
         return "most of the discrepancy stays whatever known effect is added"
     return ""
 

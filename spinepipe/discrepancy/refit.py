@@ -20,7 +20,7 @@ SMALLEST_START = 0.02
 MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 2, 2)
 """Effects that lead the screen, and forms of each, that are refitted."""
 
-SCREEN_SHARE, SCREEN_MARGIN = 0.6, 6.0
+SCREEN_SHARE, SCREEN_MARGIN = 0.75, 6.0
 """The screen is linear: an effect may trail the leader by this share of its evidence and more."""
 
 

@@ -26,9 +26,9 @@ def examined(
     supposed = standing(current.fit)
     for number, one in enumerate(supposed):
         others = tuple(other for k, other in enumerate(supposed) if k != number)
-        without = inquiry.beside(base, others)
+        without = inquiry.beside(base, current, others)
         screen, tried = inquiry.first.screen, inquiry.first.refits
-        if others:
+        if without is not base:
             screen = inquiry.look(without)
             tried = inquiry.refits(without, screen)
         own = _own(without, one, tried, inquiry)

@@ -24,7 +24,7 @@ HOPELESS = (4.0, 2.5, 1.5)
 With more, no known effect is what is missing, and adding them up would only imitate it.
 """
 
-REAL_SHARE = 0.03
+REAL_SHARE = 0.01
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
 
 MOST_FORMS_NAMED = 4

@@ -53,6 +53,8 @@ def confusions(design: Design, judged: Sequence[Judgement]) -> tuple[Confusion, 
     judged : of all effects of the design, in their order.
     """
     shown = [number for number, one in enumerate(judged) if one.testable]
+    if len(shown) < 2:
+        return ()
     targets = {number: _target(design, number, judged[number].best) for number in shown}
     return tuple(
         Confusion(target.effect, judged[other].effect, share)
