@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
 
-MOST_EVALUATIONS = 25
+MOST_EVALUATIONS = 12
 INSIDE = 1e-9
 
 

@@ -17,7 +17,7 @@ from spinepipe.effects import Parameter, Spread
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
 
-MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 2, 2)
+MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 1, 1)
 """Effects that lead the screen, and forms of each, that are refitted."""
 
 SCREEN_SHARE, SCREEN_MARGIN = 0.75, 6.0
