@@ -8,19 +8,16 @@ A page says where a part goes:
 What stands between the markers is written by `spinepipe docs` and compared in the tests.
 """
 
-import inspect
 import re
 from collections.abc import Callable
 from functools import cache, partial
-from math import inf
 from pathlib import Path
 
 from spinepipe.cohort import columns as cohort_columns
 from spinepipe.cohort.header import CohortHeader
-from spinepipe.effects import create, registered
-from spinepipe.effects.contract import Parameter
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.report.effects_reference import effects
 from spinepipe.report.keys import key_table
 from spinepipe.report.markdown import code, table
 from spinepipe.studies import KINDS, Selection
@@ -86,32 +83,6 @@ def cohort_table(form: cohort_columns.TableForm) -> str:
     more = " Further columns are carried through as text." if form.carries else ""
     head = ("column", "type", "range", "meaning", "an empty cell")
     return f"One row per {form.row}; unique by {keys}.{more}\n\n{table(head, rows)}"
-
-
-def effects() -> str:
-    """All registered effects with their parameters."""
-    return "\n\n".join(_effect(name, cls) for name, cls in sorted(registered().items()))
-
-
-def _effect(name: str, cls: type) -> str:
-    effect = create(name)
-    words = inspect.cleandoc(cls.__doc__ or "")
-    scope = "for each joint" if effect.per_joint else "once for the whole model"
-    rows = [_parameter(parameter) for parameter in effect.parameters]
-    head = ("parameter", "unit", "bounds", "default", "prior SD", "meaning")
-    listed = table(head, rows) if rows else "No parameters."
-    return f"### {code(name)}\n\nKind: {effect.kind}; parameters {scope}.\n\n{words}\n\n{listed}"
-
-
-def _parameter(parameter: Parameter) -> tuple[str, ...]:
-    bounds = f"{_number(parameter.low)} to {_number(parameter.high)}"
-    prior = f"{parameter.prior_scale:g}" + (" (of the logarithm)" if parameter.logarithmic else "")
-    default = f"{parameter.default:.6g}"
-    return code(parameter.name), parameter.unit, bounds, default, prior, parameter.meaning
-
-
-def _number(value: float) -> str:
-    return "no limit" if abs(value) == inf else f"{value:.6g}"
 
 
 def refreshed(text: str, page: str) -> str:

@@ -18,14 +18,15 @@ from spinepipe.jobs.discrepancy import figures as figures_job
 from spinepipe.jobs.discrepancy import report as report_job
 from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES, TABLES
 from spinepipe.report.discrepancy import DRAW
-from spinepipe.report.discrepancy.effect_evidence import evidence_by_round
+from spinepipe.report.discrepancy.effect_evidence import evidence_by_round, looks
 from spinepipe.report.discrepancy.findings import findings, warnings
 from spinepipe.report.discrepancy.gap_by_step import worst_places
 from spinepipe.report.discrepancy.headline import headline, how_sure
 from spinepipe.report.discrepancy.page import TITLES, discrepancy_page, left_out
 from spinepipe.report.discrepancy.read_verdict import verdict_of
 from spinepipe.report.discrepancy.tables import shown_tables
-from spinepipe.report.discrepancy.verdict import Answer
+from spinepipe.report.discrepancy.verdict import Answer, Estimate
+from spinepipe.report.discrepancy.words import estimate_of, plain, readable, value_of
 from spinepipe.report.page.results import Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies import Discrepancy, check
@@ -119,11 +120,31 @@ def test_the_best_form_of_an_effect_stands_for_it() -> None:
     assert len(evidence_by_round(pd.concat([candidates, later]))) == 2
 
 
+def test_a_look_in_the_place_of_an_effect_is_no_further_panel() -> None:
+    candidates = frames("NAMED")["candidates"]
+    screened = candidates[candidates["stage"] == "screen 1"]
+    nothing_more = screened.assign(stage="screen 2", log_evidence=-1.0)
+    again = candidates.assign(stage=candidates["stage"].str.replace(" 1", " 3"))
+    found = looks(pd.concat([candidates, nothing_more, again]))
+    assert len(found) == 2
+    assert np.isnan(found[1]["refit"]).all()
+    assert len(looks(pd.concat([candidates, again.replace(" 3", " 2", regex=True)]))) == 1
+
+
+def test_names_values_and_units_read_as_words() -> None:
+    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", 16.26, 19.1)
+    assert estimate_of(growth) == "growth (L4L5, s01) 17.7 1/rad² (95 % interval 16.3 to 19.1)"
+    assert value_of(growth) == "17.7 [16.3, 19.1]"
+    assert value_of(Estimate("gap", 0.0, "deg", 0.0, 0.1, at_bound=True)) == "0, at its bound"
+    assert plain("flexion_extension_asymmetry") == "flexion–extension asymmetry"
+    assert readable("marker_bias: try base per_joint") == "marker bias: try base per_joint"
+
+
 def test_what_cannot_be_tested_stands_beside_what_can(tmp_path: Path) -> None:
     _, cohort = study_of(tmp_path)
     words = said(drawn("effect_confusions", cohort, "NULL"))
     assert words.count("not testable here") == len(HIDDEN) + 1  # and in the key
-    assert all(name.replace("_", " ") in words for name in [*EFFECTS, *HIDDEN])
+    assert all(plain(name) in words for name in [*EFFECTS, *HIDDEN])
 
 
 def test_a_fold_without_a_result_tells_why(tmp_path: Path) -> None:
@@ -137,12 +158,12 @@ def test_a_fold_without_a_result_tells_why(tmp_path: Path) -> None:
 
 HEADLINES = {
     "NAMED": "The model lacks a neutral zone at L4L5, in flexion–extension.",
-    "NULL": "Nothing is missing above the noise. A gap would have been named from 0.19 to 0.35 "
-    "noise SD, depending on the effect.",
+    "NULL": "Nothing is missing above the noise. An effect would have been named from a gap of "
+    "0.19 noise SD (the easiest to see) to 0.35 (the hardest).",
     "SET": "One of these is missing, at L4L5, in flexion–extension, and these tests cannot tell "
     "which: a neutral zone or nonlinear stiffening.",
-    "UNKNOWN": "Something is missing that is none of the known effects: L4L5, flexion-extension, "
-    "in flexion above 5 N m.",
+    "UNKNOWN": "Something is missing that is none of the known effects. It shows most at L4L5, "
+    "flexion-extension, in flexion above 5 N m.",
 }
 
 
@@ -155,7 +176,7 @@ def test_how_sure_a_name_is() -> None:
     assert how_sure(verdict_of(VERDICTS["NAMED"])) == (
         "Neutral zone: log evidence 88.0, 6.2 is needed; next best nonlinear stiffening, 17 "
         "behind. Residuals of 4.10 noise SD become 1.02 (1 is noise). On motion held out of the "
-        "fits 97 % of the gap is closed."
+        "fits 97 % of the gap is closed, 4.18 to 0.35."
     )
     assert "Its shape: one side only" in how_sure(verdict_of(VERDICTS["UNKNOWN"]))
 
@@ -199,13 +220,16 @@ def told(answer: str, **changes: Any) -> str:
 def test_findings_have_sizes_places_and_noise() -> None:
     words = told("NAMED").replace("\u00a0", " ")
     assert "half width 1.55° (95 % interval 1.42 to 1.69)" in words
-    assert "L4L5, flexion–extension, flexion: 9.3 (7.4 to 11.3)" in words
+    assert "L4L5 in flexion–extension, test flexion: 9.3 (7.4 to 11.3)" in words
     assert "above the noise at 1 of 27 places" in words
+    assert "1.10 (0.88 to 1.42) with the base, 0.00 (0.00 to 0.10) with the effects" in words
     assert (
         "SD of one reading 0.10°, from repeated cycles, correlation from step to step 0.30" in words
     )
-    assert "by more than the margin. Detected from: flexion." in words
+    assert "Detected from: flexion." in words
+    assert "What would show them: joint centre offset: measured translations" in words
     assert "agree within the noise" in told("NULL")
+    assert "facet contact 0.20" in told("NULL")  # 0.15 + 0.3 * 0.18, rounded
     declared = told("NULL", noise={"source": "declared", "rotation_sd_deg": 0.2})
     assert "no cycle was repeated, so all hangs on that number" in declared
 
@@ -241,6 +265,48 @@ def test_tables_of_the_page_hold_the_verdict() -> None:
         "Suspected errors of the data",
         "One of these is missing",
     ]
+
+
+def test_the_nearest_effect_of_something_unknown_is_told_but_not_named() -> None:
+    shape = VERDICTS["UNKNOWN"]["unknown"]["shape"]
+    words = told("UNKNOWN", why=f"a discrepancy that no known effect explains: {shape}")
+    assert "Nearest known effect: neutral zone, log evidence 88.0." in words
+    assert "Nearest" not in told("UNKNOWN", why="the data look wrong")
+    place = {"where": "L5S1, right bending, test flexion_extension (gap 4.5); L4L5", "shape": ""}
+    unknown = verdict_of(VERDICTS["UNKNOWN"] | {"unknown": place})
+    assert headline(unknown).endswith("at L5S1, lateral bending, test flexion–extension.")
+
+
+def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
+    _, cohort = study_of(tmp_path)
+    why = "the base model cannot be fitted: no start has a pose"
+    data = {"cohort": "c", "verdict": "UNKNOWN", "why": why,
+            "unknown": {"where": "no start has a pose", "shape": "not known"}}  # fmt: skip
+    verdict = verdict_of(data)
+    assert headline(verdict).startswith("Nothing can be said of what is missing")
+    assert why in how_sure(verdict)
+    empty = {name: rows.iloc[:0] for name, rows in frames("NULL").items()}
+    assert findings(verdict, Results(empty, {}, {}, {})) == []
+    with style():
+        for draw in DRAW.values():
+            assert re.search("No|not", said(draw(cohort, verdict, empty)))
+
+
+def test_no_name_is_not_always_an_unknown_effect() -> None:
+    shape = {"unknown": {"where": "no single place stands out", "shape": "load over bending"}}
+    stiffness = verdict_of(
+        VERDICTS["UNKNOWN"] | shape | {"why": "level_dependence is no more: try base per_joint"}
+    )
+    assert headline(stiffness) == "Something is missing, but no name is believed."
+    assert "Why no name: level dependence is no more: try base per_joint." in how_sure(stiffness)
+    assert "load over bending" not in how_sure(stiffness)
+    wrong = {
+        "why": "the data look wrong, so nothing is named: a sign (L4L5)",
+        "suspected_data_errors": [{"where": "L4L5", "what": "a sign", "evidence": ""}],
+    }
+    suspected = verdict_of(VERDICTS["UNKNOWN"] | shape | wrong)
+    assert headline(suspected) == "The data look wrong, so nothing is named: a sign (L4L5)."
+    assert "load over bending" not in how_sure(suspected)
 
 
 def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:

@@ -57,6 +57,22 @@ def test_keys_of_a_study(line: str) -> None:
     assert line in generators()["keys joint_pose_sensitivity"]()
 
 
+def test_an_effect_tells_what_its_options_change_and_how_it_is_searched() -> None:
+    part = generators()["effects"]()
+    stiffening = part[part.index("### `nonlinear_stiffening`") :].partition("\n### ")[0]
+    assert (
+        "`shape`, by default `exponential` (a search tries `exponential`, `tangent`" in stiffening
+    )
+    assert "| `rate` | 1/rad | 0 to 100 | 0 | 10 |" in stiffening
+    assert "| `growth`, with `shape: tangent` | 1/rad^2 | 0 to 5000 | 0 | 75 |" in stiffening
+    assert "What shows it: several load steps up to a large motion" in stiffening
+    bushing = part[part.index("### `linear_bushing`") :].partition("\n### ")[0]
+    assert "A search for missing effects does not try it." in bushing
+    contact = part[part.index("### `facet_contact`") :].partition("\n### ")[0]
+    assert "| `gap` | rad | 0 to 0.5 |  |" in contact  # a shape has no value at which it is off
+    assert "with another `coordinate` they differ" in contact
+
+
 def test_bars_in_cells_are_escaped() -> None:
     for name, part in generators().items():
         tables = [line for line in part().splitlines() if line.startswith("|")]

@@ -20,11 +20,14 @@ from spinepipe.tables.discrepancy import NOT_TESTABLE
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 5.4, 34.0, 24.0
 _MOST_WITH_NUMBERS = 22
+_LEAST_SHARE = 0.05
+"""Smaller shares are shown as 0: they do not matter."""
+
 WORDS = (
     "Beyond what base and nuisance take up; read along a row. Computed from the tests alone, "
-    "before residuals are looked at."
+    "before residuals are looked at. Below 0.05: 0."
 )
-HEADINGS = ("Share of one effect's gap that another explains", "Smallest gap")
+HEADINGS = ("Share of one effect's gap that another explains", "Smallest gap named")
 
 
 def effect_confusions_figure(
@@ -40,9 +43,8 @@ def effect_confusions_figure(
     figure = blank(len(rows) * _ROW_MM + _AROUND_MM + _KEY_MM)
     left, right = figure.subplots(1, 2, width_ratios=[3.0, 1.0], sharey=True)
     grid = _square(confusions, rows, names)
-    image = draw_heat(
-        left, grid, Normalize(0.0, 1.0), 2 if len(rows) <= _MOST_WITH_NUMBERS else None
-    )
+    decimals = 2 if len(rows) <= _MOST_WITH_NUMBERS else None
+    image = draw_heat(left, np.where(grid < _LEAST_SHARE, 0.0, grid), Normalize(0.0, 1.0), decimals)
     name_cells(left, [plain(name) for name in rows], [plain(name) for name in names], True)
     _detectable(right, rows, hidden, _gaps(candidates, verdict))
     for index, (axis, words) in enumerate(zip((left, right), HEADINGS, strict=True)):

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from spinepipe.cohort import Cohort
+from spinepipe.report.cohort.named import short
 from spinepipe.report.discrepancy.verdict import Verdict
 from spinepipe.report.discrepancy.words import plain
 from spinepipe.report.layout import explain_marks
@@ -23,6 +24,7 @@ MOST_ROUNDS, _ACROSS = 3, 2
 SCREEN, REFIT = "screen", "refit"
 PALE = "#B9B9B9"
 _ROW_MM, _AROUND_MM, _KEY_MM = 4.4, 20.0, 15.0
+_ROOM_FOR_NUMBERS = 12.0
 _LINEAR_TO = 10.0
 """Log evidence up to which the axis is linear, beyond it is logarithmic."""
 
@@ -31,7 +33,7 @@ def effect_evidence_figure(
     cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """A panel for each round: the best form of each effect, screened and refitted."""
-    rounds = evidence_by_round(tables["candidates"])[:MOST_ROUNDS]
+    rounds = looks(tables["candidates"])[:MOST_ROUNDS]
     if not rounds:
         return saying("No evidence can be shown: no effect was tried.")
     longest = max(len(found) for found in rounds)
@@ -44,11 +46,26 @@ def effect_evidence_figure(
         axis.set_xlim(low, high)
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
         axis.set_xlabel("log evidence for the effect")
-        axis.set_title(f"{chr(ord('a') + index)}   {_title(index)}")
+        axis.set_title(f"{chr(ord('a') + index)}   {_title(rounds[:index])}")
         if verdict.threshold is not None:
             axis.axvline(verdict.threshold, color=BLACK, lw=0.8, ls="--", zorder=5)
     explain_marks(figure, _handles(verdict), _words(verdict), len(_handles(verdict)))
     return figure
+
+
+def looks(candidates: pd.DataFrame) -> list[pd.DataFrame]:
+    """Rounds in which effects entered and the one that found no more.
+
+    Later ones, which try each effect's rivals in its place, repeat what these show.
+    """
+    found: list[pd.DataFrame] = []
+    for one in evidence_by_round(candidates):
+        if any(one.sort_index().equals(other.sort_index()) for other in found):
+            break
+        found.append(one)
+        if not np.isfinite(one[REFIT]).any():
+            break
+    return found
 
 
 def evidence_by_round(candidates: pd.DataFrame) -> list[pd.DataFrame]:
@@ -77,7 +94,8 @@ def _draw(axis: Axes, found: pd.DataFrame, verdict: Verdict) -> None:
         value = row[REFIT] if refitted else row[SCREEN]
         axis.barh(y, value, height=0.62, color=_color(str(name), verdict),
                   alpha=1.0 if refitted else 0.45, lw=0, zorder=3)  # fmt: skip
-        note(axis, 1.0, y, fixed(float(value), 1), ha="right")
+        words = fixed(float(value), 1) if abs(value) < 100.0 else number(float(value), 4)
+        note(axis, 1.0, y, words, ha="right")
     axis.set_yticks(range(len(found)), [plain(str(name)) for name in found.index])
     for label, name in zip(axis.get_yticklabels(), found.index, strict=True):
         label.set_fontweight(
@@ -97,11 +115,13 @@ def _reach(rounds: list[pd.DataFrame], verdict: Verdict) -> tuple[float, float]:
     values = finite(pd.concat(rounds).to_numpy(float))
     low = min(0.0, float(values.min()))
     high = max(_LINEAR_TO, float(values.max()), 1.5 * (verdict.threshold or 0.0))
-    return 1.2 * low - 1.0, 4.0 * high
+    return 1.2 * low - 1.0, _ROOM_FOR_NUMBERS * high
 
 
-def _title(index: int) -> str:
-    return "First effect" if index == 0 else f"Beside {index} effect{'s' if index > 1 else ''}"
+def _title(before: list[pd.DataFrame]) -> str:
+    """What the effects are beside: the best refit of each round before."""
+    names = [plain(str(one[REFIT].idxmax())) for one in before]
+    return f"Beside {short(' and '.join(names), 44)}" if names else "First effect"
 
 
 def _handles(verdict: Verdict) -> list[Line2D | Patch]:

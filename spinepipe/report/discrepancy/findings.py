@@ -4,19 +4,40 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.discrepancy.verdict import Answer, Verdict
-from spinepipe.report.discrepancy.words import axis, estimate_of, listed, plain
+from spinepipe.report.discrepancy.limits import (
+    confused,
+    imitating,
+    not_testable,
+    would_have_been_seen,
+)
+from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.report.discrepancy.words import (
+    axis,
+    called,
+    capital,
+    differing,
+    estimate_of,
+    plain,
+    readable,
+)
 from spinepipe.report.page.results import Results
 from spinepipe.report.words import count, fixed, number
 
-_MOST_PLACES = 3
+_MOST_PLACES, _MOST_SIZES = 3, 4
+_BY_CHANCE = 0.025
+"""Of places with noise alone, the share whose 95 % interval lies above it."""
+
+NUISANCES = (
+    "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
+    "nuisances). Model files, and the figure of the gap along the load, do not have them."
+)
 
 
 def warnings(verdict: Verdict) -> tuple[str, ...]:
     """Readings that look like errors of the data, which no effect of a model explains."""
     return tuple(
-        f"Look at the data first: {one.where}: {one.what}"
-        + (f" ({one.evidence})." if one.evidence else ".")
+        f"Look at the data first: {readable(one.where)}: {readable(one.what)}"
+        + (f" ({readable(one.evidence)})." if one.evidence else ".")
         for one in verdict.suspicions
     )
 
@@ -25,12 +46,17 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
     """The sentences, without those that there is nothing to say for."""
     told = [
         *_sizes(verdict),
-        _reason(verdict),
+        would_have_been_seen(verdict),
+        _before_and_after(results.table("where")),
         _where(results.table("where")),
-        _not_testable(verdict),
+        confused(verdict, results.table("confusions")),
+        imitating(verdict, results.table("candidates")),
+        _detected_from(verdict),
+        not_testable(verdict),
         _noise(verdict),
     ]
-    return [sentence.replace(" %", "\u00a0%") for sentence in told if sentence]
+    said = [sentence.replace(" %", "\u00a0%") for sentence in told if sentence]
+    return [*said, NUISANCES] if said else []
 
 
 def _sizes(verdict: Verdict) -> Iterator[str]:
@@ -38,17 +64,29 @@ def _sizes(verdict: Verdict) -> Iterator[str]:
     for effect in verdict.effects:
         sizes = [estimate_of(parameter) for parameter in effect.parameters]
         if sizes:
-            name = plain(effect.name)
-            more = " (more in table 1)" if len(sizes) > 4 else ""
-            yield f"{name[:1].upper()}{name[1:]}: {', '.join(sizes[:4])}{more}."
+            more = " (more in table 1)" if len(sizes) > _MOST_SIZES else ""
+            spread = f"; {differing(effect)}" if differing(effect) else ""
+            told = ", ".join(sizes[:_MOST_SIZES])
+            yield f"{capital(called(effect))}: {told}{more}{spread}."
 
 
-def _reason(verdict: Verdict) -> str:
-    why = verdict.why.strip().rstrip(".")
-    told = [f"Why: {why}."] if why else []
-    if verdict.detected_from:
-        told.append(f"Detected from: {plain(verdict.detected_from).rstrip('.')}.")
-    return " ".join(told)
+def _detected_from(verdict: Verdict) -> str:
+    told = readable(verdict.detected_from).rstrip(".")
+    return f"Detected from: {told}." if told else ""
+
+
+def _before_and_after(where: pd.DataFrame) -> str:
+    """The gap over all readings, without and with the effects."""
+    rows = where[(where["by"] == "all") & where["gap"].notna()] if len(where) else where
+    sizes = {
+        row["model"]: f"{fixed(row['gap'])} ({fixed(row['gap_low'])} to {fixed(row['gap_high'])})"
+        for row in rows.to_dict("records")
+    }
+    if "base" not in sizes:
+        return ""
+    told = f"Gap over all readings, in noise SD (95 % interval): {sizes['base']} with the base"
+    after = sizes.get("with_effects", sizes["base"])
+    return f"{told}." if after == sizes["base"] else f"{told}, {after} with the effects."
 
 
 def _where(where: pd.DataFrame) -> str:
@@ -61,25 +99,16 @@ def _where(where: pd.DataFrame) -> str:
         return "Base model and measurement agree within the noise at every joint in every test."
     ordered = rows.sort_values("gap", ascending=False, kind="stable")
     places = [
-        f"{row['joint']}, {axis(row['coordinate'])}, {plain(row['test'])}: "
+        f"{row['joint']} in {axis(row['coordinate'])}, test {plain(row['test'])}: "
         f"{fixed(row['gap'], 1)} ({fixed(row['gap_low'], 1)} to {fixed(row['gap_high'], 1)})"
         for row in ordered.head(_MOST_PLACES).to_dict("records")
     ]
     total = f"{len(rows)} of {count(int(chosen.sum()), 'place')}"
+    chance = fixed(_BY_CHANCE * float(chosen.sum()), 0)
     return (
-        f"Where the base is off (gap in noise SD, 95 % interval): {'; '.join(places)}. "
-        f"The gap is above the noise at {total}."
+        f"Where the base is off most (gap in noise SD, 95 % interval): {'; '.join(places)}. "
+        f"The gap is above the noise at {total}; noise alone would do that at about {chance}."
     )
-
-
-def _not_testable(verdict: Verdict) -> str:
-    names = [plain(one.name) for one in verdict.not_testable]
-    if not names:
-        return ""
-    told = f"These tests cannot show {listed(names, 8, 'or')}"
-    if verdict.answer is Answer.NULL:
-        return f"{told}: nothing is said about them."
-    return f"{told}; a table below says what would."
 
 
 def _noise(verdict: Verdict) -> str:

@@ -1,4 +1,4 @@
-"""Figure: measured and modelled motion along the load steps, where they disagree most."""
+"""Figure: measured less modelled motion along the load steps, where they disagree most."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,12 +12,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.named import case, short
+from spinepipe.report.cohort.named import short
 from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.report.discrepancy.words import capital, plain
 from spinepipe.report.layout import explain_marks
 from spinepipe.report.sections import sections
-from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, saying
-from spinepipe.report.words import AXIS, POSITIVE, number
+from spinepipe.report.style import BLACK, GREY, INK, OURS, SMALL_PT, THEIRS, saying
+from spinepipe.report.words import AXIS, number, unit
 
 MOST_PLACES, FEWEST_PLACES = 6, 3
 CLEARLY = 1.5
@@ -25,7 +26,13 @@ CLEARLY = 1.5
 
 PLACE = ["specimen", "test", "joint", "coordinate"]
 
-_PANEL_MM, _KEY_MM = 56.0, 15.0
+MODELS: dict[str, dict[str, Any]] = {
+    "base": {"color": THEIRS, "ls": "--", "lw": 1.0, "marker": "s", "ms": 3.0, "mew": 0.0},
+    "with_effects": {"color": OURS, "ls": "-", "lw": 1.2, "marker": "o", "ms": 2.6, "mew": 0.0},
+}
+"""How each model is drawn."""
+
+_PANEL_MM, _KEY_MM = 50.0, 17.0
 _BAND_SD = 1.96
 
 
@@ -43,6 +50,7 @@ def gap_by_step_figure(
         rows = gap[(gap[PLACE] == list(place)).all(axis=1)].sort_values("step")
         _draw(axis, rows, added)
         _label(axis, index, place, len(cohort.specimen_names))
+        _reach(axis, rows["measured"].to_numpy(float), unit(place[-1]))
     explain_marks(figure, _handles(added), _words(places, gap), 4)
     return figure
 
@@ -61,33 +69,42 @@ def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
 def _draw(axis: Axes, rows: pd.DataFrame, with_effects: bool) -> None:
     x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
     band = _BAND_SD * rows["noise_sd"].to_numpy(float)
-    axis.fill_between(x, measured - band, measured + band, color=GREY, alpha=0.25, lw=0, zorder=1)
-    axis.plot(x, measured, "o", color=BLACK, ms=2.2, mew=0.0, zorder=4)
-    axis.plot(x, rows["base"].to_numpy(float), color=THEIRS, ls="--", lw=1.2, zorder=3)
-    if with_effects:
-        axis.plot(x, rows["with_effects"].to_numpy(float), color=OURS, lw=1.4, zorder=3)
+    axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
+    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
+    for name, look in MODELS.items() if with_effects else [("base", MODELS["base"])]:
+        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **look)
     axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
 
 
 def _label(axis: Axes, index: int, place: tuple[Any, ...], specimens: int) -> None:
     specimen, test, joint, coordinate = place
     whose = f", {short(str(specimen), 14)}" if specimens > 1 else ""
-    axis.set_title(f"{chr(ord('a') + index)}   {joint}{whose}\n{short(case(str(test)), 34)}")
-    unit = "mm" if coordinate in ("anterior", "superior", "right") else "°"
-    axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit}), + {POSITIVE[coordinate]}")
+    axis.set_title(
+        f"{chr(ord('a') + index)}   {joint}{whose}\n{short(capital(plain(str(test))), 34)}"
+    )
+    axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
     axis.set_xlabel("load step")
     axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
     axis.tick_params(axis="y", length=2.5)
 
 
+def _reach(axis: Axes, measured: np.ndarray, of: str) -> None:
+    """How far the joint moved: the size of the motion that the difference is a part of."""
+    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
+    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
+    axis.text(0.02, 1.0, words, transform=axis.transAxes, va="top", fontsize=SMALL_PT,
+              color=INK[GREY], in_layout=False)  # fmt: skip
+    axis.margins(y=0.18)
+
+
 def _handles(with_effects: bool) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=BLACK, marker="o", ms=2.6, lw=0, label="measured, mean of cycles"),
-        Patch(facecolor=GREY, alpha=0.25, lw=0, label="its noise, 95 %"),
-        Line2D([], [], color=THEIRS, ls="--", lw=1.2, label="base model"),
+        Patch(facecolor=GREY, alpha=0.25, lw=0, label="noise of the mean of the cycles, 95 %"),
+        Line2D([], [], label="measured less base model", **MODELS["base"]),
     ]
     if with_effects:
-        handles.append(Line2D([], [], color=OURS, lw=1.4, label="with the effects"))
+        label = "measured less model with the effects"
+        handles.append(Line2D([], [], label=label, **MODELS["with_effects"]))
     return handles
 
 

@@ -20,11 +20,11 @@ from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, sayin
 
 KINDS = {"specimen": "One specimen left out", "test": "One test left out"}
 MODELS = {
-    "rms_base": (THEIRS, "s", "base model"),
-    "rms_surrogate": (GREY, "D", "generic surrogate without physics"),
-    "rms_with_effects": (OURS, "o", "with the effects"),
+    "rms_base": (THEIRS, "s", 6.0, "base model"),
+    "rms_surrogate": (GREY, "D", 4.0, "generic surrogate without physics"),
+    "rms_with_effects": (OURS, "o", 3.6, "with the effects"),
 }
-"""Colour, shape and words of each model."""
+"""Colour, shape, size (pt) and words of each model; what lies below is larger."""
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 5.2, 20.0, 14.0
 _WIDE = 8.0
@@ -52,8 +52,8 @@ def gap_held_out_figure(
         axis.set_ylim(len(folds) - longest - 0.7, len(folds) - 0.3)
         _scale(axis, values)
     handles = [
-        Line2D([], [], color=color, marker=shape, ms=4.0, lw=0, label=words)
-        for color, shape, words in shown.values()
+        Line2D([], [], color=color, marker=shape, ms=size, lw=0, label=words)
+        for color, shape, size, words in shown.values()
     ]
     handles.append(Line2D([], [], color=BLACK, lw=0.8, ls="--", label="only noise"))
     explain_marks(figure, handles, _words(added), len(handles))
@@ -68,8 +68,8 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: list[str]) -> None:
             continue
         axis.plot([found.min(), found.max()], [y, y], color=GREY, lw=0.6, zorder=2)
         for name in names:
-            color, shape, _ = MODELS[name]
-            axis.plot([row[name]], [y], shape, color=color, ms=4.0, mew=0.0, zorder=4)
+            color, shape, size, _ = MODELS[name]
+            axis.plot([row[name]], [y], shape, color=color, ms=size, mew=0.0, zorder=4)
     axis.axvline(1.0, color=BLACK, lw=0.8, ls="--", zorder=1)
     axis.set_yticks(range(len(rows)), [_name(fold, kind) for fold, kind in
                                        zip(rows["fold"], rows["kind"], strict=True)])  # fmt: skip
@@ -94,5 +94,8 @@ def _scale(axis: Axes, values: np.ndarray) -> None:
 
 
 def _words(added: bool) -> str:
-    told = "Each row was left out of all fits and then predicted; 1 is what noise alone leaves."
+    told = (
+        "Left out and then predicted. 1: noise alone; what posture, frames and loads leave open "
+        "may add a little."
+    )
     return told if added else f"{told} No effect was added: there is one model."

@@ -9,9 +9,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.named import case, short
+from spinepipe.report.cohort.named import short
 from spinepipe.report.discrepancy.heat import draw_heat, empty_cell, name_cells
 from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.report.discrepancy.words import capital, plain
 from spinepipe.report.layout import explain_marks
 from spinepipe.report.spread import Array, finite
 from spinepipe.report.style import TALLEST_MM, WIDTH_MM, blank, saying
@@ -57,8 +58,11 @@ def gap_map_figure(cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.Dat
         for side, model in enumerate(models):
             axis = line[first + side]
             part = rows[(rows["test"] == test) & (rows["model"] == model)]
-            image = draw_heat(axis, _square(part, cohort.joint_names[::-1], columns), scale,
-                              1 if numbers else None)  # fmt: skip
+            grid, low = (
+                _square(part, name, cohort.joint_names[::-1], columns)
+                for name in ("gap", "gap_low")
+            )
+            image = draw_heat(axis, grid, scale, 1 if numbers else None, low <= 0.0)
             _label(axis, cohort.joint_names[::-1], columns, MODELS[model], side == 0)
         _heading(line[first], place, test, across)
     bar = figure.colorbar(image, ax=[axis for line in axes for axis in line], location="bottom",
@@ -103,9 +107,9 @@ def _room(panels: int, columns: int, joints: int) -> bool:
     return cell_mm >= _CELL_WITH_NUMBER_MM and joints * _ROW_WITH_NUMBER_MM <= TALLEST_MM / 2.0
 
 
-def _square(rows: pd.DataFrame, joints: Sequence[str], columns: Sequence[str]) -> Array:
-    """(J, C) gaps, joints from cranial to caudal; NaN where there is none."""
-    wide = rows.pivot_table("gap", "joint", "coordinate", aggfunc="first")
+def _square(rows: pd.DataFrame, value: str, joints: Sequence[str], columns: Sequence[str]) -> Array:
+    """(J, C) of one of the table's values, cranial to caudal; NaN where there is none."""
+    wide = rows.pivot_table(value, "joint", "coordinate", aggfunc="first")
     return wide.reindex(index=list(joints), columns=list(columns)).to_numpy(float)
 
 
@@ -119,7 +123,7 @@ def _label(
 
 def _heading(axis: Axes, place: int, test: str, across: int) -> None:
     """Letter and test above the pair of panels."""
-    words = f"{chr(ord('a') + place)}   {short(case(test), 96 // across)}"
+    words = f"{chr(ord('a') + place)}   {short(capital(plain(test)), 96 // across)}"
     axis.annotate(words, (0.0, 1.0), (0.0, 13.0), xycoords="axes fraction", va="bottom",
                   textcoords="offset points", fontsize=7.5, fontweight="bold",
                   annotation_clip=False, in_layout=False)  # fmt: skip
@@ -127,7 +131,7 @@ def _heading(axis: Axes, place: int, test: str, across: int) -> None:
 
 def _words(rows: pd.DataFrame, tests: Sequence[str], models: Sequence[str]) -> str:
     every = rows["test"].nunique()
-    told = ["0: only noise is left; all specimens and load steps together"]
+    told = ["White: noise may be all (its 95 % interval reaches 0); all specimens and steps"]
     if len(models) == 1:
         told.append("no effect was added, so there is one model")
     if every > len(tests):

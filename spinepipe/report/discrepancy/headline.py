@@ -1,7 +1,17 @@
 """The verdict in one sentence, and how sure it is in another."""
 
 from spinepipe.report.discrepancy.verdict import Answer, Missing, Verdict
-from spinepipe.report.discrepancy.words import listed, plain, what_of, where_of, with_article
+from spinepipe.report.discrepancy.words import (
+    axis,
+    called,
+    capital,
+    listed,
+    plain,
+    readable,
+    what_of,
+    where_of,
+    with_article,
+)
 from spinepipe.report.words import fixed, number
 
 
@@ -30,7 +40,7 @@ def _one_of(verdict: Verdict) -> str:
     told = f"one of these is missing{where}, and these tests cannot tell which: {names}."
     if verdict.effects:
         return f"The model lacks {_and(verdict.effects)}. Besides, {told}"
-    return told[:1].upper() + told[1:]
+    return capital(told)
 
 
 def _nothing(verdict: Verdict) -> str:
@@ -38,25 +48,48 @@ def _nothing(verdict: Verdict) -> str:
     if not gaps:
         return "Nothing is missing above the noise."
     low, high = number(min(gaps), 2), number(max(gaps), 2)
-    most = (
-        f"{low} to {high} noise SD, depending on the effect" if low != high else f"{low} noise SD"
+    most = "" if low == high else f" (the easiest to see) to {high} (the hardest)"
+    return (
+        "Nothing is missing above the noise. An effect would have been named from a gap of "
+        f"{low} noise SD{most}."
     )
-    return f"Nothing is missing above the noise. A gap would have been named from {most}."
 
 
 def _unknown(verdict: Verdict) -> str:
-    told = "Something is missing that is none of the known effects"
-    where = f": {verdict.unknown_where}" if verdict.unknown_where else ""
+    if _no_base(verdict):
+        return "Nothing can be said of what is missing: the base model cannot be fitted."
+    if verdict.suspicions and verdict.why:
+        return f"{capital(readable(verdict.why)).rstrip('.')}."
+    told = "something is missing that is none of the known effects"
+    if not _of_unknown_shape(verdict):
+        told = "something is missing, but no name is believed"
     if verdict.effects:
-        beside = f"Beyond that, {told[:1].lower()}{told[1:]}"
-        return f"The model lacks {_and(verdict.effects)}. {beside}{where}."
-    return f"{told}{where}."
+        told = f"The model lacks {_and(verdict.effects)}. Beyond that, {told}"
+    first = readable(verdict.unknown_where).split(";")[0].partition(" (gap")[0]
+    place = ", ".join(axis(part.replace(" ", "_")) for part in first.split(", "))
+    where = f" It shows most at {place}." if first and not first.startswith(_NOWHERE) else ""
+    return f"{capital(told)}.{where}"
+
+
+_NOWHERE = "no single place"
+
+
+def _of_unknown_shape(verdict: Verdict) -> bool:
+    """Whether the reason for no name is what generic shapes explain and known effects do not."""
+    why = verdict.why
+    return not why or verdict.unknown_shape in why or " stays" in why
+
+
+def _no_base(verdict: Verdict) -> bool:
+    """Whether there is no motion of a base model that measured motion could be held against."""
+    return bool(verdict.why) and not verdict.effects and verdict.rms_residual.base is None
 
 
 def how_sure(verdict: Verdict) -> str:
     """Evidence, margin to the runner-up, and what held-out motion says."""
     parts = [
         *(_evidence(effect, verdict) for effect in verdict.effects),
+        _why_unknown(verdict),
         _shape(verdict),
         _misfit(verdict),
         _closed(verdict),
@@ -67,8 +100,7 @@ def how_sure(verdict: Verdict) -> str:
 def _evidence(effect: Missing, verdict: Verdict) -> str:
     if effect.log_evidence is None:
         return ""
-    name = plain(effect.name)
-    told = f"{name[:1].upper()}{name[1:]}: log evidence {number(effect.log_evidence)}"
+    told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
     if verdict.threshold is not None:
         told += f", {number(verdict.threshold, 2)} is needed"
     rivals = [rival for rival in effect.rivals if rival.margin is not None]
@@ -78,10 +110,32 @@ def _evidence(effect: Missing, verdict: Verdict) -> str:
     return f"{told}."
 
 
-def _shape(verdict: Verdict) -> str:
-    if verdict.answer is not Answer.UNKNOWN or not verdict.unknown_shape:
+def _why_unknown(verdict: Verdict) -> str:
+    """Why no name is given, where that is more than the shape of what is missing."""
+    shape = verdict.unknown_shape
+    if verdict.answer is not Answer.UNKNOWN or not verdict.why or (shape and shape in verdict.why):
         return ""
-    return f"Its shape: {verdict.unknown_shape.rstrip('.')}."
+    if verdict.suspicions:
+        return ""  # the headline says it
+    return f"Why no name: {readable(verdict.why).rstrip('.')}."
+
+
+def _shape(verdict: Verdict) -> str:
+    known = verdict.unknown_shape and not _no_base(verdict) and _of_unknown_shape(verdict)
+    if verdict.answer is not Answer.UNKNOWN or not known:
+        return ""
+    shape = readable(verdict.unknown_shape).rstrip(".")
+    for spread, words in _SPREADS.items():
+        shape = shape.removesuffix(spread) + words if shape.endswith(spread) else shape
+    return f"Its shape: {shape}."
+
+
+_SPREADS = {
+    ", each joint of each specimen": ", of its own in each joint of each specimen",
+    ", by joint": ", of its own in each joint",
+    ", shared": ", alike in all joints and specimens",
+}
+"""How a shape differs between places, in the words of results and of the page."""
 
 
 def _misfit(verdict: Verdict) -> str:
@@ -97,8 +151,10 @@ def _misfit(verdict: Verdict) -> str:
 
 def _closed(verdict: Verdict) -> str:
     closed = verdict.gap.held_out_closed
-    if closed is None:
+    if closed is None or not (verdict.effects or verdict.candidates):
         return ""
     share = f"{100.0 * closed:.0f} %" if closed < 0.995 else ">99 %"
     share = "100 %" if closed >= 1.0 else share
-    return f"On motion held out of the fits {share} of the gap is closed."
+    before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
+    sizes = "" if before is None or after is None else f", {fixed(before)} to {fixed(after)}"
+    return f"On motion held out of the fits {share} of the gap is closed{sizes}."

@@ -1,6 +1,6 @@
 """The report of a search for missing effects."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import pandas as pd
 
@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.discrepancy.findings import findings, warnings
 from spinepipe.report.discrepancy.headline import headline, how_sure
 from spinepipe.report.discrepancy.tables import shown_tables
-from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.report.discrepancy.verdict import Answer, Verdict
 from spinepipe.report.page.document import Document, Headline, Picture
 from spinepipe.report.page.results import Results
 from spinepipe.studies import Discrepancy
@@ -22,9 +22,9 @@ TITLES = {
     "gap_by_step": "The gap along the load",
     "effect_evidence": "Evidence for each effect",
     "gap_held_out": "Proof on motion held out",
-    "effect_confusions": "What these tests could tell apart",
+    "effect_confusions": "What these tests could tell apart, and see",
 }
-READ = ("where", "candidates", "held_out")
+READ = ("where", "candidates", "held_out", "confusions")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
@@ -35,7 +35,7 @@ def discrepancy_page(study: Discrepancy, cohort: Cohort, results: Results, verdi
         findings=findings(verdict, results),
         pictures=[
             Picture.of(name, TITLES[name], svg, " ".join(results.captions[name].split()))
-            for name, svg in results.pictures.items()
+            for name, svg in _ordered(results.pictures, verdict)
         ],
         tables=shown_tables(verdict, results),
         metadata=results.metadata,
@@ -44,6 +44,12 @@ def discrepancy_page(study: Discrepancy, cohort: Cohort, results: Results, verdi
         headline=Headline(headline(verdict), _joined(how_sure(verdict)), warnings(verdict)),
     )
     return whole.html(study, cohort)
+
+
+def _ordered(pictures: Mapping[str, str], verdict: Verdict) -> list[tuple[str, str]]:
+    """Where nothing is missing, what could have been seen comes first."""
+    first = "effect_confusions" if verdict.answer is Answer.NULL else ""
+    return sorted(pictures.items(), key=lambda pair: pair[0] != first)
 
 
 def left_out(study: Discrepancy) -> Iterator[str]:

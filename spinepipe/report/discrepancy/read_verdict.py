@@ -20,6 +20,9 @@ from spinepipe.report.discrepancy.verdict import (
 
 Data = Mapping[str, Any]
 
+_COORDINATES = ("coordinate", "pair")
+"""Options that the scope says as well."""
+
 
 def read_verdict(path: str | Path) -> Verdict:
     """Read ``verdict.json``; keys beyond cohort and verdict may be missing."""
@@ -109,6 +112,10 @@ def _missing(data: Data | str) -> Missing:
             Rival(str(one["name"]), _number(one, "log_evidence_margin"))
             for one in _list(data, "rivals")
         ),
+        options=tuple(
+            str(value) for key, value in _part(data, "variant").items() if key not in _COORDINATES
+        ),
+        spread=_text(data.get("spread")),
     )
 
 
@@ -120,4 +127,5 @@ def _estimate(data: Data) -> Estimate:
         unit=_text(data.get("unit")),
         low=None if low is None else float(low),
         high=None if high is None else float(high),
+        at_bound=bool(data.get("at_bound", False)),
     )

@@ -1,29 +1,36 @@
 """Which tables the page of a search shows: those of the verdict, then those of the files."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.discrepancy.verdict import Verdict
-from spinepipe.report.discrepancy.words import plain, where_of
+from spinepipe.report.discrepancy.file_tables import file_tables
+from spinepipe.report.discrepancy.verdict import Missing, Verdict
+from spinepipe.report.discrepancy.words import (
+    called,
+    differing,
+    name_and_place,
+    plain,
+    readable,
+    unit_of,
+    value_of,
+    where_of,
+)
 from spinepipe.report.page.results import Results
 from spinepipe.report.page.sortable import Sortable, sortable
-from spinepipe.tables import CANDIDATES, HELD_OUT, WHERE
 from spinepipe.tables.schema import Column
 
 Records = list[dict[str, Any]]
 
-_EFFECT = Column("effect", "text", "effect, as in a model file")
+_EFFECT = Column("effect", "text", "effect")
 _COLUMNS: Mapping[str, tuple[Column, ...]] = {
     "parameters": (
         _EFFECT,
-        Column("where", "text", "joints, coordinates, specimens and tests"),
         Column("parameter", "text", "parameter of the effect"),
-        Column("value", "number", "estimate", null="not known"),
-        Column("low", "number", "lower end of the 95 % interval", null="none"),
-        Column("high", "number", "upper end of the 95 % interval", null="none"),
-        Column("unit", "text", "unit"),
+        Column("value [95 % interval]", "text", "estimate, and the interval if there is one"),
+        Column("unit", "text", "unit; none for a ratio"),
+        Column("place", "text", "joints, coordinates, specimens and tests it is of"),
     ),
     "rivals": (
         _EFFECT,
@@ -70,17 +77,20 @@ def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
         for name in _TITLES
         if made[name]
     ]
-    found += [sortable(*parts) for parts in _from_files(results) if len(parts[3])]
+    found += [sortable(*parts) for parts in file_tables(results) if len(parts[3])]
     return [table for table in found if table.rows]
 
 
 def _from_verdict(verdict: Verdict) -> dict[str, Records]:
     return {
-        "errors": [vars(one) for one in verdict.suspicions],
+        "errors": [
+            {key: readable(words) for key, words in vars(one).items()}
+            for one in verdict.suspicions
+        ],
         "parameters": [
-            {"effect": plain(effect.name), "where": where_of(effect),
-             "parameter": plain(one.name), "value": one.value, "low": one.low, "high": one.high,
-             "unit": one.unit}
+            {"effect": called(effect), "parameter": name_and_place(one)[0],
+             "value [95 % interval]": value_of(one), "unit": unit_of(one.unit),
+             "place": _place(effect, name_and_place(one)[1])}
             for effect in verdict.effects for one in effect.parameters
         ],
         "set": [
@@ -92,7 +102,11 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
             {"effect": plain(effect.name), "rival": plain(rival.name), "margin": rival.margin}
             for effect in verdict.effects for rival in effect.rivals
         ],
-        "not_testable": [vars(one) | {"effect": plain(one.name)} for one in verdict.not_testable],
+        "not_testable": [
+            {"effect": plain(one.name), "why": readable(one.why),
+             "test_that_would_tell": readable(one.test_that_would_tell)}
+            for one in verdict.not_testable
+        ],
         "detectable": [
             {"effect": plain(one.name), "gap": one.gap}
             for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
@@ -100,17 +114,6 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
     }  # fmt: skip
 
 
-def _from_files(
-    results: Results,
-) -> Iterator[tuple[str, str, str, pd.DataFrame, tuple[Column, ...]]]:
-    held_out, where = results.table("held_out"), results.table("where")
-    yield "held_out", "Held-out proof", HELD_OUT.about, held_out, HELD_OUT.columns
-    if len(where):
-        ordered = where[where["by"] != "step"].sort_values("gap", ascending=False, kind="stable")
-        yield "where", "Where the models are off", WHERE.about, ordered, WHERE.columns
-    candidates = results.table("candidates")
-    if len(candidates):
-        rows = candidates[candidates["log_evidence"].notna()]
-        ordered = rows.sort_values("log_evidence", ascending=False, kind="stable")
-        about = f"{CANDIDATES.about} Best first; rows without evidence are in candidates.parquet."
-        yield "candidates", "What was tried", about, ordered, CANDIDATES.columns
+def _place(effect: Missing, own: str) -> str:
+    """Where a value holds: where the effect is, and the places of its own or how values differ."""
+    return "; ".join(part for part in (where_of(effect), own or differing(effect)) if part)

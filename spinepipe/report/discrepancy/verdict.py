@@ -16,13 +16,20 @@ class Answer(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter with its 95 % interval, both None where there is none."""
+    """A parameter with its 95 % interval, both None where there is none.
+
+    Attributes
+    ----------
+    name : with the places it is of behind it: ``width@L4L5@s01``.
+    at_bound : whether it ended at a bound, and its value says no more than that.
+    """
 
     name: str
     value: float | None
     unit: str
     low: float | None
     high: float | None
+    at_bound: bool = False
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,7 @@ class Missing:
     ----------
     scope : joints, coordinates, specimens and tests; ``*`` stands for all.
     log_evidence : against the model without it, None where it was not told.
+    options : of its variant, in words, but for its coordinates. spread : how values may differ.
     """
 
     name: str
@@ -49,6 +57,8 @@ class Missing:
     parameters: tuple[Estimate, ...]
     log_evidence: float | None
     rivals: tuple[Rival, ...]
+    options: tuple[str, ...] = ()
+    spread: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Effects, places and misfits in plain words."""
 
+import re
 from collections.abc import Callable, Iterable
 
 from spinepipe.report.discrepancy.verdict import Estimate, Missing
@@ -11,11 +12,27 @@ _UNCOUNTED = (
     *("migration", "stiffening", "tilt", "weight"),
 )
 _MOST = 4
+_PAIRS = {"flexion extension": "flexion–extension", "bending rotation": "bending–rotation"}
+_KEYS = ("per_joint", "per_specimen")
+_NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 
 
 def plain(name: str) -> str:
     """A name of results without underscores."""
-    return name.replace("_", " ").strip()
+    words = name.replace("_", " ").strip()
+    for apart, pair in _PAIRS.items():
+        words = words.replace(apart, pair)
+    return words
+
+
+def readable(sentence: str) -> str:
+    """A sentence with its names in plain words; keys of a study file stay as they are typed."""
+    return _NAME.sub(lambda found: found[0] if found[0] in _KEYS else plain(found[0]), sentence)
+
+
+def capital(words: str) -> str:
+    """With a capital letter at the beginning."""
+    return words[:1].upper() + words[1:]
 
 
 def with_article(name: str) -> str:
@@ -65,12 +82,58 @@ def what_of(effect: Missing) -> str:
     return f"{with_article(effect.name)} {where_of(effect)}".strip()
 
 
-def estimate_of(parameter: Estimate) -> str:
-    """``width 3.1 deg (95 % interval 2.8 to 3.4)``."""
+def called(effect: Missing) -> str:
+    """``nonlinear stiffening (tangent)``: its name and the variant of it."""
+    return plain(effect.name) + (f" ({', '.join(effect.options)})" if effect.options else "")
+
+
+def differing(effect: Missing) -> str:
+    """How its values may differ from place to place; empty where there is one place or no word."""
+    return _DIFFERING.get(effect.spread, "")
+
+
+_DIFFERING = {
+    "shared": "the same in all specimens and joints",
+    "by joint": "each joint its own",
+    "by specimen": "each specimen its own",
+    "each joint of each specimen": "each joint of each specimen its own",
+    "by test": "each test its own",
+}
+
+
+def unit_of(unit: str) -> str:
+    """A unit as printed: ``°``, ``1/rad²``, nothing for a ratio."""
+    return {"deg": "°", "1": ""}.get(unit, unit.replace("^2", "²").replace("^3", "³"))
+
+
+def name_and_place(parameter: Estimate) -> tuple[str, str]:
+    """``width``, and ``L4L5, s01``: results write ``width@L4L5@s01``."""
+    name, *place = parameter.name.split("@")
+    return plain(name), ", ".join(map(plain, place))
+
+
+def value_of(parameter: Estimate) -> str:
+    """``3.1 [2.8, 3.4]``: with its 95 % interval, or what there is instead."""
     if parameter.value is None:
-        return f"{plain(parameter.name)} not known"
-    unit = "°" if parameter.unit == "deg" else f" {parameter.unit}".rstrip()
-    told = f"{plain(parameter.name)} {number(parameter.value)}{unit}"
+        return "not known"
+    value = number(parameter.value)
+    if parameter.at_bound:
+        return f"{value}, at its bound"
+    if parameter.low is None or parameter.high is None:
+        return value
+    return f"{value} [{number(parameter.low)}, {number(parameter.high)}]"
+
+
+def estimate_of(parameter: Estimate) -> str:
+    """``width 3.1° (95 % interval 2.8 to 3.4)``."""
+    name, place = name_and_place(parameter)
+    name = f"{name} ({place})" if place else name
+    if parameter.value is None:
+        return f"{name} not known"
+    unit = unit_of(parameter.unit)
+    told = f"{name} {number(parameter.value)}{unit if unit == '°' else f' {unit}'.rstrip()}"
+    if parameter.at_bound:
+        return f"{told}, at its bound"
     if parameter.low is None or parameter.high is None:
         return told
     return f"{told} (95 % interval {number(parameter.low)} to {number(parameter.high)})"
