@@ -86,6 +86,20 @@ def outcome(
     return Outcome(Verdict.NAMED, why, sure, ())
 
 
+def _without_place(found: Found) -> str:
+    """Whether effects had evidence and none kept its place."""
+    evident = [
+        one
+        for stage in found.stages[:1]
+        for one in stage.refits
+        if one.log_evidence > stage.screen.threshold
+    ]
+    if not evident:
+        return ""
+    names = _listed(list(dict.fromkeys(one.name for one in evident)), "and")
+    return f"there is evidence for {names}, but none keeps its place beside the others"
+
+
 def _mistaken(errors: Sequence[SuspectedError]) -> str:
     """Data errors are not physics: nothing is named before they are looked at."""
     if not errors:
@@ -109,7 +123,7 @@ def _unproven(found: Found, proof: HeldOut | None) -> str:
     """What is named must predict better than the base what it has not seen."""
     if not found.standing or proof is None or proof.over_base is None:
         return ""
-    if proof.beats_base and not _worse_on_tests(proof):
+    if not proof.tells or (proof.beats_base and not _worse_on_tests(proof)):
         return ""
     names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
     return (
@@ -143,7 +157,7 @@ def _unexplained(found: Found) -> str:
     lack = found.lack
     if not found.standing:
         if lack.log_evidence <= threshold:
-            return ""
+            return _without_place(found)
         return f"a discrepancy that no known effect explains: {lack.shape}"
     gain = found.base.fit.chi2 - found.final.fit.chi2
     left = 2.0 * max(lack.log_evidence, 0.0)

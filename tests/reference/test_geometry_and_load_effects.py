@@ -137,15 +137,26 @@ def test_gain_and_offset_are_other_loads(opensim_peer, seed: int) -> None:
         assert_moved(found, chain)
 
 
-def with_cable(peer, chain: Chain, tension: float):
+def through_joints(chain: Chain) -> Array:
+    """(1 + J, 3) the joints of all bodies, and a point 30 mm above the last."""
+    return np.vstack([chain.origins, chain.origins[-1] + 0.03 * chain.rotations[-1][:, 1]])
+
+
+def through_centres(chain: Chain) -> Array:
+    """(1 + J, 3) all centres of mass, and below the lowest joint as far as the first is above."""
+    return np.vstack([2.0 * chain.origins[0] - chain.centres[0], chain.centres])
+
+
+CABLES = {"joints": through_joints, "centres": through_centres}
+
+
+def with_cable(peer, chain: Chain, tension: float, guides: Array):
     """The chain in OpenSim with a path actuator from ground through all bodies, pulling always."""
     opensim = pytest.importorskip("opensim")
     built = peer.build(chain, ramp_time=1.0)
     cable = opensim.PathActuator()
     cable.setName("cable")
     cable.setOptimalForce(tension)
-    top = chain.origins[-1] + 0.03 * chain.rotations[-1][:, 1]
-    guides = [chain.origins[0], *chain.origins[1:], top]
     frames = [
         built.model.getGround(),
         *(built.model.getBodySet().get(b) for b in range(chain.n_joints)),
@@ -165,10 +176,14 @@ def with_cable(peer, chain: Chain, tension: float):
 
 @SEEDS
 @pytest.mark.parametrize("tension", [60.0, 300.0])
-def test_a_follower_load_is_a_path_actuator(opensim_peer, seed: int, tension: float) -> None:
+@pytest.mark.parametrize("guides", CABLES)
+def test_a_follower_load_is_a_path_actuator(
+    opensim_peer, seed: int, tension: float, guides: str
+) -> None:
     chain = random_chain(seed)
-    expected = opensim_peer.equilibrium_of(with_cable(opensim_peer, chain, tension)).reshape(-1, 6)
-    found = pose(chain, "follower_load", np.array([tension]))
+    cable = with_cable(opensim_peer, chain, tension, CABLES[guides](chain))
+    expected = opensim_peer.equilibrium_of(cable).reshape(-1, 6)
+    found = pose(chain, "follower_load", np.array([tension]), {"guides": guides})
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
     shortened = found[:, 1] - bridge.pose(chain)[:, 1]
     assert np.all(shortened < 0.0)

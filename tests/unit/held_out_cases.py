@@ -7,6 +7,7 @@ import numpy as np
 
 from spinepipe.discrepancy.base import base_parameters
 from spinepipe.discrepancy.forms import Form, Variant
+from spinepipe.discrepancy.found import Found
 from spinepipe.discrepancy.gaps import whole_gap
 from spinepipe.discrepancy.grounds import Grounds, Start, laid
 from spinepipe.discrepancy.hypothesis import Supposed
@@ -16,7 +17,6 @@ from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.nuisance import NuisancePriors
 from spinepipe.discrepancy.prediction import Simulated
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.search import Found
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
@@ -30,7 +30,7 @@ SD = float(np.deg2rad(0.05))
 CORRELATION = 0.3
 MOMENTS_NM = np.arange(6.0)
 AXES = {"flexion": (2, -1.0), "extension": (2, 1.0), "bending": (0, 1.0)}
-NONE = NuisancePriors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NONE = NuisancePriors(*[0.0] * 8)
 ZONE = Form(Variant("neutral_zone", ()), Spread.SHARED)
 ZONE_VALUES = np.array([0.6, 0.03])
 
@@ -76,7 +76,7 @@ def serial(steps: int) -> Array:
 
 def noise(read: Sequence[str] = ROTATIONS) -> Noise:
     sd = np.array([np.nan] * 3 + [SD if name in read else np.nan for name in ROTATIONS])
-    return Noise(sd, CORRELATION, "declared", np.zeros(6, dtype=np.int64), 0, False)
+    return Noise(sd, CORRELATION, "repeats", np.zeros(6, dtype=np.int64), 0, False)
 
 
 def noisy(q: Array, rng: np.random.Generator) -> Array:

@@ -38,15 +38,15 @@ def linear(joint: int, moments: Array, k: float) -> Array:
     return moments / k
 
 
-def frames() -> tuple[Pose, ...]:
-    return tuple(Pose(np.eye(3), np.array([0.0, 0.035 * j, 0.0])) for j in range(len(JOINTS)))
+def frames(joints: int = len(JOINTS)) -> tuple[Pose, ...]:
+    return tuple(Pose(np.eye(3), np.array([0.0, 0.035 * j, 0.0])) for j in range(joints))
 
 
-def cases(levels: Sequence[float] = SWEEP) -> list[LoadCase]:
+def cases(levels: Sequence[float] = SWEEP, joints: int = len(JOINTS)) -> list[LoadCase]:
     found = []
     for test, (axis, _) in AXES.items():
         steps = tuple(
-            LoadStep(n, (Wrench(len(JOINTS) - 1, np.zeros(3), np.zeros(3), m * np.eye(3)[axis]),))
+            LoadStep(n, (Wrench(joints - 1, np.zeros(3), np.zeros(3), m * np.eye(3)[axis]),))
             for n, m in enumerate(levels)
         )
         found.append(LoadCase(test, 1, steps))
@@ -55,31 +55,38 @@ def cases(levels: Sequence[float] = SWEEP) -> list[LoadCase]:
 
 def readings(
     seed: int = 1,
-    law: Yield = linear,
+    law: Yield | Mapping[str, Yield] = linear,
     specimens: Sequence[str] = ("a", "b", "c"),
     levels: Sequence[float] = SWEEP,
     cycles: int = 3,
     zeroed: bool = False,
     sd: float = SD,
+    joints: int = len(JOINTS),
 ) -> list[SpecimenReadings]:
-    """Specimens of different stiffness, the same at all joints, with white noise."""
+    """Specimens of different stiffness, the same at all joints, with white noise.
+
+    Parameters
+    ----------
+    law : what joints yield, or by test; linear in tests that are not named.
+    """
     rng = np.random.default_rng(seed)
     found = []
     for name in specimens:
         stiffness = STIFFNESS * np.exp(rng.normal(0.0, 0.3, 3))
         tests = []
-        for case in cases(levels):
-            q = np.zeros((len(levels), len(JOINTS), 6))
+        for case in cases(levels, joints):
+            q = np.zeros((len(levels), joints, 6))
             driven = AXES[case.test][1]
-            for joint in range(len(JOINTS)):
-                q[:, joint, driven] = law(joint, np.array(levels), stiffness[driven - 3])
+            of_test = law.get(case.test, linear) if isinstance(law, Mapping) else law
+            for joint in range(joints):
+                q[:, joint, driven] = of_test(joint, np.array(levels), stiffness[driven - 3])
             seen = q + sd * rng.standard_normal((cycles, *q.shape))
             if zeroed:
                 seen = seen - seen[:, :1]
                 seen[:, 0] = np.nan
             seen[..., :3] = np.nan
             tests.append(Repeats(case, seen))
-        found.append(SpecimenReadings(name, frames(), tuple(tests)))
+        found.append(SpecimenReadings(name, frames(joints), tuple(tests)))
     return found
 
 
@@ -97,20 +104,21 @@ def changed(
     ]
 
 
-def model(specimen: str, stiffness: Array) -> SpineModel:
+def model(specimen: str, stiffness: Array, joints: int = len(JOINTS)) -> SpineModel:
     """A weightless upright chain with linear bushings."""
+    names, poses = JOINTS[:joints], frames(joints)
     bodies = tuple(
         Body(name, 1e-6, pose.origin, 1e-9 * np.eye(3))
-        for name, pose in zip(JOINTS, frames(), strict=True)
+        for name, pose in zip(names, poses, strict=True)
     )
-    values = np.tile([1e5, 1e6, 1e5, *stiffness], (len(JOINTS), 1))
-    bushing = ScopedEffect(create("linear_bushing"), tuple(range(len(JOINTS))), values)
-    damping = np.ones((len(JOINTS), 6))
-    return SpineModel(specimen, JOINTS, frames(), bodies, np.zeros(3), damping, (bushing,))
+    values = np.tile([1e5, 1e6, 1e5, *stiffness], (joints, 1))
+    bushing = ScopedEffect(create("linear_bushing"), tuple(range(joints)), values)
+    damping = np.ones((joints, 6))
+    return SpineModel(specimen, names, poses, bodies, np.zeros(3), damping, (bushing,))
 
 
 def start(given: Sequence[SpecimenReadings], grouping: str = "per_specimen") -> Start:
     """Where fits of the readings start: the same stiffness everywhere."""
-    models: Mapping[str, SpineModel] = {r.specimen: model(r.specimen, STIFFNESS) for r in given}
+    models = {r.specimen: model(r.specimen, STIFFNESS, len(r.frames)) for r in given}
     base = {name: base_parameters(m, grouping, ROTATIONS) for name, m in models.items()}
     return Start(models, base, 100.0)

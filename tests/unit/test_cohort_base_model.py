@@ -225,6 +225,17 @@ def test_a_file_that_does_not_fit_is_refused(
     assert says in told
 
 
+def test_paths_count_from_the_project_wherever_one_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stiffening(tmp_path / "project", FOR_ALL)
+    monkeypatch.chdir(tmp_path)
+    study, _ = studies.check(tmp_path / "project", STUDY)
+    assert isinstance(study, CohortStiffness)
+    assert study.base is not None
+    assert study.base.model == "model.yaml"
+
+
 def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
     model = FOR_ALL.replace("  values", "  scope: {tests: [flexon], specimens: [x]}\n  values")
     assert len(complaints(tmp_path, model)) == 2

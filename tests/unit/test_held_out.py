@@ -9,6 +9,7 @@ from held_out_cases import (
     CYCLES,
     JOINTS,
     MOMENTS_NM,
+    NONE,
     SD,
     found,
     grounds,
@@ -17,7 +18,6 @@ from held_out_cases import (
 )
 
 from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.nuisance import NuisancePriors
 from spinepipe.discrepancy.proof.held_out import Asked, held_out, together
 from spinepipe.discrepancy.proof.held_out_rows import NO_FIT, NOT_DETERMINED, SCORED, FoldRow
 from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
@@ -27,7 +27,7 @@ from spinepipe.effects.contract import Array
 
 STEPS = len(MOMENTS_NM)
 EXTENSION, BENDING = 3, 4
-GAIN = NuisancePriors(0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 0.0)
+GAIN = replace(NONE, load_gain=0.05)
 
 
 def compliance(mean: Array, moments: Array) -> float:
@@ -140,12 +140,19 @@ def test_with_nothing_named_the_base_stands_in_for_the_model_with_effects() -> N
     assert (result.motion["b"].fold[0][..., 3:] == 0).all()  # the test's fold, not the specimen's
 
 
-def test_a_load_gain_found_in_one_test_says_nothing_of_another() -> None:
+@pytest.mark.parametrize(("shown", "size"), [(0.08, 1.0), (0.0, 0.03)])
+def test_a_load_gain_found_in_one_test_says_nothing_of_another(shown: float, size: float) -> None:
+    """Gains of 8 % are as large as a prior SD of 5 % and more; of none, the least size is left."""
     readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
+    gains = (1.0 + shown, 1.0 - shown)
+    tests = [replace(t, cycles=g * t.cycles) for t, g in zip(readings[0].tests, gains, strict=True)]
+    readings = (replace(readings[0], tests=tuple(tests)),)
     result = held_out(found(grounds(readings, GAIN), False), Asked(), at_once)
     assert result.motion["a"].base_nuisances[0][..., 3:] == pytest.approx(0.0)
     # a gain of 5 % in the unseen test: 0.05 x motion, in noise SDs of the mean
-    motion = 0.05 * MOMENTS_NM * compliance(readings[0].tests[1].mean[..., 3], MOMENTS_NM)
+    signed = zip((-1.0, 1.0), readings[0].tests, strict=True)
+    both = np.mean([compliance(t.mean[..., 3], side * MOMENTS_NM) for side, t in signed])
+    motion = size * 0.05 * MOMENTS_NM * both
     precision = CYCLES / SD**2 * np.linalg.inv(serial(STEPS))
     left_open = JOINTS * motion @ precision @ motion
     row = result.folds[0]
@@ -167,14 +174,15 @@ def test_a_fold_without_a_fit_says_why() -> None:
 
 def row(name: str, base: float, effects: float, other: float) -> FoldRow:
     gaps = [Gap(chi2, 10.0, 10) for chi2 in (base, effects, other)]
-    return FoldRow(name, "test", 10, 10, *gaps, 12.0, SCORED, "")
+    return FoldRow(name, "test", 10, 10, *gaps, 11.0, SCORED, "")
 
 
 def test_folds_are_pooled_by_their_sums() -> None:
     rows = [row("a", 100.0, 12.0, 30.0), row("b", 60.0, 9.0, 8.0), row("c", 80.0, 15.0, 40.0)]
     result = together(rows, {})
     assert result.base == Gap(240.0, 30.0, 30)
-    assert result.closed == pytest.approx((240.0 - 36.0) / (240.0 - 30.0))
+    # noise and open nuisances make 11 of each fold's chi2
+    assert result.closed == pytest.approx((240.0 - 36.0) / (240.0 - 33.0))
     assert rows[1].closed == 1.0  # no more than all of it
     assert result.over_base is not None
     assert result.over_surrogate is not None

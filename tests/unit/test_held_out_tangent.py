@@ -40,15 +40,16 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
             for one in tangent(base, 1.0).members["a"].nuisances
         ]
     )
+    # linearised at the fit before nuisances were allowed for: 1e-4 away
     moved_by = nuisance_signatures(base.fit.models["a"], readings[0].cases, False, priors)
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])
-    assert columns @ columns.T == pytest.approx(given @ given.T, abs=(1e-2 * SD) ** 2 + 1e-9)
+    assert columns @ columns.T == pytest.approx(given @ given.T, rel=1e-3, abs=(1e-2 * SD) ** 2)
 
 
 def test_the_surrogate_is_the_base_with_terms_of_all_joints_and_of_each() -> None:
     readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=False)
     base = grounds(readings)
-    model = surrogate(base)
+    model = surrogate(base, 1.0)
     known = len(base.fit.x)
     one = model.members["a"]
     first, added = one.by_x[0], len(model.mean) - known

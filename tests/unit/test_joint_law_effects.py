@@ -67,6 +67,19 @@ def test_a_spring_with_a_neutral_zone() -> None:
     assert of_a_spring(law, 0.02, 0.3, 0.02) == pytest.approx(1.0 - 0.7 * 0.975)
 
 
+@pytest.mark.parametrize(
+    ("coordinate", "widest_deg"),
+    [("extension", 7.5), ("right_bending", 7.5), ("left_rotation", 2.5)],
+)
+def test_a_neutral_zone_is_no_wider_than_five_usual_ones(
+    coordinate: str, widest_deg: float
+) -> None:
+    """Wider, all motion would lie inside: a softer joint by another name."""
+    _, width = create("neutral_zone", {"coordinate": coordinate}).parameters
+    assert np.rad2deg(width.high) == pytest.approx(widest_deg)
+    assert np.rad2deg(width.default) == pytest.approx(widest_deg / 5.0)
+
+
 def test_a_spring_that_is_stiffer_to_one_side() -> None:
     law = law_of(("flexion_extension_asymmetry", {}))
     assert of_a_spring(law, 0.1, 0.2) == pytest.approx(6.0)

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, SpineModel
 from spinepipe.statics import Chain, System
 from spinepipe.statics.motion import ChainMotion
@@ -28,6 +29,7 @@ EFFECTS = {
     "weight of each": ("segment_weight", {"where": "each"}, (1.3,)),
     "weight on top": ("segment_weight", {"where": "top"}, (2.0,)),
     "follower load": ("follower_load", {}, (80.0,)),
+    "follower load beside": ("follower_load", {"guides": "centres"}, (80.0,)),
     "misalignment": ("load_misalignment", {}, (0.06, -0.04)),
     "gain": ("load_gain", {}, (0.05,)),
     "offset": ("load_offset", {}, (0.3, -0.2, 0.4)),
@@ -142,27 +144,28 @@ def test_weight_goes_nowhere_else() -> None:
         create("segment_weight", {"where": "bottom"})
 
 
-def cable_lengths(model: SpineModel, q: Array) -> Array:
+def cable_lengths(model: SpineModel, q: Array, name: str) -> Array:
     """(3,) m: guide to guide, the guides carried by the vertebrae."""
     motion = motion_of(model, q)
     origins, top = [frame.origin for frame in model.frames], model.frames[TOP]
-    guides = [
-        origins[0],
-        motion.displacement(0).apply(origins[1]),
-        motion.displacement(1).apply(origins[2]),
-        motion.displacement(2).apply(origins[2] + 0.03 * top.rotation[:, 1]),
-    ]
+    ground, *carried = [*origins, origins[2] + 0.03 * top.rotation[:, 1]]
+    if name == "follower load beside":
+        carried = [body.com for body in model.bodies]
+        ground = origins[0] - (carried[0] - origins[0])
+    guides = [ground, *(motion.displacement(b).apply(point) for b, point in enumerate(carried))]
     return np.linalg.norm(np.diff(guides, axis=0), axis=1)
 
 
+@pytest.mark.parametrize("name", ["follower load", "follower load beside"])
 @pytest.mark.parametrize("joints", [(0, 1, 2), (0,), (1, 2)])
-def test_follower_load_does_the_work_of_a_cable(joints: tuple[int, ...]) -> None:
+def test_follower_load_does_the_work_of_a_cable(joints: tuple[int, ...], name: str) -> None:
     """80 N times what each coordinate shortens the cable by."""
     model, q = spine(3), pose()
-    found = applied("follower load", motion_of(model, q), joints)
+    found = applied(name, motion_of(model, q), joints)
     for coordinate, size in enumerate(np.tile([1e-4] * 3 + [1e-3] * 3, 3)):
         along = size * np.eye(18)[coordinate]
-        longer = slope(lambda h, a=along: cable_lengths(model, q + h * a), 1)[list(joints)].sum()
+        by_segment = slope(lambda h, a=along: cable_lengths(model, q + h * a, name), 1)
+        longer = by_segment[list(joints)].sum()
         assert found[coordinate] == pytest.approx(-80.0 * longer / size, abs=1e-7)
 
 
@@ -179,6 +182,31 @@ def test_follower_load_of_an_untranslated_spine_only_compresses() -> None:
         up = frame.rotation.T @ (ends[joint] - frame.origin)
         turned = Rotation.from_euler("ZXY", q[joint, 3:]).apply(up / np.linalg.norm(up))
         np.testing.assert_allclose(load[joint, :3], -80.0 * turned, rtol=0, atol=1e-12)
+
+
+def test_follower_load_beside_a_joint_turns_it() -> None:
+    """One upright joint, the centre of mass 10 mm ahead and 20 mm above, the guide of ground as far
+    behind and below: at rest the cable passes through the joint, 5 mm forward it does not."""
+    ahead = Body("L1", 1.0, np.array([0.01, 0.02, 0.0]), 1e-3 * np.eye(3))
+    model = replace(
+        spine(1, gravity=False), bodies=(ahead,), frames=(Pose(np.eye(3), np.zeros(3)),)
+    )
+    q = np.zeros(6)
+    load = applied("follower load beside", motion_of(model, q), (0,))
+    down = -80.0 * np.array([0.02, 0.04, 0.0]) / np.hypot(0.02, 0.04)
+    np.testing.assert_allclose(load[:3], down, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(load[3:], 0.0, rtol=0, atol=1e-12)
+    q[0] = 0.005
+    load = applied("follower load beside", motion_of(model, q), (0,))
+    pull = -80.0 * np.array([0.025, 0.04, 0.0]) / np.hypot(0.025, 0.04)
+    np.testing.assert_allclose(load[:3], pull, rtol=0, atol=1e-12)
+    # about the moved joint: (0.01, 0.02) x pull along z, positive towards extension
+    assert load[3] == pytest.approx(0.01 * pull[1] - 0.02 * pull[0], abs=1e-12)
+
+
+def test_follower_load_has_guides_that_exist() -> None:
+    with pytest.raises(ValueError, match="guides 'discs', allowed: joints, centres"):
+        create("follower_load", {"guides": "discs"})
 
 
 def about(main: int, size: float) -> Array:

@@ -24,7 +24,7 @@ UP_AND_DOWN = (0.0, 2.5, 5.0, 7.5, -2.5, -5.0, -7.5)
 SPINE = ("L5S1", "L4L5", "L3L4")
 AXES = {"flexion": (2, -1.0), "bending": (0, 1.0), "turning": (1, 1.0)}
 NEEDED = 6.0
-NO_NUISANCE = NuisancePriors(*[0.0] * 7)
+NO_NUISANCE = NuisancePriors(*[0.0] * 8)
 
 
 def spine_of(joints: int, name: str = "a") -> SpineModel:

@@ -55,7 +55,7 @@ def held_out(found: Found, asked: Asked, run: Run) -> HeldOut:
     if asked.specimens:
         folds += folds_by_specimen(readings)
     rows = [_row(models, fold, number, motion) for number, fold in enumerate(folds)]
-    if asked.tests and len(readings) == 1 and all(row.status != SCORED for row in rows):
+    if asked.tests and len(readings) == 1 and not together(rows, motion).tells:
         rows.append(_row(models, step_fold(readings), len(rows), motion))
     return together(rows, motion)
 

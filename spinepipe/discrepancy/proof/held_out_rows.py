@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.proof.held_out_motion import HeldOutMotion
 
+SAME = 1e-6
+"""Share of chi2 by which predictions that hang on nothing that was scored may differ."""
+
 SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 
 
@@ -75,6 +78,13 @@ class HeldOut:
     def closed(self) -> float | None:
         """Share of the base's excess that the effects close; None where noise hides the excess."""
         return closed(self.base, self.with_effects, self.expected)
+
+    @property
+    def tells(self) -> bool:
+        """Whether any scored reading is predicted otherwise with the effects than without."""
+        if self.over_base is None:
+            return False
+        return abs(self.over_base.chi2) > (SAME * self.base.chi2 if self.base else 0.0)
 
     @property
     def beats_base(self) -> bool:

@@ -1,0 +1,169 @@
+"""Fitted models as files: read back, they move as the fit's own do; values in units of tables."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import spring_chain_cases as chains
+from search_cases import JOINTS, Array
+
+from spinepipe.discrepancy.base import base_parameters
+from spinepipe.discrepancy.forms import Form, Variant
+from spinepipe.discrepancy.hypothesis import Hypothesis, Member, Supposed, Unknown, hypothesis
+from spinepipe.discrepancy.joint_fit import JointFit
+from spinepipe.discrepancy.model_files import model_file
+from spinepipe.discrepancy.prediction import Simulated
+from spinepipe.discrepancy.values import FittedValue, fitted_values
+from spinepipe.effects import Spread
+from spinepipe.model import ScopedEffect
+from spinepipe.model.file import effects_for, read_model, write_model
+from spinepipe.statics import moved
+from spinepipe.units import ROTATIONS
+
+NAMES = ("a", "b")
+LAXITY = Variant("local_laxity", ())
+ASYMMETRY = Variant("flexion_extension_asymmetry", ())
+OFFSET = Variant("load_offset", ())
+
+
+def fitted(*supposed: Supposed) -> JointFit:
+    """Models moved at random from where their fit starts, as if it had ended there."""
+    models = {name: chains.model(name, chains.STIFFNESS, JOINTS) for name in NAMES}
+    base = {name: base_parameters(model, "per_joint", ROTATIONS) for name, model in models.items()}
+    started = hypothesis(models, base, supposed, tuple(chains.AXES), 100.0)
+    x = np.random.default_rng(2).uniform(0.01, 0.05, len(started.unknowns))
+    ended = {
+        name: moved(member.model, member.free, x[list(member.numbers)])
+        for name, member in started.members.items()
+    }
+    bound = np.zeros(len(x), dtype=bool)
+    return JointFit(started, x, ended, 1.0, {}, {}, {}, bound, "")
+
+
+def motion(model: object) -> Array:
+    """(T, J, 6) of all tests behind one another."""
+    simulated = Simulated(model, chains.cases(joints=JOINTS), False, ())  # type: ignore[arg-type]
+    return np.concatenate(simulated.at(np.zeros(0)).readings)
+
+
+def one(variant: Variant, spread: Spread, *place: object) -> Supposed:
+    start = variant.off((0.0,) * len(variant.shapes))
+    return Supposed(Form(variant, spread, *place), start)  # type: ignore[arg-type]
+
+
+SUPPOSED = {
+    "nothing": (),
+    "shared": (one(ASYMMETRY, Spread.SHARED),),
+    "by specimen": (one(ASYMMETRY, Spread.BY_SPECIMEN),),
+    "by joint": (one(ASYMMETRY, Spread.BY_JOINT),),
+    "each": (one(ASYMMETRY, Spread.EACH),),
+    "one joint": (one(ASYMMETRY, Spread.ONE_JOINT, 1),),
+    "one joint of the first": (one(LAXITY, Spread.ONE, 1, "a"),),
+    "one joint of the last": (one(LAXITY, Spread.ONE, 2, "b"),),
+    "by test": (one(OFFSET, Spread.BY_TEST),),
+    "shared load": (one(OFFSET, Spread.SHARED),),
+    "several": (
+        one(LAXITY, Spread.ONE, 0, "b"),
+        one(OFFSET, Spread.BY_TEST),
+        one(OFFSET, Spread.SHARED),
+        one(LAXITY, Spread.ONE, 1, "a"),
+        one(Variant("facet_contact", ()), Spread.EACH),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SUPPOSED)
+def test_files_read_back_move_as_the_fit_does(name: str, tmp_path: Path) -> None:
+    fit = fitted(*SUPPOSED[name])
+    write_model(model_file(fit, "m", "chains"), tmp_path / "model.yaml")
+    file = read_model(tmp_path / "model.yaml")
+    for specimen in NAMES:
+        model = fit.models[specimen]
+        again = model.with_effects(effects_for(file, specimen, model.joints))
+        np.testing.assert_array_equal(motion(again), motion(model))
+        acting = any(one.form.acts_in(specimen) for one in SUPPOSED[name])
+        away = motion(model) - motion(model.with_effects(model.effects[:1]))
+        assert (np.abs(away[..., 3:]).max() > 1e-4) == acting
+
+
+def test_a_base_may_have_an_effect_in_one_specimen_alone(tmp_path: Path) -> None:
+    fit = fitted(one(OFFSET, Spread.SHARED))
+    model = fit.models["b"]
+    lax = ScopedEffect(LAXITY.create(), (1,), np.array([[0.4]]))
+    bushing, *behind = model.effects
+    models = {**fit.models, "b": model.with_effects((bushing, lax, *behind))}
+    file = model_file(replace(fit, models=models), "m", "chains", (("*",), ("b",)))
+    write_model(file, tmp_path / "model.yaml")
+    file = read_model(tmp_path / "model.yaml")
+    for specimen in NAMES:
+        again = model.with_effects(effects_for(file, specimen, model.joints))
+        np.testing.assert_array_equal(motion(again), motion(models[specimen]))
+
+
+def test_specimens_differ_where_the_fit_says_so() -> None:
+    file = model_file(fitted(one(ASYMMETRY, Spread.EACH)), "m", "chains")
+    rows = {(row.specimen, row.joint): row.parameters for row in file.effects[1].values}
+    assert set(rows) == {(s, j) for s in NAMES for j in chains.JOINTS[:JOINTS]}
+    assert len({row["asymmetry"] for row in rows.values()}) == 2 * JOINTS
+    (shared,) = model_file(fitted(one(ASYMMETRY, Spread.SHARED)), "m", "chains").effects[1].values
+    assert (shared.specimen, shared.joint) == ("*", "*")
+
+
+# Values in units of tables -----------------------------------------------------------------------
+
+
+def value_of(
+    variant: Variant, column: int, start: float, move: float, se: float, at_bound: bool = False
+) -> FittedValue:
+    """The value of one parameter that a fit moved, the data and the prior saying equally much."""
+    values = np.array([p.default for p in variant.create().parameters])
+    values[column] = start
+    prior = se * np.sqrt(2.0)
+    u = Unknown("", 0, column, ("a", "L4L5"), True, -9.0, 9.0, 0.0, prior)
+    supposed = (Supposed(Form(variant, Spread.ONE, 1, "a"), values),)
+    member = Member(chains.model("a", chains.STIFFNESS), (), (0,))
+    of_a = {"a": np.array([[0.6], [0.8]]) / prior}
+    started = Hypothesis({"a": member}, (u,), supposed)
+    bound = np.array([at_bound])
+    fit = JointFit(started, np.array([move]), {}, 1.0, {}, of_a, {}, bound, "")
+    (found,) = fitted_values(fit, 0)
+    return found
+
+
+DEG = 180.0 / np.pi
+Z = 1.959964
+VALUES = {
+    "rad": (Variant("load_misalignment", ()), 1, 0.01, 0.02, 0.005,
+            (0.03 * DEG, (0.03 - 0.005 * Z) * DEG, (0.03 + 0.005 * Z) * DEG), "deg"),
+    "m": (Variant("facet_contact", (("coordinate", "anterior"),)), 1, 5e-4, 1e-3, 1e-4,
+          (1.5, 1.5 - 0.1 * Z, 1.5 + 0.1 * Z), "mm"),
+    "m/rad": (Variant("joint_centre_migration", ()), 0, 0.0, 0.05, 0.01,
+              (50.0 / DEG, (50.0 - 10.0 * Z) / DEG, (50.0 + 10.0 * Z) / DEG), "mm/deg"),
+    "log": (Variant("level_dependence", ()), 0, 2.0, np.log(1.5), 0.1,
+            (3.0, 3.0 * np.exp(-0.1 * Z), 3.0 * np.exp(0.1 * Z)), "1"),
+    "log rad": (Variant("neutral_zone", ()), 1, 0.03, -np.log(2.0), 0.2,
+                (0.015 * DEG, 0.015 * DEG * np.exp(-0.2 * Z), 0.015 * DEG * np.exp(0.2 * Z)),
+                "deg"),
+    "N m": (Variant("load_offset", ()), 0, 0.0, -0.3, 0.1, (-0.3, -0.3 - 0.1 * Z, -0.3 + 0.1 * Z),
+            "N m"),
+}  # fmt: skip
+"""Effect, column, start, move and SE; value, low and high, worked by hand; their unit."""
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_values_and_intervals_in_units_of_tables(name: str) -> None:
+    variant, column, start, move, se, expected, unit = VALUES[name]
+    found = value_of(variant, column, start, move, se)
+    assert found.name == variant.create().parameters[column].name
+    assert (found.value, found.low, found.high) == pytest.approx(expected, rel=1e-6)
+    assert (found.unit, found.place, found.at_bound) == (unit, ("a", "L4L5"), False)
+
+
+def test_intervals_end_at_bounds() -> None:
+    """A joint loses 0 to 95 % of its resistance."""
+    found = value_of(LAXITY, 0, 0.3, 0.6, 0.1, at_bound=True)
+    assert (found.value, found.high) == pytest.approx((0.9, 0.95))
+    assert found.low == pytest.approx(0.9 - 0.1 * Z)
+    assert found.at_bound
+    assert value_of(LAXITY, 0, 0.3, -0.25, 0.1).low == 0.0

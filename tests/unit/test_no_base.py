@@ -1,0 +1,108 @@
+"""A base model that cannot be fitted: a verdict all the same, with what looks wrong in the data."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from chain_cases import JOINTS, STUDY
+from discrepancy_cases import project
+
+from spinepipe.jobs.discrepancy import figures, report, search
+from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES, OTHERS, TABLES
+from spinepipe.model.file import effects_for, read_model
+from spinepipe.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+
+ROOT = Path(__file__).resolve().parents[2]
+SCHEMAS = {table.name: table for table in (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)}
+START = [149000.0, 1890000.0, 135000.0, 51.0, 68.8, 291.0]
+"""Default stiffness of studies (docs/studies/discrepancy.md): N/m, then N m/rad."""
+
+
+def searched(root: Path, study: str = "base: {stiffness: per_specimen}\n") -> Path:
+    """Results of a cohort whose moments are 60 times too large; the folder they are in."""
+    project(root, study)
+    path = root / "config/cohorts/chains/loads.csv"
+    loads = pd.read_csv(path)
+    loads[["mx_nm", "my_nm", "mz_nm"]] *= 60.0
+    loads.to_csv(path, index=False)
+    folder = root / "results" / STUDY / "discrepancy"
+    folder.mkdir(parents=True)
+    names = [*(f"{name}.parquet" for name in TABLES), *OTHERS]
+    search.run(str(root), STUDY, **{name.split(".")[0]: str(folder / name) for name in names})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return searched(tmp_path_factory.mktemp("no_base"))
+
+
+@pytest.fixture(scope="module")
+def verdict(folder: Path) -> Mapping[str, Any]:
+    found: Mapping[str, Any] = json.loads((folder / "verdict.json").read_text())
+    return found
+
+
+def test_the_verdict_says_that_nothing_is_known_and_why(verdict: Mapping[str, Any]) -> None:
+    assert verdict["verdict"] == "UNKNOWN"
+    assert verdict["why"].startswith("the base model cannot be fitted: a, test flexion, step 2")
+    assert verdict["effects"] == verdict["candidates_in_set"] == []
+    assert set(verdict["unknown"]) == {"where", "shape"}
+    assert "flexion" in verdict["unknown"]["where"]
+    sizes = [v for key in ("gap", "rms_residual") for k, v in verdict[key].items() if k != "unit"]
+    assert sizes == [None] * 9
+
+
+def test_the_mistake_is_pointed_to(verdict: Mapping[str, Any]) -> None:
+    (error,) = verdict["suspected_data_errors"]
+    assert error["where"] == "all specimens"
+    assert error["what"].startswith("unit")
+
+
+def test_tables_hold_their_schemas_and_no_rows(folder: Path) -> None:
+    for name, schema in SCHEMAS.items():
+        table = pq.read_table(folder / f"{name}.parquet")
+        assert table.num_rows == 0
+        assert table.column_names == [column.name for column in schema.columns]
+
+
+@pytest.mark.parametrize("of", ["base", "with_effects"])
+def test_models_are_where_the_fit_started_and_say_so(folder: Path, of: str) -> None:
+    model = read_model(folder / f"model_{of}.yaml")
+    assert model.model == f"{STUDY}_{of}_not_fitted"
+    (bushing,) = effects_for(model, "a", JOINTS)
+    assert bushing.values.tolist() == [START] * len(JOINTS)
+
+
+def test_a_model_file_stays_the_start_that_it_was(tmp_path: Path) -> None:
+    text = (
+        "model: given\ncohort: chains\neffects:\n- effect: linear_bushing\n"
+        "  values:\n  - {extension_nm_per_rad: 9.0}\n- effect: facet_contact\n"
+    )
+    (tmp_path / "given.yaml").write_text(text)
+    made = searched(tmp_path, f"base: {{model: {tmp_path / 'given.yaml'}}}\n")
+    model = read_model(made / "model_with_effects.yaml")
+    assert [entry.effect for entry in model.effects] == ["linear_bushing", "facet_contact"]
+    assert effects_for(model, "a", JOINTS)[0].values[0, 3] == 9.0
+
+
+def test_figures_and_report_cope(folder: Path) -> None:
+    verdict, drawn = str(folder / "verdict.json"), []
+    for name, tables in DISCREPANCY_FIGURES.items():
+        paths = [str(folder / f"{table}.parquet") for table in tables]
+        svg, png = str(folder / f"{name}.svg"), str(folder / f"{name}.png")
+        figures.run(str(folder.parents[2]), STUDY, name, paths, verdict, svg, png)
+        drawn.append(svg)
+        assert "can be shown" in Path(svg).read_text()
+    captions = [str(ROOT / f"workflow/report/{name}.rst") for name in DISCREPANCY_FIGURES]
+    paths = [str(folder / f"{table}.parquet") for table in TABLES]
+    output = folder / "report.html"
+    report.run(str(folder.parents[2]), STUDY, paths, drawn, captions, verdict, str(output))
+    page = output.read_text()
+    assert "he base model cannot be fitted: a, test flexion" in page
+    assert "Look at the data first: all specimens" in page
+    assert "none of the known effects" not in page

@@ -1,0 +1,243 @@
+"""The verdict from how a search ended: each reason for it, by itself and beside the others."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from spinepipe.discrepancy.forms import Form, Variant
+from spinepipe.discrepancy.found import Found, Rival, Standing
+from spinepipe.discrepancy.gaps import Gap
+from spinepipe.discrepancy.grounds import Grounds
+from spinepipe.discrepancy.hypothesis import Supposed
+from spinepipe.discrepancy.lack_of_fit import LackOfFit
+from spinepipe.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.discrepancy.outcome import Outcome, Verdict, outcome
+from spinepipe.discrepancy.proof.held_out_rows import SCORED, FoldRow, HeldOut, Margin
+from spinepipe.effects import Spread
+
+MARGIN = 3.0
+SHAPE = "load over the joint's own extension, shared"
+
+
+def stands(
+    name: str = "creep",
+    rivals: Sequence[tuple[str, float]] = (("hysteresis", 20.0),),
+    log_evidence: float = 40.0,
+    alone: float = 40.0,
+    over_stiffness: float | None = None,
+) -> Standing:
+    supposed = Supposed(Form(Variant(name, ()), Spread.SHARED), np.zeros(1))
+    behind = tuple(Rival(*one) for one in rivals)
+    return Standing(supposed, log_evidence, alone, 100.0, behind, over_stiffness)
+
+
+def ended(
+    *standing: Standing,
+    gain: float = 100.0,
+    lack: float = -2.0,
+    generic_threshold: float = 2.0,
+    left: Gap | None = None,
+) -> Found:
+    """A search whose effects lower chi2 by ``gain``, with the generic basis' evidence behind."""
+
+    def grounds(chi2: float) -> Grounds:
+        return cast(Grounds, SimpleNamespace(fit=SimpleNamespace(chi2=chi2)))
+
+    basis = LackOfFit(lack, np.zeros(1), "own", "extension", Spread.SHARED, 0.0)
+    gap = left or Gap(400.0, 400.0, 420)
+    of_base = Gap(gap.chi2 + gain, gap.dof, gap.readings)
+    final = grounds(500.0 - gain)
+    return Found(grounds(500.0), final, standing, (), basis, basis, generic_threshold, of_base, gap)
+
+
+def proof(over_base: float | None) -> HeldOut:
+    margin = None if over_base is None else Margin(over_base, None)
+    return HeldOut((), {}, None, None, None, 0.0, margin, None)
+
+
+def says(found: Found, **more: Any) -> tuple[str, str]:
+    result = outcome(found, MARGIN, **more)
+    return result.verdict.value, result.why
+
+
+def assert_unknown(result: Outcome, *words: str) -> None:
+    assert (result.verdict, result.named, result.tied) == (Verdict.UNKNOWN, (), ())
+    for word in words:
+        assert word in result.why
+
+
+ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
+
+
+@pytest.mark.parametrize("found", [ended(stands()), ended(), ended(lack=50.0)])
+def test_data_that_look_wrong_come_before_everything(found: Found) -> None:
+    result = outcome(found, MARGIN, proof(50.0), [ERROR])
+    assert_unknown(result, "sign flipped (specimen b, L3L4)", "the data look wrong")
+
+
+def test_of_many_errors_three_are_told() -> None:
+    errors = [SuspectedError(f"specimen {name}", "units", "") for name in "abcd"]
+    why = outcome(ended(), MARGIN, None, errors).why
+    assert [name in why for name in ("specimen a", "specimen c", "specimen d")] == [
+        True,
+        True,
+        False,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lack", "threshold", "verdict"),
+    [(-2.0, 2.0, "NULL"), (4.9, 2.0, "NULL"), (5.1, 2.0, "UNKNOWN"),
+     (7.9, 8.0, "NULL"), (8.1, 8.0, "UNKNOWN")],
+)  # fmt: skip
+def test_with_nothing_named_the_generic_basis_tells_nothing_from_something_unknown(
+    lack: float, threshold: float, verdict: str
+) -> None:
+    """Its evidence must exceed the null's, and 5 (very strong) whatever the null shows."""
+    found, why = says(ended(lack=lack, generic_threshold=threshold))
+    assert found == verdict
+    assert (SHAPE in why) == (verdict == "UNKNOWN")
+
+
+def test_what_is_left_to_the_generic_basis_is_unknown() -> None:
+    """Evidence 10 is a drop of chi2 of 20 or so: 20 beside a gain of 100 is a sixth."""
+    assert_unknown(outcome(ended(stands(), lack=10.0), MARGIN), "creep", "17 %")
+
+
+@pytest.mark.parametrize(("lack", "threshold"), [(5.4, 2.0), (10.0, 11.0)])
+def test_little_left_or_no_more_than_the_null_shows_is_no_matter(
+    lack: float, threshold: float
+) -> None:
+    """10.8 of 110.8 is less than a tenth."""
+    found = ended(stands(), lack=lack, generic_threshold=threshold)
+    assert says(found)[0] == "NAMED"
+
+
+def test_effects_that_only_mend_one_another_imitate_something_else() -> None:
+    prop = stands("load_offset", log_evidence=40.0, alone=9.0)
+    result = outcome(ended(stands(), prop), MARGIN)
+    assert_unknown(result, "creep and load_offset imitate", "nothing speaks for load_offset")
+    enough = stands("load_offset", log_evidence=40.0, alone=11.0)
+    assert says(ended(stands(), enough))[0] == "NAMED"
+
+
+def test_one_effect_has_nothing_to_mend() -> None:
+    assert says(ended(stands(alone=1.0)))[0] == "NAMED"
+
+
+@pytest.mark.parametrize(
+    ("excess", "dof", "verdict"),
+    [
+        (120.0, 400.0, "UNKNOWN"),
+        (90.0, 400.0, "NAMED"),
+        (120.0, 4000.0, "NAMED"),
+        (900.0, 10000.0, "NAMED"),
+    ],
+)
+def test_most_of_a_gap_must_close_if_more_than_a_small_one_stays(
+    excess: float, dof: float, verdict: str
+) -> None:
+    """chi2 has an SD of sqrt(2 dof): 28, and 89 of 4000 readings, where 120 may be noise; 900 of
+    10000 are none, but a gap of 0.3 of the noise at most."""
+    found, why = says(ended(stands(), left=Gap(dof + excess, dof, int(dof))))
+    assert found == verdict
+    assert ("most of the discrepancy stays" in why) == (verdict == "UNKNOWN")
+
+
+@pytest.mark.parametrize(
+    ("given", "verdict"),
+    [(None, "NAMED"), (proof(None), "NAMED"), (proof(12.0), "NAMED"), (proof(-0.1), "UNKNOWN"),
+     (proof(0.0), "NAMED")],
+)  # fmt: skip
+def test_names_must_predict_what_was_held_out(given: HeldOut | None, verdict: str) -> None:
+    """Where nothing that was scored hangs on the effects, it speaks neither for nor against."""
+    found, why = says(ended(stands(), stands("load_offset")), proof=given)
+    assert found == verdict
+    if verdict == "UNKNOWN":
+        assert "creep and load_offset would explain" in why
+        assert "held-out" in why
+
+
+@pytest.mark.parametrize(
+    ("base", "with_effects", "verdict"),
+    [
+        (100.0, 129.0, "NAMED"),
+        (100.0, 131.0, "UNKNOWN"),
+        (2050.0, 2149.0, "NAMED"),
+        (2050.0, 2151.0, "UNKNOWN"),
+    ],
+)
+def test_unseen_tests_must_not_be_predicted_worse(
+    base: float, with_effects: float, verdict: str
+) -> None:
+    """Whatever specimens say: worse by 30, and by a twentieth of what the base misses (2000)."""
+
+    def fold(kind: str, *sizes: float) -> FoldRow:
+        before, after = (Gap(chi2, 50.0, 50) for chi2 in sizes)
+        return FoldRow(kind, kind, 50, 50, before, after, None, 50.0, SCORED, "")
+
+    folds = (fold("test", base, with_effects), fold("specimen", 5000.0, 60.0))
+    whole = replace(proof(4900.0), folds=folds)
+    assert says(ended(stands()), proof=whole)[0] == verdict
+
+
+def test_nothing_named_needs_no_proof() -> None:
+    assert says(ended(), proof=proof(0.0))[0] == "NULL"
+
+
+@pytest.mark.parametrize(
+    ("over", "verdict"),
+    [(2.9, "UNKNOWN"), (-4.0, "UNKNOWN"), (3.0, "NAMED"), (None, "NAMED")],
+)
+def test_many_strengths_must_do_more_than_a_stiffness_of_each_joint(
+    over: float | None, verdict: str
+) -> None:
+    found, why = says(ended(stands("load_offset"), stands(over_stiffness=over)))
+    assert found == verdict
+    assert ("creep explains no more than a stiffness" in why) == (verdict == "UNKNOWN")
+
+
+def test_ties_come_after_what_is_unexplained_or_unproven() -> None:
+    tie = stands(rivals=[("hysteresis", 1.0)])
+    assert says(ended(tie))[0] == "SET"
+    assert says(ended(tie, lack=10.0))[0] == "UNKNOWN"
+    assert says(ended(tie), proof=proof(-5.0))[0] == "UNKNOWN"
+
+
+def test_rivals_within_the_margin_make_a_set() -> None:
+    rivals = [("hysteresis", -0.5), ("load_offset", 2.9), ("marker_bias", 3.0)]
+    result = outcome(ended(stands(rivals=rivals)), MARGIN)
+    assert (result.verdict, result.named) == (Verdict.SET, ())
+    assert result.tied == ("creep", "hysteresis", "load_offset")
+    assert "creep, hysteresis or load_offset" in result.why
+
+
+def test_beside_a_tie_what_is_sure_is_named() -> None:
+    sure = stands("local_laxity")
+    result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)
+    assert (result.verdict, result.named) == (Verdict.SET, (sure,))
+    assert result.tied == ("creep", "hysteresis")
+
+
+def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
+    one = stands("creep", rivals=[("hysteresis", 1.0), ("load_offset", 9.0)])
+    other = stands("hysteresis", rivals=[("creep", 0.5)])
+    result = outcome(ended(one, other), MARGIN)
+    assert (result.verdict, result.named, result.tied) == (Verdict.NAMED, (one, other), ())
+    assert result.why.startswith("creep and hysteresis: ")
+
+
+def test_an_effect_in_two_coordinates_has_one_name() -> None:
+    result = outcome(ended(stands(), stands(), stands("load_offset")), MARGIN)
+    assert result.why.startswith("creep and load_offset: ")
+    assert len(result.named) == 3
+
+
+def test_without_evidence_for_anything_nothing_is_missing() -> None:
+    result = outcome(ended(), MARGIN)
+    assert (result.verdict, result.named, result.tied) == (Verdict.NULL, (), ())
+    assert "no effect" in result.why

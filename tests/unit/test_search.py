@@ -1,0 +1,146 @@
+"""Whole searches of chains in closed form: what is put in is named, or said to be untold."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import search_cases as cases
+from search_cases import Array, Searched, exponential, one_sided, searched
+
+from spinepipe.discrepancy.outcome import Verdict
+from spinepipe.discrepancy.values import fitted_values
+
+pytestmark = pytest.mark.slow
+
+RATE = 12.0
+ASYMMETRY = 0.15
+
+
+@cache
+def stiffening() -> Searched:
+    return searched(cases.readings(1, {"bending": exponential(RATE)}))
+
+
+@cache
+def two() -> Searched:
+    laws = {"flexion": one_sided(ASYMMETRY), "bending": exponential(RATE)}
+    return searched(cases.readings(2, laws))
+
+
+def test_stiffening_is_named_with_its_coordinate_and_rate() -> None:
+    found, ended = stiffening().found, stiffening().ended
+    assert (ended.verdict, [one.name for one in ended.named]) == (
+        Verdict.NAMED,
+        ["nonlinear_stiffening"],
+    )
+    options = dict(found.standing[0].supposed.form.variant.options)
+    assert options == {"coordinate": "right_bending", "shape": "exponential"}
+    (rate,) = fitted_values(found.final.fit, 0)
+    assert (rate.name, rate.unit, rate.place) == ("rate", "1/rad", ())
+    assert rate.low < RATE < rate.high
+    assert rate.high - rate.low < 0.3 * RATE
+    assert found.base_gap.gap > 1.0
+    assert found.final_gap.interval[0] == 0.0
+
+
+def test_a_whole_library_finds_the_same() -> None:
+    ended = searched(cases.readings(1, {"bending": exponential(RATE)}), effects=None).ended
+    assert [one.name for one in ended.named] == ["nonlinear_stiffening"]
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_springs_lack_nothing(seed: int) -> None:
+    result = searched(cases.readings(seed, {}))
+    assert (result.ended.verdict, result.found.standing) == (Verdict.NULL, ())
+    assert result.found.base_gap.interval[0] == 0.0
+    assert max(result.evidence().values()) < result.found.stages[0].screen.threshold
+
+
+def test_what_no_effect_does_is_unknown_and_said_where() -> None:
+    result = searched(cases.readings(3, {"bending": cases.wavy}))
+    assert (result.ended.verdict, result.ended.named) == (Verdict.UNKNOWN, ())
+    assert "right bending" in result.ended.why
+    assert result.found.base_gap.gap > 1.0
+
+
+def test_two_effects_are_both_named_with_their_values() -> None:
+    found, ended = two().found, two().ended
+    assert ended.verdict is Verdict.NAMED
+    values = {}
+    for number, one in enumerate(found.standing):
+        (value,) = fitted_values(found.final.fit, number)
+        coordinate = dict(one.supposed.form.variant.options)["coordinate"]
+        values[one.name, coordinate] = (value.low, value.high)
+    assert set(values) == {
+        ("flexion_extension_asymmetry", "extension"),
+        ("nonlinear_stiffening", "right_bending"),
+    }
+    low, high = values["flexion_extension_asymmetry", "extension"]
+    assert low < ASYMMETRY < high
+    low, high = values["nonlinear_stiffening", "right_bending"]
+    assert low < RATE < high
+
+
+def test_a_lax_joint_is_named_with_its_specimen_and_its_level() -> None:
+    def lax(joint: int, moments: Array, k: float) -> Array:
+        return moments / (0.7 * k if joint == 1 else k)
+
+    everywhere = {"flexion": lax, "bending": lax, "rotation": lax}
+    result = searched([*cases.readings(6, everywhere, ("a",)), *cases.readings(7, {}, ("b",))])
+    assert [one.name for one in result.ended.named] == ["local_laxity"]
+    (fraction,) = fitted_values(result.found.final.fit, 0)
+    assert fraction.place == ("a", "L4L5")
+    assert fraction.low < 0.3 < fraction.high
+
+
+def assert_same(result: Searched, other: Searched) -> None:
+    assert result.ended.verdict == other.ended.verdict
+    assert {one.name for one in result.ended.named} == {one.name for one in other.ended.named}
+    assert set(result.ended.tied) == set(other.ended.tied)
+    for name, evidence in other.evidence().items():
+        assert result.evidence()[name] == pytest.approx(evidence, rel=1e-3, abs=0.01)
+    for one in result.found.standing:
+        same = next(s for s in other.found.standing if s.supposed.form == one.supposed.form)
+        assert one.log_evidence == pytest.approx(same.log_evidence, rel=1e-3)
+        np.testing.assert_allclose(one.supposed.start, same.supposed.start, rtol=1e-3)
+
+
+def test_the_order_of_effects_tried_decides_nothing() -> None:
+    laws = {"flexion": one_sided(ASYMMETRY), "bending": exponential(RATE)}
+    assert_same(searched(cases.readings(2, laws), backwards=True), two())
+
+
+@pytest.mark.parametrize("of", ["specimens", "tests"])
+def test_the_order_of_specimens_and_tests_decides_nothing(of: str) -> None:
+    given = cases.readings(1, {"bending": exponential(RATE)})
+    if of == "specimens":
+        turned = given[::-1]
+    else:
+        turned = [replace(one, tests=one.tests[::-1]) for one in given]
+    assert_same(searched(turned), stiffening())
+
+
+def test_names_of_specimens_decide_nothing() -> None:
+    laws = {"bending": exponential(RATE)}
+    assert_same(searched(cases.readings(1, laws, ("z", "m"))), stiffening())
+
+
+def test_what_these_steps_cannot_tell_apart_is_a_set() -> None:
+    """A weak stiffening bends the curve as a neutral zone does, seen at three loads to a side."""
+    result = searched(cases.readings(1, {"flexion": exponential(1.2)}))
+    assert result.ended.verdict is Verdict.SET
+    assert set(result.ended.tied) == {"nonlinear_stiffening", "neutral_zone"}
+    assert result.ended.named == ()
+    for name in result.ended.tied:
+        assert name in result.ended.why
+
+
+def test_a_tie_beside_a_sure_effect_leaves_that_one_named() -> None:
+    laws = {"flexion": one_sided(0.04), "bending": exponential(1.2)}
+    ended = searched(cases.readings(5, laws)).ended
+    assert (ended.verdict, [one.name for one in ended.named]) == (
+        Verdict.SET,
+        ["flexion_extension_asymmetry"],
+    )
+    assert set(ended.tied) == {"nonlinear_stiffening", "neutral_zone"}
