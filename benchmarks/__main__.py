@@ -1,4 +1,4 @@
-"""`python -m benchmarks [PART ...] [--cohort PATH]`: measure, print, write results/PART.*."""
+"""`python -m benchmarks [PART ...] [options]`: measure, print, write results/PART.*."""
 
 import argparse
 import json
@@ -10,7 +10,15 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cohort, engine, identification, lost_fits, real_geometry, study
+from benchmarks import (
+    cohort,
+    discrepancy,
+    engine,
+    identification,
+    lost_fits,
+    real_geometry,
+    study,
+)
 from benchmarks.timing import machine
 
 RESULTS = Path(__file__).parent / "results"
@@ -24,12 +32,15 @@ def main() -> None:
         "lost_fits": lost_fits_parts,
         "whole_study": whole_study,
         "cohort": cohort_parts,
+        "discrepancy": lambda: discrepancy_parts(options.small),
         "real_geometry": lambda: real_geometry_part(options.cohort),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("part", nargs="*", help=", ".join(parts))
     given = os.environ.get(real_geometry.COHORT_VARIABLE)
     parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
+    small = "discrepancy: the small cohort alone, and no file is written"
+    parser.add_argument("--small", action="store_true", help=small)
     options = parser.parse_args()
     for name in options.part or parts:
         if name not in parts:
@@ -121,6 +132,21 @@ def cohort_parts() -> None:
     rows = _study_rows(lines, cohort.runs(), cohort.STUDY)
     data = {"machine": about, "specimen": {**asdict(one), "ratio": one.ratio}, "pooled_s": pooled_s}
     _write("cohort", lines, {**data, "study": rows})
+
+
+def discrepancy_parts(small: bool) -> None:
+    """Search for missing effects in a small cohort and in one of full size."""
+    about = _about()
+    lines = _head("Search for missing effects", about)
+    found = []
+    for case in [discrepancy.SMALL] if small else [discrepancy.SMALL, discrepancy.FULL]:
+        said, runs = discrepancy.measure(case)
+        rows = _study_rows(lines, runs, discrepancy.STUDY)
+        lines += ["", discrepancy.in_words(said)]
+        print(lines[-1], flush=True)
+        found.append({"recipe": case.recipe.as_dict(), "said": asdict(said), "runs": rows})
+    if not small:
+        _write("discrepancy", lines, {"machine": about, "cohorts": found})
 
 
 def real_geometry_part(given: str | None) -> None:

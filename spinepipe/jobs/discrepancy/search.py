@@ -50,6 +50,7 @@ def run(
     write_model(results.model_with_effects, model_with_effects)
     with appearing(verdict) as temporary:
         temporary.write_text(json.dumps(results.verdict, indent=1) + "\n", encoding="utf-8")
+    store.forget_the_rest()
 
 
 def searched(study: Discrepancy, cohort: Cohort, root: str, run: Run) -> Results:
@@ -59,4 +60,4 @@ def searched(study: Discrepancy, cohort: Cohort, root: str, run: Run) -> Results
         ended = investigate(study, cohort, file, run)
     except NoBase as trouble:
         return without_base(study, cohort, file, trouble)
-    return with_base(study, cohort, ended, run)
+    return with_base(study, cohort, file, ended, run)

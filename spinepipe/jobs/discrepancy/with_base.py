@@ -7,7 +7,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.design.told_apart import ToldApart, told_apart
 from spinepipe.discrepancy.investigation import Investigation
 from spinepipe.discrepancy.joint_fit import JointFit
-from spinepipe.discrepancy.model_files import model_file
+from spinepipe.discrepancy.model_files import EVERY, model_file
 from spinepipe.discrepancy.prepared import declared_sd
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.discrepancy.where import places, residual_frame
@@ -26,14 +26,21 @@ from spinepipe.studies import Discrepancy
 from spinepipe.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 
 
-def with_base(study: Discrepancy, cohort: Cohort, ended: Investigation, run: Run) -> Results:
-    """The results of an investigation, and what the tests could tell apart."""
+def with_base(
+    study: Discrepancy, cohort: Cohort, file: ModelFile | None, ended: Investigation, run: Run
+) -> Results:
+    """The results of an investigation, and what the tests could tell apart.
+
+    Parameters
+    ----------
+    file : the model file that the study starts from, if it does.
+    """
     told = _told_apart(study, cohort, ended, run)
     return Results(
         verdict=_verdict(study, cohort, ended, told),
         rows=_rows(cohort, ended, told),
-        model_base=_model(study, cohort, ended, ended.grounds.fit, "base"),
-        model_with_effects=_model(study, cohort, ended, ended.found.final.fit, "with_effects"),
+        model_base=_model(study, cohort, ended.grounds.fit, file, "base"),
+        model_with_effects=_model(study, cohort, ended.found.final.fit, file, "with_effects"),
     )
 
 
@@ -62,7 +69,7 @@ def _rows(cohort: Cohort, ended: Investigation, told: ToldApart) -> Mapping[str,
 
 
 def _model(
-    study: Discrepancy, cohort: Cohort, ended: Investigation, fit: JointFit, of: str
+    study: Discrepancy, cohort: Cohort, fit: JointFit, file: ModelFile | None, of: str
 ) -> ModelFile:
-    of_base = len(next(iter(ended.grounds.fit.models.values())).effects)
-    return model_file(fit, f"{study.study}_{of}", cohort.name, of_base)
+    base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
+    return model_file(fit, f"{study.study}_{of}", cohort.name, base)

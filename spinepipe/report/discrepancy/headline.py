@@ -115,7 +115,7 @@ def _why_unknown(verdict: Verdict) -> str:
     shape = verdict.unknown_shape
     if verdict.answer is not Answer.UNKNOWN or not verdict.why or (shape and shape in verdict.why):
         return ""
-    if verdict.suspicions:
+    if verdict.suspicions and not _no_base(verdict):
         return ""  # the headline says it
     return f"Why no name: {readable(verdict.why).rstrip('.')}."
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from spinepipe.discrepancy.design.seen import seen_in
 from spinepipe.discrepancy.design.testable import judgements
+from spinepipe.discrepancy.found import Found, Rules
 from spinepipe.discrepancy.proof.held_out import Asked, held_out
-from spinepipe.discrepancy.search import Found, Rules
 from spinepipe.discrepancy.tasks import at_once
 
 Told = dict[str, Any]

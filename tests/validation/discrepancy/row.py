@@ -6,10 +6,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from spinepipe import cohort as cohorts
+from spinepipe.discrepancy.found import Found, Standing
 from spinepipe.discrepancy.grounds import NoBase
 from spinepipe.discrepancy.investigation import investigate
 from spinepipe.discrepancy.outcome import Outcome
-from spinepipe.discrepancy.search import Found, Standing
 from spinepipe.discrepancy.tasks import at_once
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.studies import Discrepancy

@@ -1,0 +1,114 @@
+"""A search for missing effects from end to end: rules, search, figures and report, on two chains.
+
+A straight chain turns joint by joint, so its flexion under a law k q + r q^3 is the root of a
+cubic, solved here by numpy: the hidden truth is stiffening, and nothing of spinepipe makes it.
+"""
+
+import importlib
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from small_project import Project, copy_project, written
+
+pytestmark = pytest.mark.slow
+
+UNIT = Path(__file__).parents[1] / "unit"
+STUDY = "probe"
+FOLDER = f"results/{STUDY}/discrepancy"
+SETTINGS = """\
+study: probe
+kind: discrepancy
+cohort: chains
+base: {stiffness: per_specimen}
+effects: [nonlinear_stiffening, hysteresis]
+bootstrap: 100
+"""
+STIFFNESS = {"a": 50.0, "b": 40.0}
+SIGN = {"flexion": -1.0, "extension": 1.0}
+RISE = 4000.0
+"""N m/rad3; the stiffness is in N m/rad."""
+
+TABLES = ("gap", "candidates", "where", "confusions", "held_out")
+
+
+def turned(moment: float, k: float) -> float:
+    """Degrees at which k q + RISE q^3 is the moment; the cubic has one real root."""
+    roots = np.roots([RISE, 0.0, k, -moment])
+    return float(np.rad2deg(roots[np.argmin(np.abs(roots.imag))].real))
+
+
+def chains(root: Path) -> None:
+    """A project with that cohort, read in two cycles with noise of 0.05 deg, and its study."""
+    linear = {name: np.array([[k, 60.0, 200.0]] * 3) for name, k in STIFFNESS.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(UNIT)
+        cases = importlib.import_module("chain_cases")
+        patch.setitem(cases.MOMENT_OF, "extension", ("mz_nm", 1.0, "extension"))
+        made = cases.Chains(linear, tuple(SIGN), steps=6, step_nm=1.5, cycles=2, noise_deg=0.05)
+    for row in made.motion.itertuples():
+        moment, k = SIGN[row.test] * made.step_nm * row.step, STIFFNESS[row.specimen]
+        made.motion.loc[row.Index, "extension_deg"] += turned(moment, k) - np.rad2deg(moment / k)
+    made.write(root)
+    (root / f"config/studies/{STUDY}.yaml").write_text(SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """The project after one run of everything."""
+    project = copy_project(tmp_path_factory.mktemp("really_searched") / "project")
+    shutil.rmtree(project.path("config"))
+    chains(project.folder)
+    project.run_all()
+    return project
+
+
+def test_the_search_finds_what_the_chains_hide(searched: Project) -> None:
+    verdict = json.loads(searched.path(f"{FOLDER}/verdict.json").read_text())
+    assert verdict["verdict"] == "NAMED"
+    assert [one["name"] for one in verdict["effects"]] == ["nonlinear_stiffening"]
+    assert verdict["gap"]["with_effects"] < 0.1 * verdict["gap"]["base"]
+    assert verdict["gap"]["held_out_closed"] > 0.9
+
+
+def test_every_result_is_there_and_holds_its_schema(searched: Project) -> None:
+    rows = {}
+    for name in TABLES:
+        table = pq.read_table(searched.path(f"{FOLDER}/{name}.parquet"))
+        schema = getattr(importlib.import_module("spinepipe.tables"), name.upper())
+        assert table.column_names == [column.name for column in schema.columns]
+        rows[name] = table.num_rows
+    assert rows["gap"] == 2 * 2 * 6 * 3 * 3  # specimens, tests, steps, joints, rotations
+    assert rows["held_out"] == 2 + 2  # specimens and tests
+    assert min(rows.values()) > 0
+    figures = {path.stem for path in searched.path(f"{FOLDER}/figures").glob("*.svg")}
+    assert figures == {path.stem for path in searched.path(f"{FOLDER}/figures").glob("*.png")}
+    assert len(figures) == 5
+
+
+def test_the_report_opens_alone(searched: Project) -> None:
+    page = searched.path(f"{FOLDER}/report.html").read_text()
+    assert "The model lacks nonlinear stiffening" in page
+    assert not re.search(r"""<(script|link|img|iframe)[^>]+(src|href)=["'](https?:)?//""", page)
+
+
+def test_a_second_run_makes_nothing(searched: Project) -> None:
+    before = searched.files()
+    searched.run_all()
+    assert written(before, searched.files()) == set()
+
+
+def test_a_search_made_again_finds_its_pieces(searched: Project, tmp_path: Path) -> None:
+    project = Project(tmp_path / "project")
+    shutil.copytree(searched.folder, project.folder)
+    before, contents = project.files(), project.contents()
+    done = project.snakemake("-j2", "--force", f"{FOLDER}/verdict.json")
+    assert done.returncode == 0, done.stdout
+    made = written(before, project.files())
+    assert f"{STUDY}/discrepancy/verdict.json" in made
+    assert not [name for name in made if "/store/" in name]
+    assert {name for name in made if project.contents()[name] != contents[name]} == set()
