@@ -18,6 +18,11 @@ from spinepipe.statics import moved
 MOST_EVALUATIONS = 12
 INSIDE = 1e-9
 
+SAME = 1e-3
+"""Noise SDs by which a reading may differ when it is predicted afresh from the neutral pose."""
+
+OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -177,6 +182,9 @@ def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) 
     found = points.at(x)
     assert found is not None
     residuals, jacobians, predicted = found
+    cold = _Points(points.hypothesis, points.setting).at(x)
+    if cold is None or any(np.abs(cold[0][n] - r).max() > SAME for n, r in residuals.items()):
+        return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     models = {
         name: moved(member.model, member.free, x[list(member.numbers)])
         for name, member in points.hypothesis.members.items()
