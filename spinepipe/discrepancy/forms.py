@@ -9,6 +9,7 @@ import numpy as np
 
 from spinepipe.effects import Effect, Parameter, Spread, Trial, create, registered
 from spinepipe.effects.contract import Array
+from spinepipe.units import COORDINATES
 
 SHAPE_SDS = (-1.0, 0.0, 1.0)
 """Prior SDs from its default at which a parameter of shape is tried before it is fitted."""
@@ -105,15 +106,24 @@ def trials(
     for name, cls in sorted(registered().items()):
         trial: Trial | None = getattr(cls, "trial", None)
         if trial is not None and (names is None or name in names):
-            variants = tuple(Variant(name, _options(options)) for options in trial.variants)
+            every = (Variant(name, _options(options)) for options in trial.variants)
+            variants = tuple(variant for variant in every if _is_read(variant, coordinates))
             forms = [
                 form
                 for variant in variants
                 for spread in _possible(trial.spreads, len(specimens))
                 for form in _forms(variant, spread, specimens, joints)
             ]
-            found.append(Trials(name, variants, tuple(forms)))
+            if variants:
+                found.append(Trials(name, variants, tuple(forms)))
     return tuple(found)
+
+
+def _is_read(variant: Variant, coordinates: Sequence[str]) -> bool:
+    """Whether a variant acts on coordinates with readings, as far as it says on which."""
+    options = dict(variant.options)
+    named = [c for c in (options.get("coordinate"), *options.get("pair", ())) if c in COORDINATES]
+    return not named or bool(set(named) & set(coordinates))
 
 
 def _options(options: Mapping[str, Any]) -> Options:

@@ -134,6 +134,3 @@ def _drift(steps: int, size: Array, at: int) -> Array:
     for joint in range(joints):
         drift[:, joint, at, joint] = ramp * size[joint]
     return drift
-
-
-__all__ = ["FAMILIES", "GenericColumns", "Term", "generic_columns"]

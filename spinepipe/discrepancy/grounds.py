@@ -8,9 +8,11 @@ from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.discrepancy.noise import REPEATS, Noise
 from spinepipe.discrepancy.noise_of_residuals import noise_of_residuals
 from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.discrepancy.prediction import Solved
 from spinepipe.discrepancy.readings import SpecimenReadings
 from spinepipe.discrepancy.tasks import Run
 from spinepipe.discrepancy.whitening import Whitening, whitening, with_nuisances
+from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics import FreeParameter
 
@@ -61,6 +63,10 @@ class Grounds:
         return replace(self, fit=fit, start=replace(self.start, models=models))
 
 
+MOST_BASE_FITS = 5
+"""Fits in a row, each from where the last one ended, until the base has arrived."""
+
+
 class NoBase(RuntimeError):
     """The base model cannot be fitted: nothing can be said of what it lacks."""
 
@@ -90,9 +96,7 @@ def laid(
         by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
         plain = _plain(by_name, noise)
     whitenings = {
-        name: with_nuisances(
-            plain[name], nuisance_signatures(first.models[name], one.cases, noise.zeroed, priors)
-        )
+        name: with_nuisances(plain[name], _nuisances(first.models[name], one, noise.zeroed, priors))
         for name, one in by_name.items()
     }
     setting = Setting(by_name, whitenings, noise.zeroed)
@@ -102,12 +106,26 @@ def laid(
     return Grounds(by_name, noise, priors, start, tests, plain, setting, second)
 
 
+def _nuisances(
+    model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
+) -> tuple[Array, ...]:
+    tests = [case.test for case in one.cases]
+    return nuisance_signatures(Solved(model, one.cases, zeroed), priors, tests)
+
+
 def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
     return {name: whitening(one.tests, noise) for name, one in readings.items()}
 
 
 def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
     fit = run(joint_fit, models, setting)
-    if not fit.usable:
-        raise NoBase(fit.status)
-    return fit
+    for _ in range(MOST_BASE_FITS):
+        if not fit.usable:
+            raise NoBase(fit.status)
+        if not fit.status:
+            return fit
+        members = {
+            name: replace(member, model=fit.models[name]) for name, member in models.members.items()
+        }
+        fit = run(joint_fit, replace(models, members=members), setting)
+    raise NoBase(fit.status)

@@ -1,6 +1,6 @@
 """An investigation from beginning to end: base, search, data errors, proof, verdict."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.found import Found, Rules
@@ -26,6 +26,13 @@ class Investigation:
     errors: tuple[SuspectedError, ...]
     proof: HeldOut
     ended: Outcome
+
+    def as_told(self) -> "Investigation":
+        """With the base in the place of a model whose effects the verdict does not stand for."""
+        if self.ended.named or self.ended.tied:
+            return self
+        found = replace(self.found, final=self.found.base, final_gap=self.found.base_gap)
+        return replace(self, found=found, proof=self.proof.of_base())
 
 
 def investigate(

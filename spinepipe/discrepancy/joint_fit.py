@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from spinepipe.discrepancy.hypothesis import Hypothesis
+from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Hypothesis, Unknown
 from spinepipe.discrepancy.prediction import NoEquilibrium, Predicted, Simulated
 from spinepipe.discrepancy.readings import SpecimenReadings
 from spinepipe.discrepancy.whitening import Whitening
@@ -16,7 +16,6 @@ from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
 
 MOST_EVALUATIONS = 12
-INSIDE = 1e-9
 
 SAME = 1e-3
 """Noise SDs by which a reading may differ when it is predicted afresh from the neutral pose."""
@@ -148,7 +147,7 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
     points = _Points(hypothesis, setting)
     low = np.array([u.low for u in hypothesis.unknowns])
     high = np.array([u.high for u in hypothesis.unknowns])
-    start = np.clip(np.zeros(len(low)), low + INSIDE, high - INSIDE)
+    start = np.clip(np.zeros(len(low)), low, high)
     if points.compressed(start) is None:
         return _nowhere(hypothesis, start, points.trouble)
     size = len(points.compressed(start)[0])  # type: ignore[index]
@@ -168,7 +167,7 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
         jac=jacobian,
         bounds=(low, high),
         method="dogbox",
-        x_scale=np.array([min(u.sd, 1.0) for u in hypothesis.unknowns]),
+        x_scale=np.array([_scale(u) for u in hypothesis.unknowns]),
         ftol=1e-7,
         xtol=1e-6,
         gtol=1e-10,
@@ -178,12 +177,18 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
     return _ended(points, result.x, (result.x - low < 1e-6) | (high - result.x < 1e-6), status)
 
 
+def _scale(unknown: Unknown) -> float:
+    """Size of a first step: a prior SD, of base stiffnesses one in the logarithm."""
+    return unknown.sd / STRENGTH_SDS if unknown.is_strength else min(unknown.sd, 1.0)
+
+
 def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
     found = points.at(x)
-    assert found is not None
-    residuals, jacobians, predicted = found
     cold = _Points(points.hypothesis, points.setting).at(x)
-    if cold is None or any(np.abs(cold[0][n] - r).max() > SAME for n, r in residuals.items()):
+    if found is None or cold is None:
+        return _nowhere(points.hypothesis, x, OFF_THE_PATH)
+    residuals, jacobians, predicted = found
+    if any(np.abs(cold[0][n] - r).max() > SAME for n, r in residuals.items()):
         return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     models = {
         name: moved(member.model, member.free, x[list(member.numbers)])

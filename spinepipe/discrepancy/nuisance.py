@@ -14,7 +14,6 @@ from spinepipe.discrepancy.forms import Variant
 from spinepipe.discrepancy.prediction import Solved
 from spinepipe.discrepancy.signatures import EVERY_TEST, Column, signatures
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, SpineModel
 from spinepipe.units import ROTATIONS
 
 
@@ -76,16 +75,16 @@ def _columns(variant: Variant, sd: float, joints: int, places: Sequence[str]) ->
 
 
 def nuisance_signatures(
-    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, priors: NuisancePriors
+    solved: Solved, priors: NuisancePriors, tests: Sequence[str]
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
-    solved = Solved(model, cases, zeroed)
-    columns = nuisance_columns(priors, model.n_joints, [case.test for case in cases])
+    joints = solved.model.n_joints
+    columns = nuisance_columns(priors, joints, tests)
     single = signatures(solved, columns)
     if not priors.posture:
         return single
     together = [
-        signatures(solved, _columns(variant, priors.posture, model.n_joints, (EVERY_TEST,)))
+        signatures(solved, _columns(variant, priors.posture, joints, (EVERY_TEST,)))
         for variant in POSTURE
     ]
     return tuple(

@@ -6,8 +6,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.discrepancy.base import base_model, base_parameters
 from spinepipe.discrepancy.forms import trials
 from spinepipe.discrepancy.found import Rules
-from spinepipe.discrepancy.grounds import Grounds, Start, laid
-from spinepipe.discrepancy.noise import Noise, estimated_noise, without_outliers
+from spinepipe.discrepancy.grounds import Grounds, NoBase, Start, laid
+from spinepipe.discrepancy.noise import DECLARED, Noise, estimated_noise, without_outliers
 from spinepipe.discrepancy.nuisance import NuisancePriors, as_si
 from spinepipe.discrepancy.readings import SpecimenReadings, specimen_readings
 from spinepipe.discrepancy.tasks import Run
@@ -44,6 +44,8 @@ def prepared(
     base = {name: base_parameters(model, grouping, coordinates) for name, model in models.items()}
     begin = Start(models, base, study.bound_factor)
     grounds = laid(readings, noise, priors(study), begin, run)
+    if grounds.noise.source == DECLARED and declared_sd(study, cohort) is None:
+        raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
     return grounds, rules(study, cohort, coordinates)
 
 
@@ -69,10 +71,11 @@ def priors(study: Discrepancy) -> NuisancePriors:
 def read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
     """Coordinates with readings, of those that the study uses."""
     assert cohort.motion is not None
+    motion = cohort.motion[cohort.motion["test"].isin(list(study.tests or cohort.tests))]
     return tuple(
         name
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
-        if name in (study.coordinates or COORDINATES) and cohort.motion[column].notna().any()
+        if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
     )
 
 

@@ -125,7 +125,7 @@ def _value(p: Parameter, sds: float) -> float:
     side = 1.0 if p.low >= p.off else -1.0 if p.high <= p.off else float(np.sign(sds) or 1.0)
     away = side * max(abs(sds), SMALLEST_START) * p.prior_scale
     value = p.off * np.exp(away) if p.logarithmic else p.off + away
-    margin = 1e-3 * (p.high - p.low)
+    margin = min(1e-3 * (p.high - p.low), SMALLEST_START * p.prior_scale)
     return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
 
 

@@ -5,7 +5,7 @@ import pytest
 from held_out_cases import JOINTS, MOMENTS_NM, SD, found, grounds, read
 
 from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.discrepancy.prediction import Simulated
+from spinepipe.discrepancy.prediction import Simulated, Solved
 from spinepipe.discrepancy.proof.surrogate import surrogate
 from spinepipe.discrepancy.proof.tangent import tangent
 from spinepipe.statics import moved
@@ -41,7 +41,9 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
         ]
     )
     # linearised at the fit before nuisances were allowed for: 1e-4 away
-    moved_by = nuisance_signatures(base.fit.models["a"], readings[0].cases, False, priors)
+    cases = readings[0].cases
+    solved = Solved(base.fit.models["a"], cases, False)
+    moved_by = nuisance_signatures(solved, priors, [case.test for case in cases])
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])
     assert columns @ columns.T == pytest.approx(given @ given.T, rel=1e-3, abs=(1e-2 * SD) ** 2)
 

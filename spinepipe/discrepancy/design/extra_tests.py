@@ -17,9 +17,8 @@ from spinepipe.discrepancy.design.testable import Judgement, judgements
 from spinepipe.discrepancy.forms import Trials
 from spinepipe.discrepancy.grounds import Grounds
 from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.nuisance import nuisance_columns
+from spinepipe.discrepancy.nuisance import nuisance_signatures
 from spinepipe.discrepancy.prediction import NoEquilibrium, Solved
-from spinepipe.discrepancy.signatures import signatures
 from spinepipe.discrepancy.whitening import whitening, with_nuisances
 from spinepipe.effects import Trial, create, registered
 from spinepipe.effects.contract import Array
@@ -135,8 +134,7 @@ def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequen
     names = [name for name, there in zip(COORDINATES, read, strict=True) if there]
     solved = Solved(model, [one.case for one in plan.tests], plan.zeroed)
     plain = whitening(repeats, _noise(place, plan, read))
-    nuisances = nuisance_columns(place.grounds.priors, model.n_joints, tests)
-    white = with_nuisances(plain, signatures(solved, nuisances))
+    white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, tests))
     free = base_parameters(model, plan.grouping, names)
     return seen(solved, free, plain, white, candidates(trials, model.n_joints, tests))
 

@@ -129,7 +129,7 @@ def _question(
         name: grounds.fit.models[name].with_effects(grounds.fit.models[other[name]].effects)
         for name in pair
     }
-    base = {name: grounds.start.base[name] for name in pair}
+    base = {name: grounds.start.base[other[name]] for name in pair}
     whitenings = {name: grounds.setting.whitenings[other[name]] for name in pair}
     setting = Setting(readings, whitenings, grounds.noise.zeroed)
     supposed = hypothesis(models, base, (), grounds.tests, grounds.start.bound)

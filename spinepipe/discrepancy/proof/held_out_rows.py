@@ -1,7 +1,7 @@
 """Held-out confirmation as data: folds, margins, and what they say together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from spinepipe.discrepancy.gaps import Gap
 from spinepipe.discrepancy.proof.held_out_motion import HeldOutMotion
@@ -78,6 +78,15 @@ class HeldOut:
     def closed(self) -> float | None:
         """Share of the base's excess that the effects close; None where noise hides the excess."""
         return closed(self.base, self.with_effects, self.expected)
+
+    def of_base(self) -> "HeldOut":
+        """The base in the place of the model with effects."""
+        folds = tuple(replace(row, with_effects=row.base) for row in self.folds)
+        motion = {
+            name: replace(one, with_effects=one.base, with_effects_nuisances=one.base_nuisances)
+            for name, one in self.motion.items()
+        }
+        return replace(self, folds=folds, motion=motion, with_effects=self.base)
 
     @property
     def tells(self) -> bool:

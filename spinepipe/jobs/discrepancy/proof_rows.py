@@ -1,5 +1,6 @@
 """Rows of the tables held_out and confusions, and what was held out of each reading."""
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -69,7 +70,7 @@ def design_rows(told: ToldApart) -> list[Row]:
             "stage": "design",
             "effect": one.effect,
             "kind": one.best.form.variant.create().kind,
-            "variant": "{}",
+            "variant": json.dumps(dict(one.best.form.variant.options)),
             "spread": one.best.form.spread,
             "scope": "*",
             "shape": "{}",

@@ -63,9 +63,11 @@ def _rows_of(
     joints: Sequence[str],
     held_out: Sequence[tuple[Array, Array, Array]] | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
-    sd = found.base.noise.sd * BORDER_PER_SI
+    noise = found.base.noise
     base, final = found.base.fit.predicted[name], found.final.fit.predicted[name]
     for number, test in enumerate(readings.tests):
+        size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
+        sd = size[:, None] * noise.sd * BORDER_PER_SI
         for t, j, c in zip(*np.nonzero(test.count), strict=True):
             factor, count = BORDER_PER_SI[c], int(test.count[t, j, c])
             fold, out_base, out_final = ("", None, None)
@@ -83,7 +85,7 @@ def _rows_of(
                     "readings": count,
                     "base": float(base[number][t, j, c] * factor),
                     "with_effects": float(final[number][t, j, c] * factor),
-                    "noise_sd": float(sd[c] / np.sqrt(count)),
+                    "noise_sd": float(sd[t, c] / np.sqrt(count)),
                     "held_out_fold": fold,
                     "held_out_base": out_base,
                     "held_out_with_effects": out_final,

@@ -49,7 +49,9 @@ def run(
     write_model(results.model_base, model_base)
     write_model(results.model_with_effects, model_with_effects)
     with appearing(verdict) as temporary:
-        temporary.write_text(json.dumps(results.verdict, indent=1) + "\n", encoding="utf-8")
+        temporary.write_text(
+            json.dumps(results.verdict, indent=1, allow_nan=False) + "\n", encoding="utf-8"
+        )
     store.forget_the_rest()
 
 

@@ -14,6 +14,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from spinepipe.jobs.digest import code_digest
 from spinepipe.jobs.discrepancy.content import content_digest
+from spinepipe.jobs.provenance import versions
 
 os.environ.setdefault("NO_ET", "1")  # pydra reports its use over the network unless told not to
 
@@ -50,13 +51,14 @@ class Store:
 
     def __init__(self, folder: str | Path, module: str) -> None:
         """``module`` is the job whose code, with all it imports, the results hang on."""
-        self._folder, self._code = Path(folder).absolute(), code_digest(module)
+        self._folder = Path(folder).absolute()
+        self._made_by = f"{code_digest(module)} {sorted(versions().items())}".encode()
         self._asked: set[str] = set()
 
     def __call__(self, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """The function's result, computed now or before; what it raises is passed on."""
         content = content_digest((function, args, sorted(kwargs.items())))
-        token = hashlib.sha256(self._code.encode() + content).hexdigest()
+        token = hashlib.sha256(self._made_by + content).hexdigest()
         self._asked.add(token)
         place = self._folder / token
         if not list(place.glob(f"*/{_DONE}")):  # else a killed run's lock would be waited for

@@ -14,6 +14,7 @@ from spinepipe.discrepancy.investigation import Investigation
 from spinepipe.discrepancy.noise import Noise
 from spinepipe.discrepancy.outcome import Outcome, Verdict
 from spinepipe.discrepancy.proof.held_out import HeldOut
+from spinepipe.discrepancy.screen import LEAST_THRESHOLD
 from spinepipe.discrepancy.values import fitted_values
 from spinepipe.discrepancy.where import Place, worst
 from spinepipe.units import BORDER_PER_SI, ROTATIONS
@@ -57,9 +58,7 @@ def verdict_data(
 
 
 def _effect(found: Found, one: Standing, cohort: Cohort) -> Data:
-    number = next(
-        k for k, s in enumerate(found.final.fit.hypothesis.supposed) if s.form == one.supposed.form
-    )
+    number = next(k for k, standing in enumerate(found.standing) if standing is one)
     variant = one.supposed.form.variant
     return {
         "name": one.name,
@@ -129,6 +128,12 @@ def _size(gap: Gap | None, name: str) -> float | None:
     return None if gap is None else float(getattr(gap, name))
 
 
+def _shape(found: Found) -> str | None:
+    """What the generic basis finds missing, None where it has no evidence."""
+    evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
+    return found.lack.shape if evident else None
+
+
 def _unknown(found: Found, ended: Outcome, places: Sequence[Place]) -> Data | None:
     if ended.verdict is not Verdict.UNKNOWN:
         return None
@@ -138,4 +143,4 @@ def _unknown(found: Found, ended: Outcome, places: Sequence[Place]) -> Data | No
         f"(gap {p.gap.gap:.1f})"
         for p in largest
     )
-    return {"where": where or "no single place stands out", "shape": found.lack.shape}
+    return {"where": where or "no single place stands out", "shape": _shape(found)}

@@ -36,6 +36,7 @@ def with_base(
     file : the model file that the study starts from, if it does.
     """
     told = _told_apart(study, cohort, ended, run)
+    ended = ended.as_told()
     return Results(
         verdict=_verdict(study, cohort, ended, told),
         rows=_rows(cohort, ended, told),
