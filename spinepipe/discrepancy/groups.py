@@ -86,9 +86,7 @@ class Index:
         signs = np.zeros(count)
         for _, columns, owners in places:
             for column, owner in zip(columns, owners, strict=True):
-                p = parameters[self.columns[column].strength]
-                assert p.off is not None
-                signs[owner] = 1.0 if p.low >= p.off else -1.0 if p.high <= p.off else 0.0
+                signs[owner] = parameters[self.columns[column].strength].side
         return signs
 
 
@@ -113,9 +111,6 @@ def summed(
         gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
         moments += onto @ part.moments[columns]
         coupled += onto @ part.shared[columns]
-    if coupled.shape[1]:
-        gain = coupled @ np.linalg.pinv(problem.gram_shared, rcond=1e-10, hermitian=True)
-        gram = gram - gain @ coupled.T
-        moments = moments - gain @ problem.moments_shared
+    gram, moments = problem.without_shared(gram, moments, coupled)
     signs = index.signs(form, places, count)
     return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))

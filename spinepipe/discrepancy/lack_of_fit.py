@@ -113,9 +113,7 @@ def _part(
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:
         gram, moment, shared = _added(grams), _added(moments), _added(coupled)
-    if shared.shape[1]:
-        gain = shared @ np.linalg.pinv(problem.gram_shared, rcond=1e-10, hermitian=True)
-        gram, moment = gram - gain @ shared.T, moment - gain @ problem.moments_shared
+    gram, moment = problem.without_shared(gram, moment, shared)
     group = Group.of(gram, np.zeros(len(gram)))
     estimate = group.estimate(moment[:, 0])
     explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)

@@ -1,7 +1,5 @@
 """Evidence for an effect of a nonlinear fit, by Laplace's method."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
@@ -9,7 +7,6 @@ from scipy.special import log_ndtr, logsumexp
 from spinepipe.discrepancy.evidence import SIZES
 from spinepipe.discrepancy.hypothesis import STRENGTH_SDS
 from spinepipe.discrepancy.joint_fit import JointFit
-from spinepipe.effects import Parameter
 from spinepipe.effects.contract import Array
 
 
@@ -26,7 +23,8 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
     away = fit.x[own] - np.array([u.mean for u in chosen])
     is_strength = np.array([u.is_strength for u in chosen])
     declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
-    sides = _sides(fit, chosen)
+    parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
+    sides = np.array([parameters[u.column].side for u in chosen])
     found = []
     for size in SIZES:
         sd = np.where(is_strength, size, 1.0) * declared
@@ -51,21 +49,3 @@ def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
     left = mine - basis @ (basis.T @ mine)
     result: Array = left.T @ left
     return result
-
-
-def _sides(fit: JointFit, unknowns: Sequence[object]) -> Array:
-    """(k,) the side of off that bounds allow a strength, 0 for both and for shapes."""
-    sides = []
-    for u in unknowns:
-        p = _parameter(fit, u)
-        if p.off is None:
-            sides.append(0.0)
-        else:
-            sides.append(1.0 if p.low >= p.off else -1.0 if p.high <= p.off else 0.0)
-    return np.array(sides)
-
-
-def _parameter(fit: JointFit, u: object) -> Parameter:
-    number, column = u.supposed, u.column  # type: ignore[attr-defined]
-    found: Parameter = fit.hypothesis.supposed[number].form.variant.create().parameters[column]
-    return found

@@ -119,6 +119,16 @@ class Linearised:
     gram_shared: Array
     moments_shared: Array
 
+    def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
+        """Products (k, k), (k, 1 + D) of k strengths less what shared unknowns take of them.
+
+        ``coupled`` (k, a): products of the strengths with the shared unknowns.
+        """
+        if not coupled.shape[1]:
+            return gram, moments
+        gain = coupled @ np.linalg.pinv(self.gram_shared, rcond=1e-10, hermitian=True)
+        return gram - gain @ coupled.T, moments - gain @ self.moments_shared
+
 
 def linearised(of: Mapping[str, Products]) -> Linearised:
     """The problem of a cohort from those of its specimens."""

@@ -122,7 +122,7 @@ def started(tried: Tried) -> Supposed:
 def _value(p: Parameter, sds: float) -> float:
     """A strength that many prior SDs from off, a little at least, inside its bounds."""
     assert p.off is not None
-    side = 1.0 if p.low >= p.off else -1.0 if p.high <= p.off else float(np.sign(sds) or 1.0)
+    side = p.side or float(np.sign(sds) or 1.0)
     away = side * max(abs(sds), SMALLEST_START) * p.prior_scale
     value = p.off * np.exp(away) if p.logarithmic else p.off + away
     margin = min(1e-3 * (p.high - p.low), SMALLEST_START * p.prior_scale)

@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 # Typical size and bound by the number of translations in the pair. Rotations: a fifth of the
@@ -33,8 +33,7 @@ class BendingRotationCoupling:
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"pair": pair} for pair in combinations(ROTATIONS, 2)),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="motion measured in both coordinates while one of them is loaded",
     )  # fmt: skip
 

@@ -56,6 +56,13 @@ class Parameter:
     meaning: str
     off: float | None = None
 
+    @property
+    def side(self) -> float:
+        """The side of off that bounds allow: 1 above, -1 below, 0 both or no strength at all."""
+        if self.off is None:
+            return 0.0
+        return 1.0 if self.low >= self.off else -1.0 if self.high <= self.off else 0.0
+
 
 @dataclass(frozen=True)
 class JointResponse:

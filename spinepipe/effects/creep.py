@@ -7,7 +7,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Advance, Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS
 
 _FRACTION = Parameter(
@@ -56,14 +56,7 @@ class Creep:
     parameters: ClassVar[tuple[Parameter, ...]] = (_FRACTION, _TIME)
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": rotation} for rotation in ROTATIONS),
-        spreads=(
-            Spread.SHARED,
-            Spread.BY_JOINT,
-            Spread.BY_SPECIMEN,
-            Spread.EACH,
-            Spread.ONE_JOINT,
-            Spread.ONE,
-        ),
+        spreads=PER_JOINT,
         told_by="recorded times, and a load that is held over several readings",
     )
 

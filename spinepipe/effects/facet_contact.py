@@ -9,7 +9,7 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import ramp
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 SIDES = ("positive", "negative")
@@ -38,8 +38,7 @@ class FacetContact:
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c, "side": s} for c in ROTATIONS for s in SIDES),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="several load steps beyond the gap and within it, in both directions",
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, req
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import sign
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 ROUNDED_RAD, ROUNDED_M = 1.7e-3, 1e-5
@@ -31,8 +31,7 @@ class FlexionExtensionAsymmetry(CarriedShare):
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c} for c in ROTATIONS),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="the same load in both directions",
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Advance, Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS
 
 ROUNDING = 1e-4
@@ -63,14 +63,7 @@ class Hysteresis:
     parameters: ClassVar[tuple[Parameter, ...]] = (_MOMENT, _YIELD_ANGLE)
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": rotation} for rotation in ROTATIONS),
-        spreads=(
-            Spread.SHARED,
-            Spread.BY_JOINT,
-            Spread.BY_SPECIMEN,
-            Spread.EACH,
-            Spread.ONE_JOINT,
-            Spread.ONE,
-        ),
+        spreads=PER_JOINT,
         told_by="loading and unloading over the same loads in one cycle, whatever time it takes",
     )
 

@@ -9,7 +9,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, req
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import ramp
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 ROUNDED = 0.1
@@ -39,8 +39,7 @@ class NeutralZone(CarriedShare):
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c} for c in ROTATIONS),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="load steps small enough to stay near the neutral pose, and large ones",
     )  # fmt: skip
 

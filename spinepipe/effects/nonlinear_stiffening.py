@@ -11,7 +11,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, req
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import magnitude
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 SHAPES = ("exponential", "tangent", "cubic")
@@ -70,8 +70,7 @@ class NonlinearStiffening(CarriedShare):
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c, "shape": s} for c in ROTATIONS for s in SHAPES),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="several load steps up to a large motion, in both directions",
     )  # fmt: skip
 

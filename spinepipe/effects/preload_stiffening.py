@@ -8,7 +8,7 @@ import numpy as np
 from spinepipe.effects.carried_share import ALL_ROTATIONS, columns_of, require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS
 
 _SUPERIOR = COORDINATES.index("superior")
@@ -31,8 +31,7 @@ class PreloadStiffening:
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
-        spreads=(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH,
-                 Spread.ONE_JOINT, Spread.ONE),
+        spreads=PER_JOINT,
         told_by="the same moments under two different compressive preloads",
     )  # fmt: skip
 

@@ -18,6 +18,17 @@ class Spread(StrEnum):
     BY_TEST = "by test"
 
 
+PER_JOINT = (
+    Spread.SHARED,
+    Spread.BY_JOINT,
+    Spread.BY_SPECIMEN,
+    Spread.EACH,
+    Spread.ONE_JOINT,
+    Spread.ONE,
+)
+"""All ways in which an effect of single joints may differ."""
+
+
 @dataclass(frozen=True)
 class Trial:
     """What is tried of an effect.
