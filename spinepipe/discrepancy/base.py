@@ -51,3 +51,12 @@ def base_parameters(
         for index in bushings
         for parameter in free_parameters(model, index, names, grouping)
     )
+
+
+def bushing_stiffness(model: SpineModel) -> Array:
+    """(J, 6) N/m and N m/rad, of all linear bushings of each joint together."""
+    total = np.zeros((model.n_joints, len(COORDINATES)))
+    for scoped in model.effects:
+        if scoped.effect.name == BUSHING:
+            total[list(scoped.joints)] += scoped.values
+    return total

@@ -58,7 +58,10 @@ class Standing:
 
 @dataclass(frozen=True)
 class Stage:
-    """One look at the effects, with the refits that followed."""
+    """One look at the effects, with the refits that followed.
+
+    ``name`` : number of the round, or whose place all others were tried in.
+    """
 
     name: str
     screen: Screen
@@ -72,7 +75,7 @@ class Found:
     Attributes
     ----------
     base, final : the grounds with the base alone and with what stands. standing : what stands.
-    lack_of_base, lack : the generic basis beside the base, and beside the final model.
+    lack : the generic basis beside the final model.
     generic_threshold : evidence of the generic basis that the null seldom exceeds.
     """
 
@@ -80,7 +83,6 @@ class Found:
     final: Grounds
     standing: tuple[Standing, ...]
     stages: tuple[Stage, ...]
-    lack_of_base: LackOfFit
     lack: LackOfFit
     generic_threshold: float
     base_gap: Gap

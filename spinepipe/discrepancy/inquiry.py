@@ -23,6 +23,16 @@ class Inquiry:
         """The first look, beside the base alone."""
         return self.stages[0]
 
+    @property
+    def rounds(self) -> int:
+        """Rounds so far in which effects could enter."""
+        return sum(stage.name.isdigit() for stage in self.stages)
+
+    @property
+    def rivalries(self) -> int:
+        """Times so far that all others were tried in an effect's place."""
+        return len(self.stages) - self.rounds
+
     def look(self, grounds: Grounds) -> Screen:
         """A screen; the null's draws are those of the first, beside the base alone."""
         rules = self.rules

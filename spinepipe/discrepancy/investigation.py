@@ -52,7 +52,7 @@ def investigate(
     grounds, rules = prepared(study, cohort, file, run)
     found = search(grounds, rules, run)
     errors = suspected_errors(grounds, measured(study, cohort), run)
-    asked = Asked(study.held_out.tests, study.held_out.specimens)
+    asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     ended = outcome(found, study.margin, proof, errors)
     return Investigation(grounds, rules, found, errors, proof, ended)

@@ -15,7 +15,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
 
-MOST_EVALUATIONS = 12
+MOST_EVALUATIONS = 40
+
+SETTLED = 1e-5
+"""Share of chi2 below which a step counts as none: a log evidence then is right to 0.01 or so."""
 
 SAME = 1e-3
 """Noise SDs by which a reading may differ when it is predicted afresh from the neutral pose."""
@@ -168,7 +171,7 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
         bounds=(low, high),
         method="dogbox",
         x_scale=np.array([_scale(u) for u in hypothesis.unknowns]),
-        ftol=1e-7,
+        ftol=SETTLED,
         xtol=1e-6,
         gtol=1e-10,
         max_nfev=MOST_EVALUATIONS,

@@ -20,6 +20,10 @@ FAR, FAR_CYCLE = 4.0, 5.0
 So are whole cycles, by their mean deviation: zeroing hands an outlier of step 0 to all the others.
 """
 
+FEWEST_AGREEING = 3
+"""Cycles that outvote an outlier; where fewer agree, two outliers may outvote the one that is not.
+"""
+
 MAD_PER_SD = 0.67449
 CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
 FEWEST = 30
@@ -74,10 +78,19 @@ def without_outliers(
             shifted = np.abs(_mean_deviations(test)) > FAR_CYCLE * whole
             far = (np.abs(_deviations(test)) > FAR * single) | shifted[:, None]
             far &= np.isfinite(test.cycles)
+            far |= _undecided(far, test)
             dropped += int(far.sum())
             tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
         kept.append(replace(specimen, tests=tuple(tests)))
     return tuple(kept), dropped
+
+
+def _undecided(far: NDArray[np.bool_], test: Repeats) -> NDArray[np.bool_]:
+    """(C, T, J, 6) readings of which too few cycles agree to say which one is wrong."""
+    there = np.isfinite(test.cycles)
+    few = (there & ~far).sum(axis=0) < FEWEST_AGREEING
+    result: NDArray[np.bool_] = there & few & far.any(axis=0)
+    return result
 
 
 def _deviations(test: Repeats) -> Array:

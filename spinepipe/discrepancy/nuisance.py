@@ -10,11 +10,12 @@ from itertools import combinations
 
 import numpy as np
 
+from spinepipe.discrepancy.base import bushing_stiffness
 from spinepipe.discrepancy.forms import Variant
 from spinepipe.discrepancy.prediction import Solved
 from spinepipe.discrepancy.signatures import EVERY_TEST, Column, signatures
 from spinepipe.effects.contract import Array
-from spinepipe.units import ROTATIONS
+from spinepipe.units import COORDINATES, ROTATIONS
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,8 @@ class NuisancePriors:
     """One prior SD of each imperfection, SI; zero leaves it out.
 
     ``posture`` tilts laws and reported frames of a joint together, as a neutral pose that was told
-    wrongly does; ``law_axes`` and ``registration`` tilt them apart.
+    wrongly does; ``law_axes`` and ``registration`` tilt them apart. ``off_diagonal`` : share of the
+    (geometric) mean of the two stiffnesses that it couples.
     """
 
     joint_centre: float = 2e-3
@@ -31,7 +33,7 @@ class NuisancePriors:
     registration: float = float(np.deg2rad(1.0))
     load_axis: float = float(np.deg2rad(1.0))
     load_gain: float = 0.02
-    off_diagonal: float = 1.0
+    off_diagonal: float = 0.02
     rotation_order: float = 0.5
 
 
@@ -39,8 +41,15 @@ POSTURE = (Variant("axes_tilt", ()), Variant("marker_bias", (("form", "tilt"),))
 """What a wrongly told neutral pose tilts by the same angles."""
 
 
-def nuisance_columns(priors: NuisancePriors, joints: int, tests: Sequence[str]) -> list[Column]:
-    """The nuisances of a specimen as columns, each scaled to its prior SD."""
+def nuisance_columns(
+    priors: NuisancePriors, stiffness: Array, tests: Sequence[str]
+) -> list[Column]:
+    """The nuisances of a specimen as columns, each scaled to its prior SD.
+
+    Parameters
+    ----------
+    stiffness : (J, 6) of the base, SI.
+    """
     every, each_test = (EVERY_TEST,), tuple(dict.fromkeys(tests))
     blocks = [
         (Variant("joint_centre_offset", ()), priors.joint_centre, every),
@@ -49,28 +58,29 @@ def nuisance_columns(priors: NuisancePriors, joints: int, tests: Sequence[str]) 
         (Variant("load_misalignment", ()), priors.load_axis, each_test),
         (Variant("load_gain", ()), priors.load_gain, each_test),
         (Variant("rotation_order", ()), priors.rotation_order, every),
-        *(
-            (Variant("bending_rotation_coupling", (("pair", pair),)), priors.off_diagonal, every)
-            for pair in combinations(ROTATIONS, 2)
-        ),
     ]
-    return [
+    found = [
         column
         for variant, sd, places in blocks
-        if sd > 0.0
-        for column in _columns(variant, sd, joints, places)
+        for column in _columns(variant, np.full(len(stiffness), sd), places)
     ]
+    for pair in combinations(ROTATIONS, 2):
+        coupled = stiffness[:, [COORDINATES.index(name) for name in pair]]
+        sds = priors.off_diagonal * np.sqrt(np.prod(coupled, axis=1))
+        found += _columns(Variant("bending_rotation_coupling", (("pair", pair),)), sds, every)
+    return found
 
 
-def _columns(variant: Variant, sd: float, joints: int, places: Sequence[str]) -> list[Column]:
-    effect = variant.create()
-    rows = list(range(joints)) if effect.per_joint else [None]
+def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Column]:
+    """Columns of a nuisance with these prior SDs (J,), those of zero left out."""
+    rows = list(range(len(sds))) if variant.create().per_joint else [None]
     shapes = (0.0,) * len(variant.shapes)
     return [
-        Column(variant, shapes, strength, joint, test, sd)
+        Column(variant, shapes, strength, joint, test, float(sds[joint or 0]))
         for strength in variant.strengths
         for joint in rows
         for test in places
+        if sds[joint or 0] > 0.0
     ]
 
 
@@ -78,14 +88,13 @@ def nuisance_signatures(
     solved: Solved, priors: NuisancePriors, tests: Sequence[str]
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
-    joints = solved.model.n_joints
-    columns = nuisance_columns(priors, joints, tests)
-    single = signatures(solved, columns)
+    stiffness = bushing_stiffness(solved.model)
+    single = signatures(solved, nuisance_columns(priors, stiffness, tests))
     if not priors.posture:
         return single
+    posture = np.full(len(stiffness), priors.posture)
     together = [
-        signatures(solved, _columns(variant, priors.posture, joints, (EVERY_TEST,)))
-        for variant in POSTURE
+        signatures(solved, _columns(variant, posture, (EVERY_TEST,))) for variant in POSTURE
     ]
     return tuple(
         np.concatenate([one, np.sum(tilts, axis=0)], axis=-1)
@@ -102,6 +111,6 @@ def as_si(settings: Mapping[str, float]) -> NuisancePriors:
         registration=float(np.deg2rad(settings["registration_deg"])),
         load_axis=float(np.deg2rad(settings["load_axis_deg"])),
         load_gain=settings["load_gain"],
-        off_diagonal=settings["off_diagonal_nm_per_rad"],
+        off_diagonal=settings["off_diagonal"],
         rotation_order=settings["rotation_order"],
     )

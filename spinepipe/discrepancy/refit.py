@@ -17,6 +17,9 @@ from spinepipe.effects import Parameter, Spread
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
 
+STARTS = (1.0, 0.5, 0.2)
+"""Shares of the strength on the screen at which fits start, one after the other."""
+
 MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 1, 1)
 """Effects that lead the screen, and forms of each, that are refitted."""
 
@@ -44,14 +47,23 @@ class Refit:
         """Name of the effect."""
         return self.form.name
 
+    @property
+    def unknowns(self) -> int:
+        """Numbers that the form adds to what is fitted."""
+        unknowns = self.fit.hypothesis.unknowns
+        return sum(one.supposed == len(self.fit.hypothesis.supposed) - 1 for one in unknowns)
+
 
 def refits(
     grounds: Grounds, screen: Screen, trials: Sequence[Trials], run: Run
 ) -> tuple[Refit, ...]:
     """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
     by_name = {one.effect: one for one in trials}
+    there = {one.form.variant for one in standing(grounds.fit)}
     found = [
-        refit(grounds, started(tried), by_name[tried.form.name], run) for tried in leading(screen)
+        refit(grounds, started(tried), by_name[tried.form.name], run)
+        for tried in leading(screen)
+        if tried.form.variant not in there
     ]
     found += [
         refit(grounds, simple, by_name[simple.form.name], run)
@@ -130,15 +142,32 @@ def _value(p: Parameter, sds: float) -> float:
 
 
 def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
-    """One more form beside those of the grounds' fit."""
+    """One more form beside those of the grounds' fit.
+
+    What tips the segment over where it starts is tried again closer to off.
+    """
     before = grounds.fit
-    supposed = (*standing(before), one)
-    fit = run(joint_fit, grounds.suppose(supposed), grounds.setting)
+    for share in STARTS:
+        supposed = (*standing(before), weaker(one, share))
+        fit = run(joint_fit, grounds.suppose(supposed), grounds.setting)
+        if fit.usable:
+            break
     if not fit.usable or _degenerate(fit, len(supposed) - 1):
         return Refit(one.form, fit, -np.inf, -np.inf)
     gain = before.chi2 - fit.chi2
     log_evidence = laplace(fit, len(supposed) - 1, gain) + trials.log_share(one.form)
     return Refit(one.form, fit, log_evidence, gain)
+
+
+def weaker(one: Supposed, share: float) -> Supposed:
+    """The same, started at a share of the way from off."""
+    parameters, start = one.form.variant.create().parameters, one.start.copy()
+    for column in one.form.variant.strengths:
+        p = parameters[column]
+        assert p.off is not None
+        away = start[column] / p.off if p.logarithmic else start[column] - p.off
+        start[column] = p.off * away**share if p.logarithmic else p.off + share * away
+    return replace(one, start=start)
 
 
 def _degenerate(fit: JointFit, number: int) -> bool:

@@ -28,7 +28,7 @@ REAL_SHARE = 0.01
 """Of the base's excess chi2: a further effect that closes less is not worth a name."""
 
 MOST_FORMS_NAMED = 4
-MOST_SWAPS = 2
+MOST_SWAPS = 3
 
 
 def search(base: Grounds, rules: Rules, run: Run) -> Found:
@@ -51,7 +51,6 @@ def search(base: Grounds, rules: Rules, run: Run) -> Found:
         final,
         stood,
         tuple(inquiry.stages),
-        lack_of_base,
         lack,
         exceeded(lack.null, rules.false_alarm),
         base_gap,
@@ -63,7 +62,7 @@ def _forward(current: Grounds, inquiry: Inquiry, base_gap: Gap) -> Grounds:
     """Let effects enter; the grounds that are left."""
     while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
         screen = inquiry.look(current)
-        name = f"round {number + 1}"
+        name = str(inquiry.rounds + 1)
         if screen.effects[0].log_evidence <= screen.threshold:
             inquiry.stages.append(Stage(name, screen))
             break

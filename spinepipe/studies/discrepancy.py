@@ -47,6 +47,10 @@ class HeldOut(BaseModel):
 
     specimens: bool = Field(default=True, description="leave one specimen out")
     tests: bool = Field(default=True, description="leave one test out")
+    refit: bool = Field(
+        default=False,
+        description="fit again without what is left out by the full simulator, not to first order",
+    )
 
 
 class Nuisance(BaseModel):
@@ -72,8 +76,11 @@ class Nuisance(BaseModel):
     )
     load_axis_deg: float = Field(default=1.0, ge=0, le=45, description="axis of the load, deg")
     load_gain: float = Field(default=0.02, ge=0, le=1, description="size of the load, as a share")
-    off_diagonal_nm_per_rad: float = Field(
-        default=1.0, ge=0, le=1e4, description="stiffness between two rotations, N m/rad"
+    off_diagonal: float = Field(
+        default=0.02,
+        ge=0,
+        le=1,
+        description="stiffness between two rotations, as a share of the geometric mean of theirs",
     )
     rotation_order: float = Field(
         default=0.5,

@@ -74,7 +74,7 @@ CANDIDATES = Table(
         Column("stage", "text",
                "design: what the tests could tell, before residuals are looked at; screen N: all "
                "candidates, linear at the model of round N; refit N: the leading few, by the full "
-               "simulator"),
+               "simulator; screen, refit in place of X (N): X taken away, all others tried there"),
         Column("effect", "text", "effect, as in a model file"),
         Column("kind", "text", "what it acts on", allowed=tuple(Kind)),
         Column("variant", "text", "its options, as JSON"),

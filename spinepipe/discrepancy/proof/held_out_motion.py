@@ -18,14 +18,11 @@ class HeldOutMotion:
     Attributes
     ----------
     fold : number of the fold, -1 for none. base, with_effects : of the models alone.
-    base_nuisances, with_effects_nuisances : what nuisances, as found in training, add.
     """
 
     fold: tuple[NDArray[np.int64], ...]
     base: tuple[Array, ...]
     with_effects: tuple[Array, ...]
-    base_nuisances: tuple[Array, ...]
-    with_effects_nuisances: tuple[Array, ...]
 
 
 def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
@@ -35,7 +32,7 @@ def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, Held
 
 def _empty(one: SpecimenReadings) -> HeldOutMotion:
     shapes = [test.count.shape for test in one.tests]
-    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(4)]
+    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
     return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
 
 
@@ -46,8 +43,6 @@ def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -
         columns = (
             (sheet.base, found.base.motion[name]),
             (sheet.with_effects, found.with_effects.motion[name]),
-            (sheet.base_nuisances, found.base.nuisances[name]),
-            (sheet.with_effects_nuisances, found.with_effects.nuisances[name]),
         )
         for test, there in enumerate(tests):
             new = there & (sheet.fold[test] < 0)

@@ -82,10 +82,7 @@ class HeldOut:
     def of_base(self) -> "HeldOut":
         """The base in the place of the model with effects."""
         folds = tuple(replace(row, with_effects=row.base) for row in self.folds)
-        motion = {
-            name: replace(one, with_effects=one.base, with_effects_nuisances=one.base_nuisances)
-            for name, one in self.motion.items()
-        }
+        motion = {name: replace(one, with_effects=one.base) for name, one in self.motion.items()}
         return replace(self, folds=folds, motion=motion, with_effects=self.base)
 
     @property

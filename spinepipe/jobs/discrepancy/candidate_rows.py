@@ -27,17 +27,17 @@ def candidate_rows(found: Found, joints: Sequence[str]) -> list[Row]:
     """What was tried, stage by stage."""
     excess = max(found.base_gap.excess, np.finfo(float).tiny)
     rows = []
-    for number, stage in enumerate(found.stages, start=1):
-        rows += _screened(stage, number, joints, excess)
-        rows += _refitted(stage, number, joints, excess)
+    for stage in found.stages:
+        rows += _screened(stage, joints, excess)
+        rows += _refitted(stage, joints, excess)
     return rows
 
 
-def _screened(stage: Stage, number: int, joints: Sequence[str], excess: float) -> list[Row]:
+def _screened(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
-            row = _form_row(f"screen {number}", tried.form, joints)
+            row = _form_row(f"screen {stage.name}", tried.form, joints)
             row |= _of_screen(tried) | {
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
@@ -79,10 +79,10 @@ def _estimate(effect: Effect, tried: Tried) -> tuple[float | None, str]:
     return border(p.unit, value)
 
 
-def _refitted(stage: Stage, number: int, joints: Sequence[str], excess: float) -> list[Row]:
+def _refitted(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     rows, seen = [], set()
     for one in stage.refits:
-        row = _form_row(f"refit {number}", one.form, joints) | _of_refit(one, excess)
+        row = _form_row(f"refit {stage.name}", one.form, joints) | _of_refit(one, excess)
         row["threshold"] = stage.screen.threshold
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
         if key not in seen:

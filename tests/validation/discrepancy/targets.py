@@ -9,7 +9,7 @@ import numpy as np
 from tests.generators.hidden import ERRORS, KNOWN, LOAD_UNIT, UNKNOWN, USUAL, Recipe
 from tests.validation.discrepancy.designs import plain, soiled, suited, with_effects
 
-FIRST_SEED = 7000
+FIRST_SEED = 9000
 """Seeds below were looked at while the search was made."""
 
 GAPS = (0.1, 0.2, 0.5, 1.0)
