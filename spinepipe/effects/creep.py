@@ -33,22 +33,29 @@ _TIME = Parameter(
 )
 
 
+LOADS = ("held", "ramped")
+
+
 @register("creep")
 @dataclass(frozen=True)
 class Creep:
     """Holding load ``-fraction z``; z lags behind the load of the laws before, ``carried``.
 
     ``dz/dt = (carried - z) / time``: with a spring before it this is the standard linear solid,
-    whose stiffness is the spring's at once and ``1 - fraction`` of it in the end. Within a load
-    step carried is taken to grow in a straight line, and z follows in closed form to its end:
-    ``z = exp(-x) z0 + a carried0 + b carried`` with x = seconds / time, b = 1 - (1 - exp(-x)) / x
-    and a = 1 - exp(-x) - b. The error falls with the square of the step. A step that takes no
-    time moves nothing: tests that record no time do not creep. Off: fraction 0.
+    whose stiffness is the spring's at once and ``1 - fraction`` of it in the end. z follows in
+    closed form to the end of a load step, x = seconds / time. Held: the load comes at once and
+    stays, ``carried - fraction z`` is constant, and
+    ``z (1 - fraction e) = (1 - fraction) e z0 + (1 - e) carried`` with e = exp(-(1 - fraction) x).
+    Ramped: carried grows in a straight line, and ``z = exp(-x) z0 + a carried0 + b carried`` with
+    b = 1 - (1 - exp(-x)) / x and a = 1 - exp(-x) - b. A step that takes no time moves nothing:
+    tests that record no time do not creep. Off: fraction 0.
 
-    Options: ``coordinate``, the one whose load relaxes.
+    Options: ``coordinate``, the one whose load relaxes; ``load``, how it is applied in a step,
+    ``held`` or ``ramped``.
     """
 
     coordinate: str = "extension"
+    load: str = "held"
     name: ClassVar[str] = "creep"
     kind: ClassVar[Kind] = Kind.PATH
     per_joint: ClassVar[bool] = True
@@ -63,16 +70,25 @@ class Creep:
     def __post_init__(self) -> None:
         if self.coordinate not in COORDINATES:
             raise ValueError(f"creep: coordinate {self.coordinate!r}; allowed: {COORDINATES}")
+        if self.load not in LOADS:
+            raise ValueError(f"creep: load {self.load!r}; allowed: {LOADS}")
 
     @property
     def _at(self) -> int:
         return COORDINATES.index(self.coordinate)
 
+    def _lag(self, parameters: Array, state: Array, seconds: float, carried: Array) -> "_Lag":
+        fraction, time = parameters.T
+        here = carried[:, self._at]
+        if self.load == "ramped":
+            return _ramped(time, state, seconds, here)
+        return _held(fraction, time, state, seconds, here)
+
     def respond_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> JointResponse:
         """Load (J, 6); state is (z, carried) of each joint at the end of the last step."""
-        at, lag = self._at, _lag(parameters[:, 1], state, seconds, carried[:, self._at])
+        at, lag = self._at, self._lag(parameters, state, seconds, carried)
         load, by_carried = np.zeros_like(q), np.zeros((*q.shape, 6))
         load[:, at] = -parameters[:, 0] * lag.z
         by_carried[:, at, at] = -parameters[:, 0] * lag.by_carried
@@ -82,9 +98,9 @@ class Creep:
         self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> Array:
         """(J, 6, 2): what lags, and its slope by the time."""
-        lag = _lag(parameters[:, 1], state, seconds, carried[:, self._at])
+        lag = self._lag(parameters, state, seconds, carried)
         derivative = np.zeros((*q.shape, 2))
-        derivative[:, self._at, 0] = -lag.z
+        derivative[:, self._at, 0] = -lag.z - parameters[:, 0] * lag.by_fraction
         derivative[:, self._at, 1] = -parameters[:, 0] * lag.by_time
         return derivative
 
@@ -92,7 +108,7 @@ class Creep:
         self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
     ) -> Array:
         """(J, 6, 2): by z and carried at the step's start."""
-        lag = _lag(parameters[:, 1], state, seconds, carried[:, self._at])
+        lag = self._lag(parameters, state, seconds, carried)
         derivative = np.zeros((*q.shape, 2))
         derivative[:, self._at] = -parameters[:, :1] * lag.by_state
         return derivative
@@ -102,10 +118,10 @@ class Creep:
     ) -> Advance:
         """z and carried at the end of the step."""
         here = carried[:, self._at]
-        lag = _lag(parameters[:, 1], state, seconds, here)
+        lag = self._lag(parameters, state, seconds, carried)
         by_parameter, by_state = np.zeros((2, len(q), 2, 2))
         by_carried = np.zeros((len(q), 2, 6))
-        by_parameter[:, 0, 1] = lag.by_time
+        by_parameter[:, 0] = np.column_stack([lag.by_fraction, lag.by_time])
         by_state[:, 0] = lag.by_state
         by_carried[:, 0, self._at] = lag.by_carried
         by_carried[:, 1, self._at] = 1.0
@@ -120,17 +136,32 @@ class _Lag:
     z: Array
     by_carried: Array
     by_state: Array
+    by_fraction: Array
     by_time: Array
 
 
-def _lag(time: Array, state: Array, seconds: float, carried: Array) -> _Lag:
+def _held(fraction: Array, time: Array, state: Array, seconds: float, carried: Array) -> _Lag:
+    """What follows carried (J,) while the load is constant."""
+    x, z0 = seconds / time, state[:, 0]
+    kept = np.exp(-(1.0 - fraction) * x)
+    whole = 1.0 - fraction * kept
+    z = ((1.0 - fraction) * kept * z0 + (1.0 - kept) * carried) / whole
+    by_kept = ((1.0 - fraction) * z0 - carried + fraction * z) / whole
+    by_fraction = kept * (z - z0) / whole + by_kept * kept * x
+    by_state = np.column_stack([(1.0 - fraction) * kept / whole, np.zeros_like(z0)])
+    by_time = by_kept * kept * (1.0 - fraction) * x / time
+    return _Lag(z, (1.0 - kept) / whole, by_state, by_fraction, by_time)
+
+
+def _ramped(time: Array, state: Array, seconds: float, carried: Array) -> _Lag:
     """What follows a straight line to carried (J,) with a time constant."""
     x = seconds / time
     kept, mean, mean_slope = np.exp(-x), _mean(x), _mean_slope(x)
     z0, carried0 = state.T
     z = kept * z0 + (mean - kept) * carried0 + (1.0 - mean) * carried
     by_x = kept * (carried0 - z0) + mean_slope * (carried0 - carried)
-    return _Lag(z, 1.0 - mean, np.column_stack([kept, mean - kept]), -x / time * by_x)
+    by_state = np.column_stack([kept, mean - kept])
+    return _Lag(z, 1.0 - mean, by_state, np.zeros_like(z), -x / time * by_x)
 
 
 def _mean(x: Array) -> Array:

@@ -18,7 +18,7 @@ TIMES = np.array([0.0, 40.0, 140.0, 220.0, 300.0, 340.0])
 MOMENTS = np.array([0.0, 4.0, 4.0, -3.0, -3.0, 2.0])
 
 
-def joint(effect: str, *values: float) -> SpineModel:
+def joint(effect: str, *values: float, **options: str) -> SpineModel:
     """One joint on springs, without weight, with one more effect in extension."""
     springs = np.array([[1e5, 1e5, 1e5, SPRING, 50.0, 60.0]])
     return SpineModel(
@@ -30,7 +30,7 @@ def joint(effect: str, *values: float) -> SpineModel:
         damping=np.ones((1, 6)),
         effects=(
             ScopedEffect(create("linear_bushing"), (0,), springs),
-            ScopedEffect(create(effect), (0,), np.array([values])),
+            ScopedEffect(create(effect, options), (0,), np.array([values])),
         ),
     )
 
@@ -77,25 +77,42 @@ def test_friction_is_dahls_differential_equation(per_piece: int) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * moment / SPRING)
 
 
-def test_creep_is_the_standard_linear_solid() -> None:
+FRACTION, TIME = 0.4, 60.0
+
+
+def angle(moment: float, dashpot: float) -> float:
     """A spring (1 - f) k beside a Maxwell arm: spring f k on a dashpot of viscosity f k T.
 
     Its internal variable is the dashpot's angle: M = (1 - f) k q + f k (q - p), p' = (q - p) / T.
     """
-    fraction, time = 0.4, 60.0
-    arm = fraction * SPRING
+    return (moment + FRACTION * SPRING * dashpot) / SPRING
 
-    def angle(moment: float, dashpot: float) -> float:
-        return (moment + arm * dashpot) / SPRING
 
+def test_creep_under_held_loads_is_the_standard_linear_solid() -> None:
+    dashpot, expected = np.zeros(1), [0.0]
+    for number in range(1, len(TIMES)):
+        moment = MOMENTS[number]
+        run = solve_ivp(
+            lambda t, p, moment=moment: (angle(moment, p) - p) / TIME,
+            TIMES[number - 1 : number + 1],
+            dashpot,
+            **TIGHT,
+        )
+        dashpot = run.y[:, -1]
+        expected.append(angle(moment, dashpot[0]))
+    found = extension(joint("creep", FRACTION, TIME), TIMES, MOMENTS)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_creep_under_ramps_is_the_standard_linear_solid() -> None:
     def rate(t: float, dashpot: Array) -> Array:
-        return (angle(np.interp(t, TIMES, MOMENTS), dashpot) - dashpot) / time
+        return (angle(np.interp(t, TIMES, MOMENTS), dashpot) - dashpot) / TIME
 
     errors = []
     for per_piece in (4, 8, 16):
         times, moments = steps_of(per_piece)
         run = solve_ivp(rate, (0.0, TIMES[-1]), [0.0], t_eval=times, max_step=5.0, **TIGHT)
-        found = extension(joint("creep", fraction, time), times, moments)
+        found = extension(joint("creep", FRACTION, TIME, load="ramped"), times, moments)
         errors.append(np.abs(found - angle(moments, run.y[0])).max())
     largest = 4.0 / SPRING
     assert errors[0] < 2e-3 * largest

@@ -24,10 +24,14 @@ def friction(
 
 
 def creeping(
-    n: int, fraction: float = 0.3, time: float = 3.0, coordinate: str = "extension"
+    n: int,
+    fraction: float = 0.3,
+    time: float = 3.0,
+    coordinate: str = "extension",
+    load: str = "held",
 ) -> ScopedEffect:
     """Creep in all n joints."""
-    effect = create("creep", {"coordinate": coordinate})
+    effect = create("creep", {"coordinate": coordinate, "load": load})
     return scoped(effect, tuple(range(n)), (fraction, time))
 
 

@@ -69,7 +69,7 @@ def test_four_lines_are_a_study(tmp_path: Path) -> None:
     assert (study.seed, study.false_alarm, study.bootstrap, study.margin) == (2024, 0.01, 500, 3.0)
     assert study.held_out.specimens
     assert study.held_out.tests
-    sds = (2.0, 2.0, 1.0, 1.0, 1.0, 0.02, 1.0, 0.5)
+    sds = (2.0, 2.0, 1.0, 1.0, 1.0, 0.02, 0.02, 0.5)
     assert tuple(dict(study.nuisance).values()) == sds
     assert cohort.name == "chains"
 

@@ -55,11 +55,16 @@ MIXED = (
 PATHS = {
     "hysteresis": (friction(3),),
     "creep": (creeping(3),),
+    "creep of ramps": (creeping(3, load="ramped"),),
     "creep of what hysteresis carries": (friction(3, coordinate="right_bending"),
                                          creeping(3, coordinate="right_bending")),
     "mixed": MIXED,
 }  # fmt: skip
-OFF = {"hysteresis": (friction(3, 0.0),), "creep": (creeping(3, 0.0),)}
+OFF = {
+    "hysteresis": (friction(3, 0.0),),
+    "creep": (creeping(3, 0.0),),
+    "creep of ramps": (creeping(3, 0.0, load="ramped"),),
+}
 
 
 def unknowns(system: System, strengths_only: bool = False) -> tuple[FreeParameter, ...]:
@@ -201,14 +206,15 @@ def test_corners_much_sharper_than_a_step_are_passed(moment, yield_deg, steps) -
         assert all(np.abs(after.state[:, 1]).max() < 1.01 for after in step.advances.values())
 
 
-def drift(fraction: float, per_time: float) -> tuple[Array, Array]:
+def drift(fraction: float, per_time: float, load: str) -> tuple[Array, Array]:
     """Found and exact extension while 2 N m are held for five time constants of 60 s.
 
     k q = M + f z and dz/dt = (k q - z) / T give
     q = M / k (1 + f / (1 - f) (1 - exp(-(1 - f) t / T))).
     """
     times = np.arange(0.0, 5.0 + 1e-9, per_time) * 60.0
-    found = angles(one_joint(creeping(1, fraction, 60.0)), np.full(len(times), 2.0), times)
+    creep = creeping(1, fraction, 60.0, load=load)
+    found = angles(one_joint(creep), np.full(len(times), 2.0), times)
     kept = 1.0 - fraction
     exact = 1.0 + fraction / kept * (1.0 - np.exp(-kept * times / 60.0))
     return found, 2.0 / EXTENSION_SPRING * exact
@@ -216,9 +222,16 @@ def drift(fraction: float, per_time: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("fraction", [0.2, 0.5, 0.9])
 def test_a_held_load_creeps_by_the_closed_form(fraction: float) -> None:
+    for per_time in (0.05, 0.5, 2.5):
+        found, exact = drift(fraction, per_time, "held")
+        np.testing.assert_allclose(found, exact, rtol=1e-11)
+
+
+@pytest.mark.parametrize("fraction", [0.2, 0.5, 0.9])
+def test_in_small_steps_a_ramp_that_stands_still_is_a_held_load(fraction: float) -> None:
     errors = []
     for per_time in (0.05, 0.1, 0.5, 1.0):
-        found, exact = drift(fraction, per_time)
+        found, exact = drift(fraction, per_time, "ramped")
         in_the_end = 2.0 / EXTENSION_SPRING * fraction / (1.0 - fraction)
         errors.append(np.abs(found - exact).max() / in_the_end)
         assert found[0] == pytest.approx(exact[0], rel=1e-13)
