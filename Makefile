@@ -13,7 +13,7 @@ full: env  ## build the long studies too
 	$(BIN)/snakemake -j$(CORES) full
 
 test: dev-env  ## run all tests
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
 lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 	$(BIN)/ruff format --check .
