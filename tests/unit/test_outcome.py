@@ -51,7 +51,7 @@ def ended(
     gap = left or Gap(400.0, 400.0, 420)
     of_base = Gap(gap.chi2 + gain, gap.dof, gap.readings)
     final = grounds(500.0 - gain)
-    return Found(grounds(500.0), final, standing, (), basis, basis, generic_threshold, of_base, gap)
+    return Found(grounds(500.0), final, standing, (), basis, generic_threshold, of_base, gap)
 
 
 def proof(over_base: float | None) -> HeldOut:
@@ -127,6 +127,14 @@ def test_effects_that_only_mend_one_another_imitate_something_else() -> None:
 
 def test_one_effect_has_nothing_to_mend() -> None:
     assert says(ended(stands(alone=1.0)))[0] == "NAMED"
+
+
+def test_many_values_that_close_no_gap_are_no_name() -> None:
+    """40 values take 40 off chi2 by chance: chi2 falls by 39, the degrees of freedom by 40."""
+    found = ended(stands("creep"), gain=39.0, left=Gap(480.0, 400.0, 500))
+    found = replace(found, base_gap=Gap(519.0, 440.0, 500))
+    assert_unknown(outcome(found, MARGIN), "evidence for creep", "closes no gap")
+    assert outcome(replace(found, base_gap=Gap(521.0, 440.0, 500)), MARGIN).verdict == "NAMED"
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,10 @@ Cohorts whose truth is hidden, made by another simulator (tests/generators/hidde
 laws of its own), searched with the rules a study has by default but for 300 draws of the null.
 Thresholds were tuned on other seeds. Top-1: exactly the truth is named. Wrong name: any name that
 is not true. Intervals: Clopper-Pearson, of medians by order statistics, 95 %. Reached: by the
-whole interval. Gaps are those truly there, in SD of one reading. The detection limit and
-"judged able" are spinepipe's own; "by algebra" is not: centres need translations or preloads,
-stiffness that grows with compression needs two preloads."""
+whole interval. Gaps are those truly there, in SD of one reading. The detection limit
+(the gap at which an effect should be found in nine cohorts of ten) and "judged able" are
+spinepipe's own; "by algebra" is not: centres need translations or preloads, stiffness that grows
+with compression needs two preloads."""
 
 
 def write(rows: Sequence[Row], command: str, code: str, folder: Path = RESULTS) -> None:
