@@ -84,12 +84,31 @@ def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Column
     ]
 
 
+ALIKE = ("rotation_order", "bending_rotation_coupling")
+"""Nuisances that joints may share, as they come from one convention or one kind of tissue."""
+
+
+def _alike(columns: Sequence[Column], moved: tuple[Array, ...]) -> list[Array]:
+    """(T, J, 6, g) per test: columns of a nuisance that joints may share, all joints together."""
+    names = [(c.variant, c.strength) if c.variant.effect in ALIKE else None for c in columns]
+    kinds = [kind for kind in dict.fromkeys(names) if kind is not None]
+    onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
+    return [one @ onto.reshape(len(columns), len(kinds)) for one in moved]
+
+
 def nuisance_signatures(
     solved: Solved, priors: NuisancePriors, tests: Sequence[str]
 ) -> tuple[Array, ...]:
-    """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance."""
+    """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance.
+
+    Rotation order and off-diagonals differ between joints, and again all together by as much.
+    """
     stiffness = bushing_stiffness(solved.model)
-    single = signatures(solved, nuisance_columns(priors, stiffness, tests))
+    columns = nuisance_columns(priors, stiffness, tests)
+    single = signatures(solved, columns)
+    single = tuple(
+        np.concatenate(pair, axis=-1) for pair in zip(single, _alike(columns, single), strict=True)
+    )
     if not priors.posture:
         return single
     posture = np.full(len(stiffness), priors.posture)

@@ -170,9 +170,6 @@ def _unexplained(found: Found) -> str:
         alone = _listed(list(dict.fromkeys(props)), "and")
         return f"{names} imitate it together, but by itself nothing speaks for {alone}"
     excess = found.final_gap.excess
-    if excess >= found.base_gap.excess:
-        names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
-        return f"there is evidence for {names}, but it closes no gap: it only has many values"
     if found.final_gap.interval[0] > LEAST_LEFT and excess > GAP_LEFT * (gain + excess):
         return "most of the discrepancy stays whatever known effect is added"
     return ""
