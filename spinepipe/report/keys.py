@@ -42,8 +42,9 @@ def _rows(whole: Schema, part: Schema, prefix: str) -> Iterator[tuple[str, ...]]
             yield from _rows(whole, inner, f"{key}[].")
         elif "discriminator" in inner:
             forms = inner["discriminator"]
-            yield (code(key), "list of mappings", _default(given, name in required),
-                   f"the keys of one form, by `{forms['propertyName']}`", field["told"])  # fmt: skip
+            one_of = f"the keys of one form, by `{forms['propertyName']}`"
+            yield (code(key), "list of mappings", _default(given, name in required), one_of,
+                   field["told"])  # fmt: skip
             for form, reference in forms["mapping"].items():
                 yield from _rows(whole, _resolved(whole, {"$ref": reference}), f"{key}[{form}].")
         else:

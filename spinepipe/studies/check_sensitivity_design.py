@@ -34,9 +34,11 @@ def _samples(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
         below = 2 ** int(log2(n))
         remedy = f"take {below} or {2 * below}"
         yield Problem(*place, str(n), "a power of two with method sobol", remedy)
-    fewest = 4 * design.harmonics**2 + 1
+    others = max(1, len(study.factor_names) - 1)
+    fewest = 4 * design.harmonics**2 * others + 1  # for each factor a frequency of its own
     if design.method == "fast" and n < fewest:
-        allowed = f"at least {fewest} with method fast and {design.harmonics} harmonics"
+        count = f"{design.harmonics} harmonics and {others + 1} factors"
+        allowed = f"at least {fewest} with method fast, {count}"
         yield Problem(*place, str(n), allowed, "take more samples, or fewer harmonics")
     if design.method == "morris" and design.levels % 2:
         allowed = "an even number: steps of half the levels must stay on the grid"

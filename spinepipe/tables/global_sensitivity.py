@@ -48,6 +48,7 @@ DESIGN = Table(
         _FACTOR,
         Column("value", "number", "its value: an offset from the cohort's own, or a multiplier",
                "see unit"),
+        Column("group", "text", "group that gets an index; the factor's own name without one"),
         Column("unit", "text", "unit of the value; 1: a multiplier", allowed=("mm", "deg", "1")),
     ),
 )  # fmt: skip
@@ -134,6 +135,10 @@ INDICES = Table(
         *_OUTPUT,
         _OTHER,
         *_numbers("no index, or one without an interval"),
+        Column("mean", "number", "mean of the output over all runs that have it",
+               "of the output", "no run has it"),
+        Column("sd", "number", "standard deviation of the output over all runs that have it",
+               "of the output", "no run has it", low=0.0),
         Column("noise_floor", "number",
                "upper end of the interval of the same index of the factor that changes nothing",
                "see index", "no such factor, index or interval"),

@@ -105,7 +105,7 @@ def convergence(found: pd.DataFrame, off: float = 0.2) -> pd.DataFrame:
     return table(CONVERGENCE, [{str(k): v for k, v in row.items()} for row in grown])
 
 
-def runs(n: int = 600, lost: int = 5) -> tuple[pd.DataFrame, pd.DataFrame]:
+def runs(n: int = 600, lost: int = 5, **groups: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Responses and design of the function itself; joint L4L5 moves twice as far as the others."""
     rng = np.random.default_rng(1)
     values = {name: rng.normal(size=n) for name in SLOPES}
@@ -113,7 +113,13 @@ def runs(n: int = 600, lost: int = 5) -> tuple[pd.DataFrame, pd.DataFrame]:
     values["load_size"] = np.exp(values["load_size"])
     output = sum(slope * values[name] for name, slope in SLOPES.items())
     design = [
-        {"sample": k, "factor": name, "value": values[name][k], "unit": units.get(name, "1")}
+        {
+            "sample": k,
+            "factor": name,
+            "value": values[name][k],
+            "group": groups.get(name, name),
+            "unit": units.get(name, "1"),
+        }
         for k in range(n)
         for name in SLOPES
     ]
@@ -335,13 +341,13 @@ def test_runs_over_the_leading_factors(cohort: Cohort) -> None:
 
 
 def test_a_group_is_shown_by_the_member_that_the_output_follows(cohort: Cohort) -> None:
-    responses, design = runs()
+    responses, design = runs(load_size="rig", load_point_x="rig")
     grouped = indices(factors=("rig", "mass", "damping", "dummy"))
     grouped.loc[grouped["factor"] == "rig", "estimate"] = 0.99
     figure = drawn("top_factors", cohort, responses, design, grouped)
     assert figure.axes[0].get_xlabel() == "load size (times)"
     assert titles(figure)[0] == "in a group"
-    assert "for a group" in said(figure)
+    assert "of a group the factor" in said(figure)
 
 
 def test_running_median_of_a_line_is_the_line() -> None:

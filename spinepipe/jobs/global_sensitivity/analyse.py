@@ -65,20 +65,24 @@ def _asked(settings: GlobalSensitivity) -> Settings:
 def _index_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, Any]]:
     found = indices(design_of(settings), one.values, one.ok, _asked(settings), one.resolution)
     floors = noise_floor(found)
+    means, sds = _sizes(one)
     for index in found:
         above = above_floor(index, floors)
         nothing = [None] * len(one.where)
         floor = floors[index.index].tolist() if index.index in floors else nothing
         columns = zip(
-            one.where, _numbers(index), floor, above, index.status, index.message, strict=True
+            *(one.where, _numbers(index), means, sds, floor, above, index.status, index.message),
+            strict=True,
         )
-        for where, numbers, top, is_above, status, message in columns:
+        for where, numbers, mean, sd, top, is_above, status, message in columns:
             yield {
                 **dict(zip(WHERE, where, strict=True)),
                 "index": index.index,
                 "factor": index.factor,
                 "other": index.other,
                 **numbers,
+                "mean": mean,
+                "sd": sd,
                 "noise_floor": top,
                 "above_floor": is_above,
                 "runs": index.runs,
@@ -101,6 +105,15 @@ def _convergence_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict
                     "runs": stage.runs,
                     **numbers,
                 }
+
+
+def _sizes(one: Output) -> tuple[list[float | None], list[float | None]]:
+    """Mean and SD of each output over the runs that have it."""
+    if not one.ok.any():
+        nothing: list[float | None] = [None] * len(one.where)
+        return nothing, nothing
+    values = one.values[one.ok]
+    return values.mean(axis=0).tolist(), values.std(axis=0).tolist()
 
 
 def _numbers(index: Index) -> Sequence[dict[str, float | None]]:

@@ -22,6 +22,7 @@ def run(root: str, study: str, output: str) -> None:
         "sample": np.repeat(np.arange(samples), count),
         "factor": _repeated(settings.factor_names, samples),
         "value": values.ravel(),
+        "group": _repeated(settings.groups, samples),
         "unit": _repeated(settings.units, samples),
     }
     made_by = provenance("global_sensitivity.design", settings, cohort)

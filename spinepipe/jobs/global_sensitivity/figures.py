@@ -1,12 +1,16 @@
 """Job: one figure of a global sensitivity study, as SVG and as PNG."""
 
+from collections.abc import Callable
+
+from matplotlib.figure import Figure
+
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.global_sensitivity import convergence_figure, indices_figure, scatter_figure
 from spinepipe.report.style import save, style
 from spinepipe.studies import GlobalSensitivity
 from spinepipe.tables import read_frames
 
-DRAW = {
+DRAW: dict[str, Callable[..., Figure]] = {
     "factor_indices": indices_figure,
     "index_convergence": convergence_figure,
     "top_factors": scatter_figure,

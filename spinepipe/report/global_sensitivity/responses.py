@@ -25,7 +25,7 @@ class Output:
     Attributes
     ----------
     values : output by sample, in the unit of the tables.
-    factors : its leading factors; for a group a factor that has no index of its own.
+    factors : its leading factors, of a group one member.
     index : rows of the main index of this output, by factor or group.
     """
 
@@ -38,9 +38,18 @@ class Output:
 
 
 def output_of(
-    panel: Panel, responses: pd.DataFrame, measures: Measures, drawn: Values
+    panel: Panel,
+    responses: pd.DataFrame,
+    measures: Measures,
+    drawn: Values,
+    groups: Mapping[str, str],
 ) -> Output | None:
-    """The output at the joint where it varies most, of the first specimen; None without runs."""
+    """The output at the joint where it varies most, of the first specimen; None without runs.
+
+    Parameters
+    ----------
+    groups : group of each factor.
+    """
     specimen = str(panel.rows["specimen"].iloc[0])
     rows = responses[
         (responses["specimen"] == specimen)
@@ -59,21 +68,21 @@ def output_of(
         & (panel.rows["joint"] == joint)
     ].set_index("factor")
     order = index["estimate"].drop(DUMMY, errors="ignore").sort_values(ascending=False)
-    return Output(panel, specimen, joint, values, _drawn(list(order.index), values, drawn), index)
+    leading = _drawn(list(order.index), values, drawn, groups)
+    return Output(panel, specimen, joint, values, leading, index)
 
 
-def _drawn(order: Sequence[str], values: pd.Series, drawn: Values) -> tuple[str, ...]:
-    """The leading factors; a group's place takes the best follower of those in groups.
-
-    Which factor is in which group is in no table. All that have no index are in one; that whose
-    ranks follow the output's most is the one to look at.
-    """
-    members = [name for name in drawn if name not in order and name != DUMMY]
+def _drawn(
+    order: Sequence[str], values: pd.Series, drawn: Values, groups: Mapping[str, str]
+) -> tuple[str, ...]:
+    """The leading factors; of a group the member whose ranks follow the output's most."""
     ranks = values.rank()
-    follows = {name: abs(ranks.corr(drawn[name].reindex(values.index).rank())) for name in members}
-    best = iter(sorted(members, key=lambda name: -follows[name]))
-    found = [name if name in drawn else next(best, "") for name in order[:TOP]]
-    return tuple(name for name in found if name)
+
+    def follows(name: str) -> float:
+        return abs(float(ranks.corr(drawn[name].reindex(values.index).rank())))
+
+    members = [[name for name in drawn if groups[name] == leader] for leader in order[:TOP]]
+    return tuple(max(of_group, key=follows) for of_group in members if of_group)
 
 
 def column_of(output: str, coordinate: str, responses: pd.DataFrame) -> str:

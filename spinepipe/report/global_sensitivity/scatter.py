@@ -38,7 +38,8 @@ def scatter_figure(
     values, units = _values(design)
     run = [panel for panel in found if panel.output != "stiffness"]
     first = first_of(run, MOST_OUTPUTS)
-    every = [output_of(panel, responses, measures, values) for panel in first]
+    groups = dict(zip(design["factor"], design["group"], strict=True))
+    every = [output_of(panel, responses, measures, values, groups) for panel in first]
     lines = [one for one in every if one is not None and one.factors]
     if not lines:
         return saying("No runs can be shown: none has an equilibrium.")
@@ -122,5 +123,5 @@ def _words(lines: Sequence[Output], cohort: Cohort) -> str:
     dots = f", {MOST_DOTS} of them drawn" if runs > MOST_DOTS else ""
     parts.append(f"{count(runs, 'run')} with an equilibrium{dots}")
     if any(name not in one.index.index for one in lines for name in one.factors):
-        parts.append("for a group, that of all factors in groups which the output follows most")
+        parts.append("of a group the factor that the output follows most")
     return capital("; ".join(parts)) + "."
