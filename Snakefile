@@ -27,6 +27,7 @@ wildcard_constraints:
     method="|".join(METHODS),
     sd_mm="[0-9.e+-]+",
     block="[0-9]{3,5}|pooled",
+    batch="[0-9]{5,7}",
     representation="[a-z_]+",
     fitted_to="[^/=]+",
     without="[^/=]+",
@@ -38,6 +39,7 @@ include: "workflow/rules/identification.smk"
 include: "workflow/rules/range_of_motion.smk"
 include: "workflow/rules/cohort_stiffness.smk"
 include: "workflow/rules/discrepancy.smk"
+include: "workflow/rules/global_sensitivity.smk"
 
 
 rule all:

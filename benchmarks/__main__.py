@@ -16,7 +16,9 @@ from benchmarks import (
     engine,
     identification,
     lost_fits,
+    many_spines,
     real_geometry,
+    sensitivity,
     study,
 )
 from benchmarks.timing import machine
@@ -33,6 +35,8 @@ def main() -> None:
         "whole_study": whole_study,
         "cohort": cohort_parts,
         "discrepancy": lambda: discrepancy_parts(options.small),
+        "many_spines": many_spines_part,
+        "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
@@ -147,6 +151,36 @@ def discrepancy_parts(small: bool) -> None:
         found.append({"recipe": case.recipe.as_dict(), "said": asdict(said), "runs": rows})
     if not small:
         _write("discrepancy", lines, {"machine": about, "cohorts": found})
+
+
+def many_spines_part() -> None:
+    """One equilibrium by number of joints: among many, by the engine of record, by OpenSim."""
+    about = _about()
+    lines = _head("Equilibria of many spines", about)
+    lines += [
+        "",
+        "| joints | among many, us | engine of record with loading, us | OpenSim static, us "
+        "| agreement | handed on |",
+        "|---|---|---|---|---|---|",
+    ]
+    rows = []
+    for row in many_spines.growth():
+        rows.append(asdict(row))
+        lines.append(
+            f"| {row.joints} | {1e6 * row.together_s:.0f} | {1e6 * row.engine_s:.0f} "
+            f"| {1e6 * row.opensim_s:.0f} | {row.difference:.0e} | {100 * row.by_engine:.0f} % |"
+        )
+        print(lines[-1], flush=True)
+    _write("many_spines", lines, {"machine": about, "growth": rows})
+
+
+def sensitivity_parts() -> None:
+    """Sobol studies of full size, and growth with the number of targets."""
+    about = _about()
+    lines = _head("Global sensitivity", about)
+    rows = _study_rows(lines, sensitivity.sobol_runs(), sensitivity.STUDY)
+    rows += _study_rows(lines, sensitivity.target_runs(), sensitivity.STUDY)
+    _write("sensitivity", lines, {"machine": about, "study": rows})
 
 
 def real_geometry_part(given: str | None) -> None:

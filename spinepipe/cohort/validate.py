@@ -34,10 +34,11 @@ def _distinct(details: list[ErrorDetails]) -> Iterator[ErrorDetails]:
 
 
 def _problem(model: type[BaseModel], document: Document, detail: ErrorDetails) -> Problem:
-    loc = detail["loc"]
+    owner, field, loc = _field_at(model, detail["loc"])
     key = ".".join(map(str, loc))
-    owner, field = _field_at(model, loc)
     place = (document.file, document.line_of(key), key or None)
+    if detail["type"].startswith("union_tag"):
+        return _no_such_form(document, key, detail)
     if detail["type"] == "extra_forbidden":
         names = list(owner.model_fields)
         remedy = did_you_mean(str(loc[-1]), names, "delete it or correct its name")
@@ -53,18 +54,54 @@ def _problem(model: type[BaseModel], document: Document, detail: ErrorDetails) -
     return Problem(*place, _shown(detail["input"]), allowed, remedy)
 
 
+def _no_such_form(document: Document, key: str, detail: ErrorDetails) -> Problem:
+    """An item that does not say which of several forms it has, or one that there is not."""
+    context = detail.get("ctx", {})
+    (name,) = _quoted(context["discriminator"])
+    key = f"{key}.{name}"
+    place = (document.file, document.line_of(key), key)
+    if detail["type"] == "union_tag_not_found":
+        found, allowed = "nothing: the key is missing", "a form, which decides on the other keys"
+        return Problem(*place, found, allowed, f"add `{name}:`")
+    tags = _quoted(context["expected_tags"])
+    remedy = did_you_mean(context["tag"], tags, "it decides which other keys are allowed")
+    return Problem(*place, repr(context["tag"]), one_of(tags), remedy)
+
+
 def _field_at(
     model: type[BaseModel], loc: tuple[int | str, ...]
-) -> tuple[type[BaseModel], FieldInfo | None]:
-    """The innermost model on the way to a place, and the field of it that was last named."""
+) -> tuple[type[BaseModel], FieldInfo | None, tuple[int | str, ...]]:
+    """The innermost model on the way to a place, the field of it that was last named, the place.
+
+    Where an item may have several forms, pydantic's place names the form, which is no key.
+    """
     owner, field = model, None
+    keys: list[int | str] = []
     for name in loc:
+        forms = _forms(field)
+        if name in forms:
+            owner, field = forms[str(name)], None
+            continue
+        keys.append(name)
         inner = _inner_model(field)
         if inner is not None:
             owner, field = inner, None
         if isinstance(name, str) and name in owner.model_fields:
             field = owner.model_fields[name]
-    return owner, field
+    return owner, field, tuple(keys)
+
+
+def _forms(field: FieldInfo | None) -> dict[str, type[BaseModel]]:
+    """Models of a list of items with one of several forms, by what says which; else none."""
+    for item in get_args(field.annotation) if field is not None else ():
+        for told in getattr(item, "__metadata__", ()):
+            tag = getattr(told, "discriminator", None)
+            if isinstance(tag, str):
+                models = get_args(item.__origin__)
+                return {
+                    n: one for one in models for n in get_args(one.model_fields[tag].annotation)
+                }
+    return {}
 
 
 def _inner_model(field: FieldInfo | None) -> type[BaseModel] | None:

@@ -61,7 +61,7 @@ def _folder(name: str, root: str, _study_file: Stamp) -> Path:
 def _study(
     name: str, root: str, _study_file: Stamp, _cohort_files: tuple[Stamp, ...]
 ) -> tuple[Study, Cohort]:
-    return check(Path(root), name)
+    return check(Path(root), name, starting=False)
 
 
 def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort]:

@@ -7,6 +7,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs import layout
 from spinepipe.jobs.cohort_stiffness import layout as cohort_stiffness
 from spinepipe.jobs.discrepancy import layout as discrepancy
+from spinepipe.jobs.global_sensitivity import layout as global_sensitivity
 from spinepipe.jobs.range_of_motion import layout as range_of_motion
 from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies import Study
@@ -16,10 +17,16 @@ LAYOUTS: dict[str, Callable[[Any, Cohort], StudyFiles]] = {
     "range_of_motion": range_of_motion.RangeOfMotionFiles.of,
     "cohort_stiffness": cohort_stiffness.CohortLayout.of,
     "discrepancy": discrepancy.DiscrepancyFiles.of,
+    "global_sensitivity": global_sensitivity.SensitivityFiles.of,
 }
 """What lists the files of each kind of study."""
 
-JOINED = (*layout.OF_JOBS, *cohort_stiffness.OF_JOBS, *range_of_motion.OF_JOBS)
+JOINED = (
+    *layout.OF_JOBS,
+    *cohort_stiffness.OF_JOBS,
+    *range_of_motion.OF_JOBS,
+    *global_sensitivity.OF_JOBS,
+)
 """Tables of all kinds that are joined from job files."""
 
 

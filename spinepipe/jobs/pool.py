@@ -30,7 +30,7 @@ from typing import Any
 _JOBS = Path(__file__).resolve().parent
 _PRELOADED = (
     *("calibrate", "simulate", "bootstrap", "collect", "cohort_stiffness.fit"),
-    "range_of_motion.simulate",
+    *("range_of_motion.simulate", "global_sensitivity.respond"),
 )
 """Jobs that come by the hundreds: imported once in the server, others when first asked for."""
 

@@ -23,6 +23,11 @@ _FRAMES = {"poses", "pose_sd"}
 """Settings of range of motion: what is computed, of which stiffness sets, in which frames."""
 
 
+_RESPONDING = {"specimens", "tests", "steps", "stiffness", "level_stiffness", "damping", "loading"}
+_ANALYSING = {"bootstraps", "confidence", "most_failed", "outputs"}
+"""Settings of global sensitivity: what the samples are done with, and what is made of them."""
+
+
 def _whole(*names: str) -> dict[str, Any]:
     return dict.fromkeys(names, True)
 
@@ -79,6 +84,12 @@ IRRELEVANT: dict[str, dict[str, Any]] = {
     "range_of_motion.variance": {},
     "range_of_motion.figures": {},
     "range_of_motion.report": {},
+    "global_sensitivity.design": _whole(*_RESPONDING, *_ANALYSING),
+    "global_sensitivity.respond": _whole(*_ANALYSING, "calibration", "seed"),
+    "global_sensitivity.calibrate": _whole(*_ANALYSING, "steps"),
+    "global_sensitivity.analyse": {},
+    "global_sensitivity.figures": {},
+    "global_sensitivity.report": {},
     "discrepancy.search": {},  # every setting says something about the search
     "discrepancy.figures": {},
     "discrepancy.report": {},

@@ -40,6 +40,13 @@ def _rows(whole: Schema, part: Schema, prefix: str) -> Iterator[tuple[str, ...]]
             yield (code(key), "list of mappings", _default(given, name in required),
                    "the keys below, for each", field["told"])  # fmt: skip
             yield from _rows(whole, inner, f"{key}[].")
+        elif "discriminator" in inner:
+            forms = inner["discriminator"]
+            one_of = f"the keys of one form, by `{forms['propertyName']}`"
+            yield (code(key), "list of mappings", _default(given, name in required), one_of,
+                   field["told"])  # fmt: skip
+            for form, reference in forms["mapping"].items():
+                yield from _rows(whole, _resolved(whole, {"$ref": reference}), f"{key}[{form}].")
         else:
             default = _default(given, name in required)
             yield code(key), _type(whole, field), default, _allowed(whole, field), field["told"]

@@ -3,6 +3,7 @@
 from spinepipe.studies.check import check
 from spinepipe.studies.cohort_stiffness import CohortStiffness, CrossValidation
 from spinepipe.studies.discrepancy import Discrepancy, DiscrepancyBase, HeldOut, Nuisance
+from spinepipe.studies.global_sensitivity import GlobalSensitivity, Outputs, SensitivityDesign
 from spinepipe.studies.identification import (
     Bootstrap,
     DampingBootstrap,
@@ -27,15 +28,18 @@ __all__ = [
     "DampingBootstrap",
     "Discrepancy",
     "DiscrepancyBase",
+    "GlobalSensitivity",
     "HeldOut",
     "JointPoseSensitivity",
     "LandmarkPrecision",
     "LevelStiffness",
     "Methods",
     "Nuisance",
+    "Outputs",
     "PoseSd",
     "RangeOfMotion",
     "Selection",
+    "SensitivityDesign",
     "StartBootstrap",
     "Study",
     "Success",

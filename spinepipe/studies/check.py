@@ -12,9 +12,11 @@ from spinepipe.studies.check_base_model import check_base_model
 from spinepipe.studies.check_cohort_base import check_cohort_base
 from spinepipe.studies.check_cohort_stiffness import check_cohort_stiffness
 from spinepipe.studies.check_discrepancy import check_discrepancy
+from spinepipe.studies.check_global_sensitivity import check_global_sensitivity
 from spinepipe.studies.check_joint_pose_sensitivity import check_joint_pose_sensitivity
 from spinepipe.studies.check_range_of_motion import check_range_of_motion
 from spinepipe.studies.read import STUDIES, load
+from spinepipe.studies.size_of_design import check_size_of_design
 from spinepipe.studies.study import COHORTS, Study, cohort_folder
 
 __all__ = ["check"]
@@ -24,6 +26,7 @@ CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
     "range_of_motion": check_range_of_motion,
     "cohort_stiffness": check_cohort_stiffness,
     "discrepancy": check_discrepancy,
+    "global_sensitivity": check_global_sensitivity,
 }
 """What each kind of study demands of its cohort."""
 
@@ -33,14 +36,21 @@ FILE_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]
 }
 """What kinds of studies demand of further files, whose paths count from the Snakefile."""
 
+ROOM_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
+    "global_sensitivity": check_size_of_design,
+}
+"""What kinds of studies need of the machine; asked when all else is sound."""
 
-def check(root: Path, study_name: str) -> tuple[Study, Cohort]:
+
+def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Cohort]:
     """Read a study and its cohort and hold them against each other.
 
     Parameters
     ----------
     root : folder of the Snakefile.
     study_name : name of a file in ``config/studies``, without ``.yaml``.
+    starting : whether the study is yet to start, so that the machine must have room for it; a
+        job of a study that runs has its own share in what is short.
 
     Raises
     ------
@@ -55,6 +65,8 @@ def check(root: Path, study_name: str) -> tuple[Study, Cohort]:
         problems += CHECKS[study.kind](document, study, cohort)
         if study.kind in FILE_CHECKS:
             problems += FILE_CHECKS[study.kind](document, study, cohort, root)
+        if starting and not problems and study.kind in ROOM_CHECKS:
+            problems += ROOM_CHECKS[study.kind](document, study, cohort, root)
     if problems or study is None or cohort is None:
         raise InputError(problems)
     return study, cohort

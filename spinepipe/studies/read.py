@@ -7,6 +7,7 @@ from spinepipe.cohort.validate import validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.cohort_stiffness import CohortStiffness
 from spinepipe.studies.discrepancy import Discrepancy
+from spinepipe.studies.global_sensitivity import GlobalSensitivity
 from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
 from spinepipe.studies.range_of_motion import RangeOfMotion
 from spinepipe.studies.study import Study
@@ -20,6 +21,7 @@ KINDS: dict[str, type[Study]] = {
     "range_of_motion": RangeOfMotion,
     "cohort_stiffness": CohortStiffness,
     "discrepancy": Discrepancy,
+    "global_sensitivity": GlobalSensitivity,
 }
 """The model of each kind of study."""
 

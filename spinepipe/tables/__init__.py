@@ -3,6 +3,13 @@
 from spinepipe.tables.cohort_stiffness import ERRORS, FITS, POOLING, SIGN_CHECKS, STIFFNESS
 from spinepipe.tables.cohort_stiffness_analyses import FINDINGS, MAE, RANKING
 from spinepipe.tables.discrepancy import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.tables.global_sensitivity import (
+    CALIBRATED,
+    CONVERGENCE,
+    DESIGN,
+    INDICES,
+    RESPONSES,
+)
 from spinepipe.tables.identification import (
     AGAINST_GOULD_2024A,
     AGAINST_GOULD_2024B,
@@ -77,6 +84,11 @@ TABLES = {
         WHERE,
         CONFUSIONS,
         HELD_OUT,
+        DESIGN,
+        RESPONSES,
+        CALIBRATED,
+        INDICES,
+        CONVERGENCE,
     )
 }
 
@@ -85,10 +97,13 @@ __all__ = [
     "AGAINST_GOULD_2024B",
     "AGREEMENT",
     "BOOTSTRAP",
+    "CALIBRATED",
     "CALIBRATIONS",
     "CANDIDATES",
     "CONFUSIONS",
+    "CONVERGENCE",
     "COUNTS",
+    "DESIGN",
     "ERRORS",
     "FINDINGS",
     "FITS",
@@ -96,6 +111,7 @@ __all__ = [
     "GAP",
     "HELD_OUT",
     "IMPORTANCE",
+    "INDICES",
     "LANDMARKS",
     "LANDMARK_PRECISION",
     "MAE",
@@ -106,6 +122,7 @@ __all__ = [
     "RANGE_OF_MOTION",
     "RANKING",
     "REQUIRED_PRECISION",
+    "RESPONSES",
     "ROM_SUMMARY",
     "ROM_VARIANCE",
     "SIGN_CHECKS",

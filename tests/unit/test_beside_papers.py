@@ -18,7 +18,15 @@ COHORTS = Path(__file__).resolve().parents[2] / "config" / "cohorts"
 
 def study_of(kind: str, cohort: str) -> Study:
     """A study of a kind, all else left to the defaults where there are any."""
-    needed = {"discrepancy": {"base": {"stiffness": "per_specimen"}}}
+    times = {"low": 0.5, "high": 2.0}
+    stiffness = {"of": "stiffness", "coordinate": "extension", "times": times}
+    needed = {
+        "discrepancy": {"base": {"stiffness": "per_specimen"}},
+        "global_sensitivity": {
+            "factors": [stiffness, {"of": "load_size", "times": times}],
+            "outputs": {"stiffness": True},
+        },
+    }
     return KINDS[kind](study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 

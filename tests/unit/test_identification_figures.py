@@ -13,6 +13,7 @@ from study_cases import STUDY, Size, project, results
 from spinepipe.jobs import figures
 from spinepipe.jobs.cohort_stiffness.layout import COHORT_FIGURES
 from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES
+from spinepipe.jobs.global_sensitivity.layout import SENSITIVITY_FIGURES
 from spinepipe.jobs.layout import FIGURES
 from spinepipe.jobs.range_of_motion.layout import ROM_FIGURES
 from spinepipe.report.bootstrap_paper import draw_errors
@@ -60,7 +61,7 @@ def words(svg: Path) -> str:
 def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
     assert set(figures.DRAW) == set(FIGURES)
     captions = Path(__file__).resolve().parents[2] / "workflow" / "report"
-    known = {*FIGURES, *COHORT_FIGURES, *ROM_FIGURES, *DISCREPANCY_FIGURES}
+    known = {*FIGURES, *COHORT_FIGURES, *ROM_FIGURES, *DISCREPANCY_FIGURES, *SENSITIVITY_FIGURES}
     assert {path.stem for path in captions.glob("*.rst")} == known
 
 

@@ -31,6 +31,8 @@ def results_of(kind):
 
 def selection():
     """Which studies are built; those of `all` are validated, all problems told at once."""
+    if not workflow.is_main_process:  # a job of a cluster: it was validated before it was submitted
+        return studies.Selection.model_construct(studies=(), full=())
     problems = []
     try:
         chosen = studies.read_selection(Path(ROOT))
@@ -60,7 +62,7 @@ def everything(names):
 
 @cache
 def check(name):
-    return studies.check(Path(ROOT), name)
+    return studies.check(Path(ROOT), name, starting=workflow.is_main_process)
 
 
 def load(name):
@@ -113,6 +115,11 @@ def jobs_of_block(wildcards):
         checkpoints.rank_models.get(study=wildcards.study)
     place = wildcards.table, wildcards.specimen, wildcards.block
     return layout(wildcards.study).job_files(*place)
+
+
+def blocks_of_specimen(table):
+    """Input function: the blocks of a table that hold the specimen at hand."""
+    return lambda wildcards: layout(wildcards.study).blocks_of(table, wildcards.specimen)
 
 
 def stiffness_source(wildcards):

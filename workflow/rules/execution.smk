@@ -5,6 +5,7 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
+from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
 from spinepipe.jobs.pool import submit_and_wait, warm_up
@@ -12,13 +13,32 @@ from spinepipe.jobs.progress import Progress
 
 
 def check_engine():
-    """Refuse to run jobs as one Snakemake process each, which is many times slower."""
+    """Refuse to run jobs as one Snakemake process each, which is many times slower.
+
+    An executor that submits jobs sets this option itself, for jobs that do run here.
+    """
     if not workflow.execution_settings.use_threads:
         stop(
             "the option force-use-threads is off: each job would start Snakemake anew, "
             "many times slower.\nLet Snakemake find profiles/default beside the Snakefile (do not pass "
             "--workflow-profile none), or add --force-use-threads."
         )
+
+
+def share_a_process():
+    """Run all jobs of a submitted group in one process, on the machine it was submitted to.
+
+    Left alone, Snakemake starts itself anew for each of them: Slurm's executor as one job step after
+    the other, other executors because force-use-threads is handed on to single jobs only (and no
+    profile is read there). See docs/cluster.md.
+    """
+    if workflow.remote_exec:
+        workflow.is_local = lambda rule: True
+        workflow.global_resources["_nodes"] = None  # else one at a time
+        LocalExecutor.use_threads = property(lambda self: True, lambda self, told: None)
+
+
+share_a_process()
 
 
 def lift_rate_limit():

@@ -1,0 +1,105 @@
+"""Equilibria of many spines at once beside the engine and OpenSim, by number of joints."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.engine import with_moments
+from benchmarks.timing import cpu_seconds
+from spinepipe.statics import Chain, System, follow
+from spinepipe.statics.many import Cases, Spines, solve_many
+from tests.reference.bridge import load_case, spine_model
+from tests.reference.peers import opensim_peer
+from tests.reference.peers.chain import Chain as PeerChain
+from tests.reference.peers.chain import t12_s1_chain
+
+JOINTS = (3, 6, 10, 15, 20)
+MOMENT_NM = 7.5
+COUNT = 2000
+CHECKED = 20
+
+
+@dataclass(frozen=True)
+class Growth:
+    """CPU seconds of one equilibrium under a flexing moment, a new spine each time.
+
+    Attributes
+    ----------
+    together_s : among many at once. engine_s : by the engine of record, the model loaded first.
+    opensim_s : OpenSim's static root-find on a model that is built already.
+    difference : largest between the first two, m or rad. by_engine : share that was handed on.
+    """
+
+    joints: int
+    together_s: float
+    engine_s: float
+    opensim_s: float
+    difference: float
+    by_engine: float
+
+
+def growth() -> Iterator[Growth]:
+    """One row for each number of joints."""
+    for joints in JOINTS:
+        yield _row(joints)
+
+
+def chain_of(joints: int) -> PeerChain:
+    """T12-S1, cut short or with its joints repeated upwards."""
+    chain = with_moments(t12_s1_chain())[0]
+    return chain if joints == chain.n_joints else stacked(chain, joints)
+
+
+def stacked(chain: PeerChain, joints: int) -> PeerChain:
+    """Levels of a chain one above the other, again and again, without loads but a moment on top."""
+    order = np.arange(joints) % chain.n_joints
+    turn = np.arange(joints) // chain.n_joints
+    rise = (chain.origins[-1] - chain.origins[0]) * chain.n_joints / (chain.n_joints - 1)
+    up = turn[:, None] * rise
+    load = chain.loads[0]
+    made = replace(
+        chain,
+        rotations=chain.rotations[order],
+        origins=chain.origins[order] + up,
+        stiffness=chain.stiffness[order],
+        damping=chain.damping[order],
+        masses=chain.masses[order],
+        centres=chain.centres[order] + up,
+        inertias=chain.inertias[order],
+        loads=(),
+    )
+    return made.with_loads(replace(load, body=joints - 1, point=made.centres[joints - 1]))
+
+
+def _row(joints: int) -> Growth:
+    chain = chain_of(joints)
+    model, case = spine_model(chain), load_case(chain)
+    spines = _varied(Spines.of(model, COUNT))
+    cases = Cases.of(case, COUNT)
+    found = solve_many(spines, cases)
+    models = [spines.model(number) for number in range(CHECKED)]
+    poses = [follow(System(Chain(one), one, case))[-1].equilibrium.q for one in models]
+    worst = max(
+        float(np.abs(found.q[number, -1] - pose.reshape(-1, 6)).max())
+        for number, pose in enumerate(poses)
+    )
+    built = opensim_peer.build(chain)
+    start = np.zeros((joints, 6))
+    return Growth(
+        joints,
+        cpu_seconds(lambda: solve_many(spines, cases), 3, 0).median / COUNT,
+        cpu_seconds(lambda: [follow(System(Chain(m), m, case)) for m in models], 3).median
+        / CHECKED,
+        cpu_seconds(lambda: opensim_peer.equilibrium_of(built, start=start), 5).median,
+        worst,
+        float(found.by_engine.mean()),
+    )
+
+
+def _varied(spines: Spines) -> Spines:
+    """Every spine with frames and stiffness of its own."""
+    rng = np.random.default_rng(1)
+    stiffness = spines.values[0] * np.exp(rng.normal(0.0, 0.2, spines.values[0].shape))
+    origins = spines.origins + rng.normal(0.0, 1e-3, spines.origins.shape)
+    return replace(spines, origins=origins, values=(stiffness,))

@@ -1,0 +1,127 @@
+"""Global sensitivity studies of full size, as a user runs them: time, memory, repeats."""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.study import Run, copy_of_project, run_workflow
+
+STUDY = "bench_factors"
+JOINTS = {
+    "palanca_l1l4": ("L3L4", "L2L3", "L1L2"),
+    "t12s1_phantom": ("L5S1", "L4L5", "L3L4", "L2L3", "L1L2", "T12L1"),
+}
+ROTATIONS = ("extension", "right_bending", "left_rotation")
+FACTORS = 23
+"""Factors of each study; the dummy is the 24th."""
+
+_TEXT = """\
+study: {study}
+kind: global_sensitivity
+cohort: {cohort}
+specimens: [{specimen}]
+factors:
+{factors}
+design: {{method: {method}, samples: {samples}}}
+samples_per_target: {per_target}
+"""
+
+
+@dataclass(frozen=True)
+class Size:
+    """A study to time: what is said of it, its cohort, settings, and the goal of its cold run."""
+
+    what: str
+    cohort: str
+    specimen: str
+    method: str
+    samples: int
+    per_target: str
+    goal: str
+
+
+SOBOL = (
+    Size("L1-L4, Sobol, 24 factors, N = 1024", "palanca_l1l4", "s01", "sobol", 1024, "null",
+         "60 s runs, 60 s indices, 1.5 GB"),
+    Size("T12-S1, Sobol, 24 factors, N = 1024", "t12s1_phantom", "s01", "sobol", 1024, "null",
+         "120 s runs, 60 s indices"),
+)  # fmt: skip
+TARGETS = tuple(
+    Size(f"{n:,} samples, a target each", "palanca_l1l4", "s01", "latin_hypercube", n, "1", goal)
+    for n, goal in ((100, ""), (1000, ""), (5000, ""), (20_000, "240 s"))
+)
+
+
+def sobol_runs() -> Iterator[Run]:
+    """Responses, then indices, of each study."""
+    for size in SOBOL:
+        with _project(size) as folder:
+            results = f"results/{STUDY}"
+            responses = [f"{results}/responses.parquet"]
+            yield run_workflow(f"{size.what}: responses", folder, responses, size.goal)
+            yield run_workflow(f"{size.what}: indices", folder, [f"{results}/indices.parquet"], "")
+            yield run_workflow(f"{size.what}: all the rest", folder, ["all"], "")
+
+
+def target_runs() -> Iterator[Run]:
+    """Cold, again, and after losing one sample in a hundred."""
+    for size in TARGETS:
+        with _project(size) as folder:
+            wanted = [f"results/{STUDY}/responses.parquet"]
+            jobs = Path(folder, f"results/{STUDY}/jobs/responses")
+            yield run_workflow(f"{size.what}: cold", folder, wanted, size.goal)
+            last = size.samples == TARGETS[-1].samples
+            yield run_workflow(f"{size.what}: nothing to do", folder, wanted, "20 s" * last)
+            lost = sorted(jobs.glob("*/*.parquet"))[::100]
+            for path in lost:
+                path.unlink()
+            files = [path.relative_to(folder).as_posix() for path in lost]
+            yield run_workflow(f"{size.what}: 1 % lost", folder, [*wanted, *files], "30 s" * last)
+
+
+@contextlib.contextmanager
+def _project(size: Size) -> Iterator[str]:
+    """A copy of the project with this study alone."""
+    with copy_of_project() as folder:
+        for other in Path(folder, "config", "studies").glob("*.yaml"):
+            other.unlink()
+        Path(folder, "config/studies", f"{STUDY}.yaml").write_text(text_of(size), encoding="utf-8")
+        Path(folder, "config/config.yaml").write_text(f"studies: [{STUDY}]\n", encoding="utf-8")
+        yield folder
+
+
+def text_of(size: Size) -> str:
+    """The study file."""
+    lines = "\n".join(f"  - {{{line}}}" for line in _factors(JOINTS[size.cohort]))
+    return _TEXT.format(
+        study=STUDY,
+        cohort=size.cohort,
+        specimen=size.specimen,
+        factors=lines,
+        method=size.method,
+        samples=size.samples,
+        per_target=size.per_target,
+    )
+
+
+def _factors(joints: Sequence[str]) -> list[str]:
+    """Loads, then stiffness and centre joint by joint, as many as there are places for."""
+    found = [f"of: load_direction, axis: {axis}, offset_deg: {{sd: 2}}" for axis in "xyz"]
+    found.append("of: load_size, times: {sd: 0.05}")
+    found += [
+        f"of: stiffness, coordinate: {name}, joints: [{joint}], times: {{low: 0.5, high: 2}}"
+        for name in ROTATIONS
+        for joint in joints
+    ]
+    found += [
+        f"of: {of}, axis: {axis}, joints: [{joint}], {offset}"
+        for of, axis, offset in (
+            ("joint_centre", "anterior", "offset_mm: {sd: 2}"),
+            ("joint_centre", "superior", "offset_mm: {sd: 2}"),
+            ("joint_axes", "extension", "offset_deg: {sd: 2}"),
+            ("joint_axes", "right_bending", "offset_deg: {sd: 2}"),
+        )
+        for joint in joints
+    ]
+    return found[:FACTORS]

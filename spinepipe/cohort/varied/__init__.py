@@ -1,0 +1,1 @@
+"""A specimen varied: many spines and loads from factors with values, for one design."""

@@ -1,0 +1,104 @@
+"""Where the variation of a specimen starts: its own spine, landmarks and tests."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames, landmarks, spine_model
+from spinepipe.cohort.varied.asked_test import AskedTest, asked_tests
+from spinepipe.cohort.varied.landmark_frames import INFERIOR, SUPERIOR, Flags
+from spinepipe.effects import create
+from spinepipe.effects.contract import Array
+from spinepipe.frames import FRAME_LANDMARKS
+from spinepipe.model import ScopedEffect, SpineModel
+
+BUSHING = "linear_bushing"
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A specimen as the cohort describes it.
+
+    Attributes
+    ----------
+    model : its spine on linear bushings, the model's only effect.
+    vertebrae : caudal to cranial; the first is fixed.
+    points : (J + 1, 4, 3) m, ground: landmarks that make frames; zero where there is none.
+    known : (J + 1, 4) which of them there are.
+    given : (J,) joints whose frame ``joints.csv`` gives, whatever the landmarks are.
+    tests : its tests.
+    """
+
+    model: SpineModel
+    vertebrae: tuple[str, ...]
+    points: Array
+    known: Flags
+    given: Flags
+    tests: tuple[AskedTest, ...]
+
+
+def start_of(
+    cohort: Cohort,
+    specimen: str,
+    stiffness: Array,
+    damping: Array,
+    tests: Sequence[str],
+    all_steps: bool,
+) -> Start:
+    """A specimen of a cohort with loads.
+
+    Parameters
+    ----------
+    stiffness : (6,) or (J, 6) N/m and N m/rad. damping : (6,) N s/m and N m s/rad.
+    tests : names of tests; those that the specimen does not have are left out.
+    all_steps : all load steps, or that of the largest load only.
+    """
+    n = len(cohort.joint_names)
+    values = np.broadcast_to(stiffness, (n, 6)).copy()
+    bushing = ScopedEffect(create(BUSHING), tuple(range(n)), values)
+    frames = joint_frames(cohort, specimen)
+    return Start(
+        spine_model(cohort, specimen, frames, (bushing,), damping),
+        cohort.vertebrae,
+        *frame_landmarks(cohort, specimen),
+        given_joints(cohort, specimen),
+        asked_tests(cohort, specimen, tests, all_steps),
+    )
+
+
+def frame_landmarks(cohort: Cohort, specimen: str) -> tuple[Array, Flags]:
+    """Points (J + 1, 4, 3) m, and which of them there are (J + 1, 4)."""
+    points = np.zeros((len(cohort.vertebrae), len(FRAME_LANDMARKS), 3))
+    known = np.zeros(points.shape[:2], dtype=bool)
+    found = {} if cohort.landmarks is None else landmarks(cohort, specimen)
+    for row, vertebra in enumerate(cohort.vertebrae):
+        for column, name in enumerate(FRAME_LANDMARKS):
+            point = found.get(vertebra, {}).get(name)
+            if point is not None:
+                points[row, column], known[row, column] = point, True
+    return points, known
+
+
+def given_joints(cohort: Cohort, specimen: str) -> Flags:
+    """(J,) joints whose frame ``joints.csv`` gives."""
+    if cohort.joints is None:
+        return np.zeros(len(cohort.joint_names), dtype=bool)
+    rows = cohort.joints[cohort.joints["specimen"] == specimen]
+    return np.isin(cohort.joint_names, rows["joint"])
+
+
+def moved_by(known: Flags, given: Flags, vertebra: int, landmark: int) -> list[int]:
+    """Joints whose frame a landmark has a part in."""
+    whole = [bool(row.all()) for row in known]
+    facing = {vertebra: SUPERIOR, vertebra - 1: INFERIOR}  # of the joint above, and of that below
+    return [
+        joint
+        for joint, (lower, upper) in enumerate(pairwise(range(len(known))))
+        if vertebra in (lower, upper)
+        and known[vertebra, landmark]
+        and not given[joint]
+        and (whole[vertebra] or facing[joint] == landmark)
+    ]

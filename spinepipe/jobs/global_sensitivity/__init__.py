@@ -1,0 +1,1 @@
+"""Jobs of studies of kind global_sensitivity: the design, responses by the batch, indices."""

@@ -1,0 +1,93 @@
+"""Job: stiffness of one specimen calibrated to its measured motion, in one batch of samples."""
+
+from typing import Any
+
+import numpy as np
+
+from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import in_frames, joint_frames, measured_motion
+from spinepipe.designs import specimen_seed
+from spinepipe.jobs.global_sensitivity.batch import Batch, batch_of
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.statics import Status, free_parameters, moved
+from spinepipe.studies import GlobalSensitivity
+from spinepipe.tables import CALIBRATED, to_arrow, write
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+
+TABLE = CALIBRATED.without("specimen")
+"""A job file: the specimen is in its folder's name."""
+
+STARTS = 1
+
+
+def run(root: str, study: str, design: str, specimen: str, batch: str, output: str) -> None:
+    """Write one row per sample: stiffness that all joints share."""
+    settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    one = batch_of(root, settings, cohort, design, specimen, int(batch), all_steps=True)
+    rows = [_refused(one.first + sample, why) for sample, why in one.varied.refused.items()]
+    for place, sample in enumerate(one.varied.kept.tolist()):
+        rows.append(_fitted(settings, cohort, specimen, one, place, one.first + sample))
+    rows.sort(key=lambda row: int(row["sample"]))
+    columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
+    made_by = provenance("global_sensitivity.calibrate", settings, cohort)
+    write(to_arrow(TABLE, columns), output, made_by)
+
+
+def _fitted(
+    settings: GlobalSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    batch: Batch,
+    place: int,
+    sample: int,
+) -> dict[str, Any]:
+    try:
+        problem = _problem(settings, cohort, specimen, batch, place)
+        seed = specimen_seed(settings.seed, f"{specimen}/{sample}")
+        found = fit(problem, STARTS, seed, settings.calibration.identifiable_below)
+    except RefusedModel as error:
+        return _refused(sample, str(error))
+    return _row(sample, problem, found)
+
+
+def _problem(
+    settings: GlobalSensitivity, cohort: Cohort, specimen: str, batch: Batch, place: int
+) -> Problem:
+    """The sample's spine and loads, and the readings in the frames that it has."""
+    model = batch.varied.spines.model(place)
+    options = settings.calibration
+    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
+    free = free_parameters(model, 0, names, "per_specimen")
+    reach = np.full(len(free), np.log(options.bound_factor))
+    tests = tuple(test.case for test in batch.start.tests)
+    nominal = joint_frames(cohort, specimen)
+    cases = tuple(
+        MeasuredCase(
+            cases.case(place),
+            in_frames(motion, nominal, model.frames).q,
+            cohort.zeroed_at_step_0,
+        )
+        for cases, motion in zip(
+            batch.varied.cases, measured_motion(cohort, specimen, tests), strict=True
+        )
+    )
+    weights = np.array(options.weights.in_order(), dtype=float)
+    return Problem(model, cases, free, weights, -reach, reach)
+
+
+def _row(sample: int, problem: Problem, found: Fit) -> dict[str, Any]:
+    solved = found.status.usable
+    values = moved(problem.model, problem.free, found.x).effects[0].values[0]
+    row: dict[str, Any] = {
+        name: float(value) if solved else None
+        for name, value in zip(STIFFNESS_COLUMNS, values, strict=True)
+    }
+    return {**row, "sample": sample, "status": found.status.value, "message": found.message}
+
+
+def _refused(sample: int, message: str) -> dict[str, Any]:
+    row: dict[str, Any] = dict.fromkeys(STIFFNESS_COLUMNS)
+    return {**row, "sample": sample, "status": Status.REFUSED.value, "message": message}

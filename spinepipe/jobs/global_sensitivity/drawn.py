@@ -1,0 +1,40 @@
+"""The design of a study and the values in its file, read once per worker and state of the file."""
+
+from functools import lru_cache
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.inputs import Stamp, stamp
+from spinepipe.sensitivity.global_indices import Design, draw
+from spinepipe.studies import GlobalSensitivity
+
+
+def design_of(study: GlobalSensitivity) -> Design:
+    """The design that the study's seed gives."""
+    own = study.design
+    groups = tuple(factor.group for factor in study.factors)
+    return draw(
+        own.method,
+        tuple(factor.label for factor in study.factors),
+        own.samples,
+        study.seed,
+        groups=groups if any(groups) else None,
+        second_order=own.second_order,
+        levels=own.levels,
+        harmonics=own.harmonics,
+        dummy=study.dummy,
+    )
+
+
+def drawn_values(path: str, study: GlobalSensitivity) -> Array:
+    """(n, D) values of ``design.parquet``, m, rad or multipliers."""
+    return _values(stamp(path), study.n_runs) / np.array(study.per_si)
+
+
+@lru_cache(maxsize=2)
+def _values(where: Stamp, samples: int) -> Array:
+    column = pq.read_table(where[0], columns=["value"]).column("value")
+    values: Array = column.to_numpy().reshape(samples, -1)
+    return values

@@ -1,0 +1,20 @@
+"""Job: the report of a global sensitivity study, one HTML file."""
+
+from pathlib import Path
+
+from spinepipe.files import appearing
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.page_inputs import results_of
+from spinepipe.report.global_sensitivity.page import READ, sensitivity_page
+from spinepipe.studies import GlobalSensitivity
+
+
+def run(
+    root: str, study: str, tables: list[str], figures: list[str], captions: list[str], output: str
+) -> None:
+    """Write the page from the files of all tables, pictures (SVG) and captions."""
+    settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    results = results_of(READ, tables, figures, captions)
+    page = sensitivity_page(settings, cohort, results)
+    with appearing(Path(output)) as temporary:
+        temporary.write_text(page, encoding="utf-8")

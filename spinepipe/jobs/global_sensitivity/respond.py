@@ -1,0 +1,88 @@
+"""Job: motion and joint loads of one specimen in one batch of samples, in all tests."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort.varied.asked_test import AskedTest
+from spinepipe.jobs.global_sensitivity.batch import Batch, batch_of
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.provenance import provenance
+from spinepipe.statics import Status
+from spinepipe.statics.many import ManySolved, solve_many
+from spinepipe.studies import GlobalSensitivity
+from spinepipe.tables import RESPONSES, to_arrow, write
+from spinepipe.units import COORDINATE_COLUMNS, from_si
+
+TABLE = RESPONSES.without("specimen")
+"""A job file: the specimen is in its folder's name."""
+
+LOADS = tuple(c.name for c in RESPONSES.columns if c.name.startswith("load_"))
+
+
+def run(root: str, study: str, design: str, specimen: str, batch: str, output: str) -> None:
+    """Write the rows of a batch: sample by sample, test by test, step by step, joint by joint."""
+    settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    one = batch_of(root, settings, cohort, design, specimen, int(batch), settings.steps == "all")
+    solved = [
+        _rows(one, test, solve_many(one.varied.spines, cases))
+        for test, cases in zip(one.start.tests, one.varied.cases, strict=True)
+    ]
+    columns = _columns(one, cohort.joint_names, solved)
+    made_by = provenance("global_sensitivity.respond", settings, cohort)
+    write(to_arrow(TABLE, columns), output, made_by)
+
+
+class _Rows:
+    """What a test gives for M samples, T stored steps and J joints.
+
+    ``motion``, ``load`` : (M, T, J, 6) mm and deg, N and N m, NaN without equilibrium.
+    ``status``, ``message`` : (M, T).
+    """
+
+    def __init__(self, batch: Batch, test: AskedTest, joints: int) -> None:
+        self.test = test
+        shape = (batch.count, len(test.steps))
+        self.motion, self.load = np.full((2, *shape, joints, 6), np.nan)
+        self.status = np.full(shape, Status.REFUSED.value, dtype=object)
+        self.message = np.full(shape, "", dtype=object)
+        for sample, reason in batch.varied.refused.items():
+            self.message[sample] = reason
+
+
+def _rows(batch: Batch, test: AskedTest, solved: ManySolved) -> _Rows:
+    rows = _Rows(batch, test, solved.q.shape[2])
+    start = solved.q[:, :1] if test.from_first else 0.0
+    kept, stored = batch.varied.kept, test.stored
+    rows.motion[kept] = from_si(solved.q - start)[:, stored]
+    rows.load[kept] = solved.load[:, stored]
+    rows.status[kept] = solved.status[:, stored].astype(object)
+    words = np.full(solved.status.shape, "", dtype=object)
+    for place, message in solved.messages.items():
+        words[place] = message
+    rows.message[kept] = words[:, stored]
+    return rows
+
+
+def _columns(batch: Batch, joints: Sequence[str], tests: Sequence[_Rows]) -> dict[str, Any]:
+    steps = [(one.test.case.test, step) for one in tests for step in one.test.steps]
+    per_sample, each = len(steps) * len(joints), len(joints)
+    motion, load = (
+        np.concatenate([getattr(one, name) for one in tests], axis=1).reshape(-1, 6).T
+        for name in ("motion", "load")
+    )
+    told = {
+        name: np.repeat(np.concatenate([getattr(one, name) for one in tests], axis=1), each)
+        for name in ("status", "message")
+    }
+    numbers = np.arange(batch.first, batch.first + batch.count)
+    return {
+        "sample": np.repeat(numbers, per_sample),
+        "test": [test for test, _ in steps for _ in joints] * batch.count,
+        "step": [step for _, step in steps for _ in joints] * batch.count,
+        "joint": list(joints) * (len(steps) * batch.count),
+        **dict(zip([f"predicted_{name}" for name in COORDINATE_COLUMNS], motion, strict=True)),
+        **dict(zip(LOADS, load, strict=True)),
+        **told,
+    }

@@ -1,0 +1,106 @@
+"""Figure: how indices settle with the number of runs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.global_sensitivity.measures import NAME, Measures, measures_of, unit_of
+from spinepipe.report.global_sensitivity.panels import (
+    Panel,
+    leading,
+    outputs,
+    pooled,
+    shown,
+    with_results,
+)
+from spinepipe.report.global_sensitivity.titles import no_index, sections_of, title
+from spinepipe.report.global_sensitivity.words import OUTPUT, factor_name
+from spinepipe.report.layout import explain_marks
+from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, saying
+from spinepipe.studies.global_sensitivity import DUMMY
+
+MOST_PANELS = 9
+_LOOKS = (
+    {"color": BLUE, "marker": "o"},
+    {"color": VERMILLION, "marker": "s"},
+    {"color": GREEN, "marker": "^"},
+)
+"""Of the first, second and third factor of a panel."""
+
+_DUMMY_LOOK = {"color": GREY, "marker": "x", "ls": "--"}
+_PANEL_MM, _KEY_MM = 56.0, 10.0
+_ROOM_FOR_KEY = 0.55
+"""Height for the names of factors, as a part of the height of the lines."""
+
+Looks = Mapping[str, Mapping[str, Any]]
+
+
+def convergence_figure(cohort: Cohort, convergence: pd.DataFrame, indices: pd.DataFrame) -> Figure:
+    """The main index of each panel's leading factors against the runs, from ``convergence``."""
+    measures = measures_of(indices)
+    found = outputs(cohort, indices, measures) if measures else []
+    if not found or measures is None:
+        return no_index(indices)
+    grown = with_results(convergence, measures)
+    grown = grown[grown["index"] == measures.main]
+    if grown["runs"].nunique() < 2:
+        return saying("No convergence can be shown: this design has no smaller part of its own.")
+    kept = shown(found, cohort.joint_names, MOST_PANELS)
+    panels, figure = sections_of(kept, dict.fromkeys(OUTPUT, _PANEL_MM), _KEY_MM)
+    for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
+        _draw(axis, panel.of(grown), _looks(leading([panel], measures)), measures)
+        axis.set_title(title(index, panel))
+    explain_marks(figure, [], _words(kept, measures), 1)
+    return figure
+
+
+def _looks(factors: Sequence[str]) -> Looks:
+    """How the leading factors and the dummy are drawn."""
+    first = [name for name in factors if name != DUMMY]
+    looks: dict[str, Mapping[str, Any]] = dict(zip(first, _LOOKS, strict=False))
+    return looks | ({DUMMY: _DUMMY_LOOK} if DUMMY in factors else {})
+
+
+def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
+    rows = pooled(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
+    for name, look in looks.items():
+        one = rows[rows["factor"] == name]
+        axis.fill_between(one["runs"], one["low"], one["high"], color=look["color"], alpha=0.18,
+                          lw=0, zorder=2)  # fmt: skip
+        axis.plot(one["runs"], one["estimate"], ms=2.8, mew=0.6, lw=1.0, zorder=3,
+                  label=factor_name(name), **look)  # fmt: skip
+    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=1)
+    axis.set_xscale("log")
+    log_ticks(axis.xaxis, float(rows["runs"].min()), float(rows["runs"].max()))
+    axis.set_xlabel("runs")
+    unit = f" ({unit_of(panel.output, panel.coordinate)})" if measures.in_units else ""
+    axis.set_ylabel(f"{NAME[measures.main]}{unit}")
+    axis.tick_params(axis="y", length=2.5)
+    _limit(axis, rows[rows["factor"].isin(list(looks))])
+    axis.legend(loc="upper right", fontsize=SMALL_PT, handlelength=2.2, labelspacing=0.25,
+                borderaxespad=0.0)  # fmt: skip
+
+
+def _limit(axis: Axes, rows: pd.DataFrame) -> None:
+    """Limits of the estimates with some room: intervals of few runs may reach far beyond."""
+    ends = rows[["estimate"]].to_numpy(float)
+    late = rows[rows["runs"] > np.sqrt(rows["runs"].min() * rows["runs"].max())]
+    ends = np.concatenate([ends.ravel(), late[["low", "high"]].to_numpy(float).ravel(), [0.0]])
+    low, high = np.nanmin(ends), np.nanmax(ends)
+    room = (high - low) or 1.0
+    axis.set_ylim(low - 0.06 * room, high + _ROOM_FOR_KEY * room)
+
+
+def _words(kept: Sequence[Panel], measures: Measures) -> str:
+    pool = any(panel.places > 1 for panel in kept)
+    parts = (
+        f"Line: {NAME[measures.main]} of the panel's leading factors, band: its interval",
+        "means over joints and specimens" if pool else "",
+    )
+    return "; ".join(part for part in parts if part) + "."

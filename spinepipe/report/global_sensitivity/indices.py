@@ -1,0 +1,193 @@
+"""Figure: what each output hangs on, factor by factor, beside the noise floor."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.global_sensitivity.drawn_factors import drawn_factors
+from spinepipe.report.global_sensitivity.measures import (
+    COLORS,
+    NAME,
+    Measures,
+    measures_of,
+    unit_of,
+)
+from spinepipe.report.global_sensitivity.panels import (
+    Panel,
+    above_floor,
+    outputs,
+    pooled,
+    shown,
+)
+from spinepipe.report.global_sensitivity.titles import no_index, sections_of, title, told
+from spinepipe.report.global_sensitivity.words import OUTPUT, factor_name
+from spinepipe.report.layout import explain_marks
+from spinepipe.report.sections import MOST_ACROSS
+from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
+
+_ROW_MM, _LEAST_ROW_MM, _AROUND_MM, _KEY_MM = 5.0, 3.0, 17.0, 18.0
+_BARS = 0.78
+"""Share of a row that its bars fill."""
+
+_DOT_FROM = 0.005
+"""Part of the largest index below which a dot would only blur the line at 0."""
+
+
+def indices_figure(cohort: Cohort, indices: pd.DataFrame) -> Figure:
+    """A panel for each output, a row for each factor, a bar for each index, from ``indices``."""
+    measures = measures_of(indices)
+    found = outputs(cohort, indices, measures) if measures else []
+    if not found or measures is None:
+        return no_index(indices)
+    orders = {name: drawn_factors(part, measures) for name, part in _by_output(found).items()}
+    rows = {name: len(order) for name, (order, _) in orders.items()}
+    kept = shown(found, cohort.joint_names, _most_panels(rows))
+    row = min(_ROW_MM, (TALLEST_MM - _KEY_MM - _AROUND_MM * _lines(kept)) / _rows(kept, rows))
+    heights = {name: n * row + _AROUND_MM for name, n in rows.items()}
+    panels, figure = sections_of(kept, heights, _KEY_MM)
+    for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
+        _draw(axis, panel, orders[panel.output][0], measures)
+        axis.set_title(title(index, panel))
+        axis.set_xlabel(_axis(panel, measures))
+    _scale(panels, measures)
+    for name, part in _by_output(kept).items():
+        axes = [axis for axis, panel in zip(panels, kept, strict=True) if panel.output == name]
+        _name(axes, part, orders[name][0], measures)
+    handles = _handles(kept, measures)
+    missing = _missing({name: words for name, (_, words) in orders.items() if words})
+    explain_marks(figure, handles, told(kept, found, missing), len(handles))
+    return figure
+
+
+def _missing(words: Mapping[str, str]) -> str:
+    """What is said of factors without a row, output by output where that differs."""
+    if len(set(words.values())) < 2:
+        return next(iter(words.values()), "")
+    return "; ".join(f"{OUTPUT[name]}: {told_}" for name, told_ in words.items())
+
+
+def _by_output(panels: Sequence[Panel]) -> dict[str, list[Panel]]:
+    names = dict.fromkeys(panel.output for panel in panels)
+    return {name: [panel for panel in panels if panel.output == name] for name in names}
+
+
+def _most_panels(rows: Mapping[str, int]) -> int:
+    """How many panels a page holds, if every line of them is as high as the mean."""
+    line = _LEAST_ROW_MM * sum(rows.values()) / len(rows) + _AROUND_MM
+    return MOST_ACROSS * max(len(rows), int((TALLEST_MM - _KEY_MM) // line))
+
+
+def _lines(kept: Sequence[Panel]) -> int:
+    return sum(-(-len(part) // MOST_ACROSS) for part in _by_output(kept).values())
+
+
+def _rows(kept: Sequence[Panel], rows: Mapping[str, int]) -> int:
+    """Rows below each other on the page."""
+    parts = _by_output(kept).items()
+    return sum(-(-len(part) // MOST_ACROSS) * rows[name] for name, part in parts)
+
+
+def _draw(axis: Axes, panel: Panel, order: Sequence[str], measures: Measures) -> None:
+    """Bars with their intervals; the first factor on top."""
+    known = [name for name in measures.shown if name in set(panel.rows["index"])]
+    height = _BARS / len(known)
+    for place, index in enumerate(known):
+        rows = panel.rows[panel.rows["index"] == index]
+        at = _BARS / 2.0 - (place + 0.5) * height
+        color = COLORS[measures.shown.index(index)]
+        _bars(axis, rows, order, at, 0.86 * height, color)
+        _floor(axis, rows, color, index == measures.main)
+    axis.axvline(0.0, color=BLACK, lw=0.6, zorder=5)
+    axis.set_ylim(-0.6, len(order) - 0.4)
+    axis.spines["left"].set_visible(False)
+
+
+def _bars(
+    axis: Axes, rows: pd.DataFrame, order: Sequence[str], at: float, height: float, color: str
+) -> None:
+    """One index: bars, lines for their intervals, dots for single joints where several are one."""
+    one = pooled(rows).set_index("factor").reindex(list(order)).dropna(subset="estimate")
+    y = np.array([len(order) - 1 - order.index(name) for name in one.index], dtype=float) + at
+    axis.barh(y, one["estimate"], height=height, color=color, lw=0, zorder=3)
+    for at_y, low, high in zip(y, one["low"], one["high"], strict=True):
+        if np.isfinite([low, high]).all():
+            axis.plot([low, high], [at_y, at_y], color=BLACK, lw=0.8, solid_capstyle="butt",
+                      zorder=4)  # fmt: skip
+    if (one["places"] > 1).any():
+        places = dict(zip(one.index, y, strict=True))
+        far = rows["estimate"].abs() > _DOT_FROM * rows["estimate"].abs().max()
+        dots = rows[rows["factor"].isin(one.index) & far]
+        axis.plot(dots["estimate"], dots["factor"].map(places), "o", ms=1.7, mfc=WHITE, mec=BLACK,
+                  mew=0.35, ls="", zorder=6)  # fmt: skip
+
+
+def _floor(axis: Axes, rows: pd.DataFrame, color: str, main: bool) -> None:
+    """The noise floor: a dashed line in the index's colour, and of the main one a band."""
+    floor = rows["noise_floor"].max()
+    if not np.isfinite(floor) or floor <= 0.0:
+        return
+    if main:
+        axis.axvspan(0.0, floor, color=GREY, alpha=0.22, lw=0, zorder=1)
+    axis.axvline(floor, color=INK[color], lw=0.8, ls=(0, (3, 2)), zorder=2)
+
+
+def _scale(axes: Sequence[Axes], measures: Measures) -> None:
+    """From 0, or the lowest interval; indices without a unit have the same scale in all panels."""
+    ends = [axis.dataLim.intervalx for axis in axes]
+    for axis, (low, high) in zip(axes, ends, strict=True):
+        if not measures.in_units:
+            low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+        axis.set_xlim(min(low, 0.0) - 0.01 * high, 1.03 * high)
+
+
+def _axis(panel: Panel, measures: Measures) -> str:
+    if measures.in_units:
+        return f"μ*, σ ({unit_of(panel.output, panel.coordinate)})"
+    return "share of variance" if measures.of_variance else "index"
+
+
+def _name(
+    panels: Sequence[Axes], kept: Sequence[Panel], order: Sequence[str], measures: Measures
+) -> None:
+    """Names of factors on the left; those that are above no floor are grey."""
+    rows = pd.concat([panel.rows for panel in kept])
+    main = rows[rows["index"] == measures.main]
+    above = above_floor(main)
+    known = bool(main["noise_floor"].notna().any())
+    for axis in panels:
+        axis.set_yticks(range(len(order)), [factor_name(name) for name in order[::-1]])
+        place = axis.get_subplotspec()
+        for label, name in zip(axis.get_yticklabels(), order[::-1], strict=True):
+            label.set_color(BLACK if name in above or not known else GREY)
+        axis.tick_params(labelleft=place is None or place.is_first_col())
+
+
+def _handles(kept: Sequence[Panel], measures: Measures) -> list[Line2D | Patch]:
+    rows = pd.concat([panel.rows for panel in kept])
+    there = set(rows["index"])
+    handles: list[Line2D | Patch] = [
+        Patch(facecolor=COLORS[place], lw=0, label=NAME[index])
+        for place, index in enumerate(measures.shown)
+        if index in there
+    ]
+    if rows["ci_low"].notna().any():
+        handles.append(Line2D([], [], color=BLACK, lw=0.8, label="interval"))
+    if any(panel.places > 1 for panel in kept):
+        handles.append(Line2D([], [], marker="o", ms=2.5, mfc=WHITE, mec=BLACK, mew=0.4, lw=0,
+                              label="single joint"))  # fmt: skip
+    if rows["noise_floor"].max() > 0.0:
+        handles.append(
+            Patch(
+                facecolor=GREY,
+                alpha=0.3,
+                lw=0,
+                label="noise floor of the dummy; dashed: of each index",
+            )
+        )
+    return handles

@@ -1,0 +1,68 @@
+"""How indices settle as a design grows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from spinepipe.sensitivity.global_indices.design import Design, Method
+from spinepipe.sensitivity.global_indices.index import Index
+from spinepipe.sensitivity.global_indices.indices import FEWEST, indices
+from spinepipe.sensitivity.global_indices.report import names_of
+from spinepipe.sensitivity.global_indices.settings import Settings
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Indices from part of a design: how many base samples, trajectories or points, how many runs
+    with those that failed, and the indices."""
+
+    samples: int
+    runs: int
+    indices: tuple[Index, ...]
+
+
+def convergence(
+    design: Design,
+    outputs: ArrayLike,
+    ok: ArrayLike | None = None,
+    settings: Settings | None = None,
+    sizes: int = 8,
+    resolution: ArrayLike = 0.0,
+) -> tuple[Stage, ...]:
+    """Indices but for those of pairs on growing parts of a design, the whole last.
+
+    Parameters
+    ----------
+    outputs, ok, settings, resolution : as for `indices`.
+    sizes : at most so many parts, each twice the one before; fewer where they would be too small.
+
+    Parts of a Sobol design are its first base samples, powers of two, each of them as well spread
+    as a design of its own; of Morris the first trajectories. The first points of a Latin hypercube
+    are no Latin hypercube: its parts are nested random subsets (settings' seed), which scatter a
+    little more than a hypercube of their size. A FAST curve has no parts: one stage.
+    """
+    settings = settings or Settings()
+    asked = {index for index, _, other in names_of(design) if not other and settings.asks(index)}
+    settings = replace(settings, wanted=tuple(sorted(asked)))
+    values = np.asarray(outputs, dtype=np.float64)
+    good = np.ones(design.n, dtype=bool) if ok is None else np.asarray(ok, dtype=bool)
+    if design.method is Method.LATIN_HYPERCUBE:
+        order = np.random.default_rng([settings.seed, design.n]).permutation(design.n)
+        design = replace(design, unit=design.unit[order])
+        values, good = values[order], good[order]
+    stages = []
+    for samples in _sizes(design, sizes):
+        part = design.first(samples)
+        found = indices(part, values[: part.n], good[: part.n], settings, resolution)
+        stages.append(Stage(samples, part.n, found))
+    return tuple(stages)
+
+
+def _sizes(design: Design, sizes: int) -> list[int]:
+    """Halves of halves of the samples, smallest first."""
+    if design.method is Method.FAST:
+        return [design.samples]
+    halves = {design.samples >> step for step in range(max(1, sizes))}
+    least = FEWEST[design.method]
+    return sorted(size for size in halves if size >= least or size == design.samples)

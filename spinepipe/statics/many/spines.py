@@ -1,0 +1,139 @@
+"""Many spines of one structure, and the same test of each: numbers as arrays, names once."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects import Wrench
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase, SpineModel
+
+
+@dataclass(frozen=True, eq=False)
+class Spines:
+    """M spines that differ in numbers alone.
+
+    Attributes
+    ----------
+    like : names and effects; the arrays take the place of its numbers.
+    rotations, origins : (M, J, 3, 3) and (M, J, 3) m, joint frames in ground, neutral pose.
+    masses, coms, inertias : (M, J) kg, (M, J, 3) m, (M, J, 3, 3) kg m2, as of `Body`.
+    damping : (M, J, 6) N s/m and N m s/rad.
+    values : of each effect of ``like`` (M, R, P).
+    """
+
+    like: SpineModel
+    rotations: Array
+    origins: Array
+    masses: Array
+    coms: Array
+    inertias: Array
+    damping: Array
+    values: tuple[Array, ...]
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+    @classmethod
+    def of(cls, model: SpineModel, count: int) -> "Spines":
+        """The same spine that many times."""
+        return cls(
+            model,
+            _repeated([frame.rotation for frame in model.frames], count),
+            _repeated([frame.origin for frame in model.frames], count),
+            _repeated([body.mass for body in model.bodies], count),
+            _repeated([body.com for body in model.bodies], count),
+            _repeated([body.inertia for body in model.bodies], count),
+            _repeated(model.damping, count),
+            tuple(_repeated(scoped.values, count) for scoped in model.effects),
+        )
+
+    def part(self, chosen: slice | Indices) -> "Spines":
+        """Some of them."""
+        return replace(
+            self,
+            rotations=self.rotations[chosen],
+            origins=self.origins[chosen],
+            masses=self.masses[chosen],
+            coms=self.coms[chosen],
+            inertias=self.inertias[chosen],
+            damping=self.damping[chosen],
+            values=tuple(values[chosen] for values in self.values),
+        )
+
+    def model(self, i: int) -> SpineModel:
+        """One of them as a model of its own.
+
+        Raises
+        ------
+        RefusedModel
+            For numbers that no solver should be given.
+        """
+        bodies = zip(self.like.bodies, self.masses[i], self.coms[i], self.inertias[i], strict=True)
+        effects = zip(self.like.effects, self.values, strict=True)
+        return replace(
+            self.like,
+            frames=tuple(map(Pose, self.rotations[i], self.origins[i])),
+            bodies=tuple(Body(b.name, float(m), c, inertia) for b, m, c, inertia in bodies),
+            damping=self.damping[i],
+            effects=tuple(scoped.with_values(values[i]) for scoped, values in effects),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """One test of M spines, with the same steps and loaded vertebrae.
+
+    Attributes
+    ----------
+    like : names, steps, times and bodies; the arrays take the place of its numbers.
+    points, forces, moments : (M, T, W, 3) m, N and N m in ground, of each step's wrenches; where
+        a step has fewer than W, the last ones are zero and nobody's.
+    """
+
+    like: LoadCase
+    points: Array
+    forces: Array
+    moments: Array
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @classmethod
+    def of(cls, case: LoadCase, count: int) -> "Cases":
+        """The same loads that many times."""
+        most = max((len(step.wrenches) for step in case.steps), default=0)
+        numbers = np.zeros((3, len(case.steps), most, 3))
+        for row, step in enumerate(case.steps):
+            for column, wrench in enumerate(step.wrenches):
+                numbers[:, row, column] = wrench.point, wrench.force, wrench.moment
+        points, forces, moments = (_repeated(part, count) for part in numbers)
+        return cls(case, points, forces, moments)
+
+    def part(self, chosen: slice | Indices) -> "Cases":
+        """Some of them."""
+        return replace(
+            self,
+            points=self.points[chosen],
+            forces=self.forces[chosen],
+            moments=self.moments[chosen],
+        )
+
+    def case(self, i: int) -> LoadCase:
+        """One of them as a load case of its own."""
+        steps = []
+        for row, step in enumerate(self.like.steps):
+            wrenches = tuple(
+                Wrench(one.body, self.points[i, row, w], self.forces[i, row, w],
+                       self.moments[i, row, w])
+                for w, one in enumerate(step.wrenches)
+            )  # fmt: skip
+            steps.append(replace(step, wrenches=wrenches))
+        return replace(self.like, steps=tuple(steps))
+
+
+def _repeated(one: object, count: int) -> Array:
+    """(count, ...) copies."""
+    values = np.asarray(one, dtype=float)
+    return np.repeat(values[None], count, axis=0)

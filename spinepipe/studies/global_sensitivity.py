@@ -1,0 +1,192 @@
+"""The study kind that asks which uncertain inputs drive motion, joint loads and stiffness."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.varied.change import Change, Of
+from spinepipe.studies.coordinates import FORM, Coordinate, Damping
+from spinepipe.studies.factors import AnyFactor
+from spinepipe.studies.lists import EachOnce, Tests, distinct
+from spinepipe.studies.published_stiffness import LevelStiffness, PublishedStiffness
+from spinepipe.studies.sample_calibration import SampleCalibration
+from spinepipe.studies.study import Study
+
+__all__ = ["GlobalSensitivity", "Outputs", "SensitivityDesign"]
+
+DUMMY = "dummy"
+"""Name of the factor that changes nothing."""
+
+MOST_SINGLE_TARGETS = 2000
+"""Samples x specimens up to which each sample is a target of its own."""
+
+SAMPLES_PER_TARGET = 256
+"""Samples per target beyond that."""
+
+_Coordinates = Annotated[tuple[Coordinate, ...], Field(strict=False), AfterValidator(distinct)]
+_Specimens = EachOnce[Annotated[str, StringConstraints(min_length=1)]]
+
+
+class SensitivityDesign(BaseModel):
+    """Which values the factors take."""
+
+    model_config = FORM
+
+    method: Literal["sobol", "latin_hypercube", "morris", "fast"] = Field(
+        default="sobol",
+        description="sobol: indices S1, ST, S2; latin_hypercube: PAWN, RBD-FAST, delta, regional; "
+        "morris: elementary effects; fast: S1, ST",
+    )
+    samples: int = Field(
+        default=256,
+        ge=2,
+        le=2**24,
+        description="base samples; with D factors and groups the runs are sobol samples x "
+        "(2 D + 2), or (D + 2) without second order; latin_hypercube samples; morris samples x "
+        "(D + 1); fast samples x D",
+    )
+    second_order: bool = Field(default=True, description="sobol: indices of pairs too")
+    levels: int = Field(default=4, ge=2, le=100, description="morris: levels of each factor")
+    harmonics: int = Field(
+        default=4, ge=1, le=20, description="fast: harmonics that are summed into S1"
+    )
+
+    def runs_per_sample(self, compared: int) -> int:
+        """Runs for each base sample, with so many factors and groups, the dummy among them."""
+        pairs = 2 if self.second_order else 1
+        runs = {"sobol": pairs * compared + 2, "morris": compared + 1, "fast": compared}
+        return runs.get(self.method, 1)
+
+
+class Outputs(BaseModel):
+    """What is explained by the factors."""
+
+    model_config = FORM
+
+    motion: _Coordinates = Field(
+        default=("extension", "right_bending", "left_rotation"),
+        description="coordinates of joint motion; []: none",
+    )
+    joint_load: _Coordinates = Field(
+        default=("extension", "right_bending", "left_rotation"),
+        description="coordinates along which the joints' loads are taken (moments along rotations, "
+        "forces along translations); []: none",
+    )
+    stiffness: bool = Field(
+        default=False, description="stiffness calibrated to measured motion, once per sample"
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if not (self.motion or self.joint_load or self.stiffness):
+            raise ValueError("at least one output")
+        return self
+
+
+class GlobalSensitivity(Study):
+    """Draw all factors at once, move every specimen, and ask which factor moved the results."""
+
+    kind: Literal["global_sensitivity"] = Field(description="kind of study")
+    factors: Annotated[tuple[AnyFactor, ...], Field(strict=False)] = Field(
+        description="what is uncertain, and how far"
+    )
+    design: SensitivityDesign = Field(
+        default_factory=SensitivityDesign, description="which values the factors take"
+    )
+    dummy: bool = Field(
+        default=True,
+        description="add a factor that changes nothing: its indices are the noise of all others",
+    )
+    specimens: _Specimens | None = Field(default=None, description="specimens; null: all")
+    tests: Tests | None = Field(
+        default=None, description="tests of loads.csv, of each its first cycle; null: all"
+    )
+    steps: Literal["peak", "all"] = Field(
+        default="peak", description="load steps: that of the largest load, or all"
+    )
+    seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
+    stiffness: PublishedStiffness = Field(
+        default_factory=PublishedStiffness, description="stiffness of all joints before factors"
+    )
+    level_stiffness: Mapping[str, LevelStiffness] = Field(
+        default_factory=dict,
+        description="rotational stiffness joint by joint, where it differs from `stiffness`",
+    )
+    damping: Damping = Field(
+        default_factory=Damping, description="viscous damping; decides at most what is stable"
+    )
+    loading: Literal["equilibrium"] = Field(
+        default="equilibrium", description="how simulations are solved: static equilibrium"
+    )
+    outputs: Outputs = Field(default_factory=Outputs, description="what the factors explain")
+    calibration: SampleCalibration = Field(
+        default_factory=SampleCalibration,
+        description="how stiffness is fitted, where it is an output",
+    )
+    bootstraps: int = Field(
+        default=1000, ge=2, le=100_000, description="resamples for the intervals of indices"
+    )
+    confidence: float = Field(default=0.95, gt=0, lt=1, description="coverage of the intervals")
+    samples_per_target: int | None = Field(
+        default=None,
+        ge=1,
+        le=1_000_000,
+        description="runs of a specimen that one job computes; null: 1 up to 2,000 runs x "
+        "specimens, beyond that 256",
+    )
+    most_failed: float = Field(
+        default=0.2, ge=0, lt=1, description="share of failed runs above which no index is given"
+    )
+
+    @property
+    def factor_names(self) -> tuple[str, ...]:
+        """(D,) names, the dummy's last."""
+        return (*(factor.label for factor in self.factors), *((DUMMY,) if self.dummy else ()))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """(D,) group of each factor; one without is a group by its own name."""
+        own = tuple(factor.group or factor.label for factor in self.factors)
+        return (*own, *((DUMMY,) if self.dummy else ()))
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """(G,) what gets an index: groups in the order of their first factors."""
+        return tuple(dict.fromkeys(self.groups))
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """(D,) what each factor changes."""
+        nothing = (Change(Of.NOTHING),) if self.dummy else ()
+        return (*(factor.change for factor in self.factors), *nothing)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(D,) unit of each value in files and tables: mm, deg or 1."""
+        return (*(factor.spread.unit for factor in self.factors), *(("1",) if self.dummy else ()))
+
+    @property
+    def per_si(self) -> tuple[float, ...]:
+        """(D,) what one SI unit of each value is in its unit of files and tables."""
+        return (*(one.spread.per_si for one in self.factors), *((1.0,) if self.dummy else ()))
+
+    @property
+    def n_runs(self) -> int:
+        """Number of runs of each specimen."""
+        return self.design.samples * self.design.runs_per_sample(len(self.compared))
+
+    def batch_size(self, specimens: int) -> int:
+        """Runs of a specimen that one job computes, in a study of so many specimens."""
+        if self.samples_per_target is not None:
+            return self.samples_per_target
+        return 1 if self.n_runs * specimens <= MOST_SINGLE_TARGETS else SAMPLES_PER_TARGET
+
+    def chosen_specimens(self, cohort: Cohort) -> tuple[str, ...]:
+        """The study's specimens."""
+        return self.specimens or cohort.specimen_names
+
+    def chosen_tests(self, cohort: Cohort) -> tuple[str, ...]:
+        """The study's tests."""
+        return self.tests or cohort.tests

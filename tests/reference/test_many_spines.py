@@ -1,0 +1,157 @@
+"""Many spines at once against the engine of record, spine by spine, on random chains."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinepipe.effects import create
+from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.statics import Chain, Status, System, follow
+from spinepipe.statics.holding import hold
+from spinepipe.statics.many import Cases, Spines, solve_many
+from tests.reference import bridge
+from tests.reference.peers import chain as chains
+
+AGREEMENT = 1e-10
+"""m and rad."""
+
+COUNT = 40
+
+
+def varied(model: SpineModel, rng: np.random.Generator) -> Spines:
+    """Spines that differ in frames, bodies, damping and stiffness."""
+    spines = Spines.of(model, COUNT)
+    shape = spines.origins.shape
+    scale = np.exp(rng.normal(0.0, 0.2, (COUNT, shape[1])))
+    return replace(
+        spines,
+        origins=spines.origins + rng.normal(0.0, 2e-3, shape),
+        masses=spines.masses * scale,
+        inertias=spines.inertias * scale[..., None, None],
+        coms=spines.coms + rng.normal(0.0, 3e-3, shape),
+        damping=spines.damping * np.exp(rng.normal(0.0, 0.3, spines.damping.shape)),
+        values=(spines.values[0] * np.exp(rng.normal(0.0, 0.2, spines.values[0].shape)),
+                *spines.values[1:]),
+    )  # fmt: skip
+
+
+def loaded(case: LoadCase, rng: np.random.Generator, share: float = 1.0) -> Cases:
+    """Loads that differ in size, direction and point."""
+    cases = Cases.of(case, COUNT)
+    size = np.exp(rng.normal(0.0, 0.2, (COUNT, 1, 1, 1)))
+    return replace(
+        cases,
+        points=cases.points + rng.normal(0.0, 2e-3, cases.points.shape),
+        forces=cases.forces * size,
+        moments=cases.moments * size + share * rng.normal(0.0, 0.05, cases.moments.shape),
+    )
+
+
+def by_engine(model: SpineModel, case: LoadCase) -> tuple[np.ndarray, np.ndarray, list[Status]]:
+    """(T, J, 6) poses and joint loads of the engine of record, and how each step ended."""
+    system = System(Chain(model), model, case)
+    solved = follow(system)
+    q = np.array([step.equilibrium.q.reshape(-1, 6) for step in solved])
+    load = np.array(
+        [
+            hold(system.placed(step.equilibrium.q, False), system.laws, step.states, False).load
+            for step in solved
+        ]
+    )
+    return q, load, [step.equilibrium.status for step in solved]
+
+
+@pytest.mark.parametrize(
+    ("seed", "n_joints", "share"), [(1, 1, 1.0), (2, 3, 1.0), (3, 6, 0.4), (4, 17, 0.01)]
+)
+def test_random_spines_are_where_the_engine_puts_them(
+    seed: int, n_joints: int, share: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    chain = chains.random_chain(rng, n_joints)
+    spines = varied(bridge.spine_model(chain), rng)
+    cases = loaded(bridge.load_case(chain, 0.5 * share, share), rng, share)
+    found = solve_many(spines, cases)
+    assert found.by_engine.mean() < 0.5  # or this would compare the engine with itself
+    for number in np.flatnonzero(~found.by_engine)[:12]:
+        q, load, status = by_engine(spines.model(number), cases.case(number))
+        assert status == [Status.CONVERGED] * 2
+        np.testing.assert_allclose(found.q[number], q, rtol=0, atol=AGREEMENT)
+        np.testing.assert_allclose(found.load[number], load, rtol=1e-8, atol=1e-8)
+
+
+def test_laws_of_single_joints_act_in_their_order() -> None:
+    rng = np.random.default_rng(7)
+    chain = chains.random_chain(rng, 4)
+    model = bridge.spine_model(chain)
+    stiffening = create("nonlinear_stiffening", {"coordinate": "extension"})
+    coupling = create("bending_rotation_coupling")
+    laws = (
+        ScopedEffect(stiffening, (0, 2), np.array([[10.0], [30.0]])),
+        ScopedEffect(coupling, (1, 3), np.array([[5.0], [-8.0]])),
+    )
+    spines = varied(model.with_effects((*model.effects, *laws)), rng)
+    cases = loaded(bridge.load_case(chain), rng)
+    found = solve_many(spines, cases)
+    assert not found.by_engine.any()
+    without = solve_many(replace(spines, like=model, values=spines.values[:1]), cases)
+    assert np.abs(found.q - without.q).max() > 1e-4
+    for number in range(8):
+        q, _, _ = by_engine(spines.model(number), cases.case(number))
+        np.testing.assert_allclose(found.q[number], q, rtol=0, atol=AGREEMENT)
+
+
+def test_other_effects_go_to_the_engine() -> None:
+    rng = np.random.default_rng(8)
+    chain = chains.random_chain(rng, 2)
+    model = bridge.spine_model(chain)
+    offset = ScopedEffect(create("joint_centre_offset"), (0,), np.array([[1e-3, 0.0, 2e-3]]))
+    spines = Spines.of(model.with_effects((*model.effects, offset)), 3)
+    found = solve_many(spines, Cases.of(bridge.load_case(chain), 3))
+    assert found.by_engine.all()
+    q, _, _ = by_engine(spines.model(0), bridge.load_case(chain))
+    np.testing.assert_allclose(found.q[2], q, rtol=0, atol=1e-13)
+
+
+def test_a_spine_that_tips_over_is_a_row_with_a_reason() -> None:
+    """Soft joints under their weight buckle; the others of the same chunk are none the worse."""
+    rng = np.random.default_rng(9)
+    chain = chains.random_chain(rng, 3)
+    spines = Spines.of(bridge.spine_model(chain), 4)
+    soft = spines.values[0].copy()
+    soft[2] *= 1e-4
+    cases = Cases.of(bridge.load_case(chain), 4)
+    found = solve_many(replace(spines, values=(soft,)), cases)
+    whole = solve_many(spines, cases)
+    assert found.status[2, 0] == Status.UNSTABLE
+    assert found.messages[2, 0]
+    assert np.isnan(found.q[2]).all()
+    assert np.isnan(found.load[2]).all()
+    np.testing.assert_array_equal(found.q[[0, 1, 3]], whole.q[[0, 1, 3]])
+    assert (found.status[[0, 1, 3]] == Status.CONVERGED).all()
+
+
+def test_an_impossible_spine_is_refused_and_the_others_solved() -> None:
+    rng = np.random.default_rng(10)
+    chain = chains.random_chain(rng, 2)
+    spines = Spines.of(bridge.spine_model(chain), 3)
+    values = spines.values[0].copy()
+    values[1] = np.nan
+    found = solve_many(replace(spines, values=(values,)), Cases.of(bridge.load_case(chain), 3))
+    assert found.status[:, 0].tolist() == ["converged", "refused", "converged"]
+    assert "linear_bushing" in found.messages[1, 0]
+    assert np.isfinite(found.q[[0, 2]]).all()
+
+
+def test_parts_and_single_spines_are_what_they_were() -> None:
+    rng = np.random.default_rng(11)
+    chain = chains.random_chain(rng, 3)
+    model, case = bridge.spine_model(chain), bridge.load_case(chain, 0.2, 1.0)
+    spines, cases = Spines.of(model, 5), Cases.of(case, 5)
+    again = spines.part(slice(1, 3)).model(1)
+    np.testing.assert_array_equal(again.effects[0].values, model.effects[0].values)
+    for step, other in zip(cases.part(slice(4, 5)).case(0).steps, case.steps, strict=True):
+        for wrench, same in zip(step.wrenches, other.wrenches, strict=True):
+            np.testing.assert_array_equal(wrench.moment, same.moment)
+            np.testing.assert_array_equal(wrench.point, same.point)

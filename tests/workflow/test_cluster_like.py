@@ -1,0 +1,90 @@
+"""A study run as on a cluster: submitted jobs are processes of their own that share a folder.
+
+The profile for Slurm is used as it is, with an executor that submits to a shell script instead.
+"""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from small_project import Project, copy_project
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+import grid_cases
+
+pytestmark = pytest.mark.slow
+
+PLUGIN = "snakemake-executor-plugin-cluster-generic"
+PROFILE = Path(__file__).parents[2] / "profiles/slurm/config.yaml"
+MOVES = 16
+STUDY = (
+    "poses: 2\nstiffness_sets: 8\n"
+    "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
+)
+MOVES_PER_SUBMITTED_JOB = 8
+SUBMIT = """\
+#!/bin/sh
+# Stands in for a queue: the job script runs in a session of its own, as nobody's child.
+setsid sh "$1" > "queue/$(basename "$1").log" 2>&1 < /dev/null &
+echo $!
+"""
+# Which process reads the Snakefile: one for each time Snakemake is started.
+NOTE = "\nPath('queue', f'{os.getpid()}.start').touch()\n"
+
+
+def new_project(folder: Path) -> Project:
+    project = copy_project(folder)
+    grid_cases.project(folder, STUDY, specimens=("a",))
+    (folder / "queue").mkdir()
+    snakefile = project.path("Snakefile")
+    snakefile.write_text(snakefile.read_text() + NOTE)
+    submit = project.path("submit.sh")
+    submit.write_text(SUBMIT)
+    submit.chmod(0o755)
+    return project
+
+
+def run_on_cluster(project: Project) -> str:
+    """`all` of a project, its jobs submitted; returns what Snakemake said."""
+    done = project.snakemake(
+        *("all", "--profile", "profiles/slurm", "--executor", "cluster-generic"),
+        *("--cluster-generic-submit-cmd", "./submit.sh", "--jobs", "2", "--cores", "2"),
+        *("--group-components", f"moves={MOVES_PER_SUBMITTED_JOB}"),
+        *("--seconds-between-status-checks", "1", "--latency-wait", "10"),
+    )
+    logs = "\n".join(path.read_text() for path in project.path("queue").glob("*.log"))
+    assert done.returncode == 0, done.stdout + logs
+    return done.stdout
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec(PLUGIN.replace("-", "_")) is None, reason=f"{PLUGIN} is not installed"
+)
+def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: Path) -> None:
+    local, cluster = new_project(tmp_path / "local"), new_project(tmp_path / "cluster")
+    local.run_all()
+    said = run_on_cluster(cluster)
+    assert cluster.contents() == local.contents()
+
+    groups = len(re.findall("Submitted group job", said))
+    submitted = len(re.findall("Submitted (?:group )?job", said))
+    assert (
+        groups == MOVES // MOVES_PER_SUBMITTED_JOB + 1
+    )  # and one of summaries, figures and report
+    assert submitted < MOVES
+    assert len(list(cluster.path("queue").glob("*.start"))) == submitted + 1
+
+    assert "Nothing to be done" in cluster.run_all()
+
+
+def test_the_profile_speaks_of_rules_that_exist(tmp_path: Path) -> None:
+    settings = yaml.safe_load(PROFILE.read_text())
+    rules = set(new_project(tmp_path / "project").snakemake("--list-rules").stdout.split())
+    assert {"move", "respond"} <= rules
+    assert set(settings["groups"]) | set(settings["set-resources"]) <= rules
+    assert set(settings["group-components"]) <= set(settings["groups"].values())
+    pages = {rule for rule in rules if rule.startswith("figure_") or rule.endswith("_report")}
+    assert {settings["groups"].get(rule) for rule in pages} == {"pages"}
