@@ -94,7 +94,7 @@ def _applied(spines: Spines, loads: Loads, motion: ManyMotion) -> tuple[Array, A
 def _mass_velocity(spines: Spines, motion: ManyMotion) -> Array:
     """(M, n, 3) kg: generalised weight per unit of gravity along each axis."""
     count, joints = spines.masses.shape
-    centres = (motion.rotations @ spines.coms[..., None])[..., 0] + motion.translations
+    centres = motion.points(spines.coms)
     carried = _and_above(spines.masses)
     moment = _and_above(spines.masses[..., None] * centres)
     found = np.empty((count, joints, 6, 3))

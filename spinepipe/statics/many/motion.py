@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.many.spines import Spines
 
 
@@ -34,6 +34,21 @@ class ManyMotion:
         turned = (self.rotations[:, body] @ neutral[:, :, None])[:, :, 0]
         result: Array = turned + self.translations[:, body]
         return result
+
+    def points(self, neutral: Array) -> Array:
+        """(M, J, 3) where one point of each vertebra, (M, J, 3) at the neutral pose, is, m."""
+        result: Array = (self.rotations @ neutral[..., None])[..., 0] + self.translations
+        return result
+
+    def part(self, chosen: Indices) -> "ManyMotion":
+        """Some of the chains."""
+        return ManyMotion(
+            self.sliding[chosen],
+            self.turning[chosen],
+            self.pivots[chosen],
+            self.rotations[chosen],
+            self.translations[chosen],
+        )
 
     def velocities(self, body: int, point: Array) -> Array:
         """(M, n, 3) velocity of a vertebra's points, (M, 3) where they are, by coordinate."""

@@ -1,8 +1,13 @@
-"""Which of many equilibria are stable for sure, by a test that is sufficient and cheap.
+"""Which of many equilibria are stable for sure, by tests that are sufficient and cheap.
 
-With the tangent's symmetric and skew parts S and A in coordinates where damping is one, motion
-decays if min eig S > |A|^2 |M| (`spinepipe.statics.stability`). |M| is at most the trace of M, so
-it is enough that S - |A|^2 tr(M) is positive definite: one Cholesky factor.
+In coordinates where damping is one, M x'' + x' + (S + A) x = 0, with the tangent's symmetric and
+skew parts S and A. Both tests stand on an energy whose decay proves stability:
+
+V = x'.Mx' / 2 + e x'.Mx + x.(S + e) x / 2,  dV/dt = -x'.(1 - e M) x' - x'.A x - e x.S x,
+
+so that motion decays if S - A^T (1 - e M)^-1 A / (4 e) is positive definite for any e < 1 / |M|.
+With e = 1 / (2 |M|) it is enough that S - |A|^2 |M| is, which needs no mass matrix: |M| is at most
+its trace. Those that fail this are tried with the whole mass matrix.
 """
 
 import numpy as np
@@ -14,6 +19,9 @@ from spinepipe.statics.many.spines import Spines
 
 Flags = NDArray[np.bool_]
 
+SHARE = 0.9
+"""e times |M|: near one where the mass matrix has one large eigenvalue and A leaves it alone."""
+
 
 def surely_stable(spines: Spines, motion: ManyMotion, tangents: Array) -> Flags:
     """(M,) False where nothing is proven; tangents (M, n, n)."""
@@ -24,9 +32,21 @@ def surely_stable(spines: Spines, motion: ManyMotion, tangents: Array) -> Flags:
     skew = scaled - symmetric
     twist = 0.5 * np.einsum("mij,mij->m", skew, skew)
     shift = twist * (_inertia(spines, motion).reshape(damping.shape) / damping).sum(axis=1)
-    at = np.arange(damping.shape[1])
-    symmetric[:, at, at] -= shift[:, None]
-    return _positive(symmetric)
+    found = _positive(symmetric - shift[:, None, None] * np.eye(damping.shape[1]))
+    doubt = np.flatnonzero(~found)
+    if len(doubt):
+        mass = _mass(spines.part(doubt), motion.part(doubt))
+        mass *= scale[doubt, :, None] * scale[doubt, None, :]
+        found[doubt] = _energy_decays(mass, symmetric[doubt], skew[doubt])
+    return found
+
+
+def _energy_decays(mass: Array, symmetric: Array, skew: Array) -> Flags:
+    """The test with the whole mass matrix; the Frobenius norm is no less than |M|."""
+    share = SHARE / np.linalg.norm(mass, axis=(1, 2))[:, None, None]
+    room = np.eye(mass.shape[1]) - share * mass
+    twist = skew.transpose(0, 2, 1) @ np.linalg.solve(room, skew) / (4.0 * share)
+    return _positive(symmetric - twist)
 
 
 def _positive(symmetric: Array) -> Flags:
@@ -41,7 +61,7 @@ def _positive(symmetric: Array) -> Flags:
 
 def _inertia(spines: Spines, motion: ManyMotion) -> Array:
     """(M, J, 6) no less than the diagonal of the mass matrix."""
-    centres = (motion.rotations @ spines.coms[..., None])[..., 0] + motion.translations
+    centres = motion.points(spines.coms)
     largest = np.trace(spines.inertias, axis1=2, axis2=3)
     count, joints = spines.masses.shape
     found = np.zeros((count, joints, 6))
@@ -51,4 +71,18 @@ def _inertia(spines: Spines, motion: ManyMotion) -> Array:
         found[:, : body + 1, :3] += mass[..., None]
         turned = mass * np.sum(arms**2, axis=2) + largest[:, None, body]
         found[:, : body + 1, 3:] += turned[..., None]
+    return found
+
+
+def _mass(spines: Spines, motion: ManyMotion) -> Array:
+    """(M, n, n) mass matrices, kg, kg m and kg m2."""
+    centres = motion.points(spines.coms)
+    count, joints = spines.masses.shape
+    found = np.zeros((count, 6 * joints, 6 * joints))
+    for body in range(joints):
+        velocities = motion.velocities(body, centres[:, body])
+        found += spines.masses[:, body, None, None] * velocities @ velocities.transpose(0, 2, 1)
+        turned, axes = motion.rotations[:, body], motion.axes(body)
+        inertia = turned @ spines.inertias[:, body] @ turned.transpose(0, 2, 1)
+        found += axes @ inertia @ axes.transpose(0, 2, 1)
     return found
