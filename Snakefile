@@ -7,6 +7,7 @@ min_version("9.27")
 sys.path.insert(0, workflow.basedir)
 
 
+include: "workflow/rules/scheduling.smk"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/execution.smk"
 
@@ -58,6 +59,8 @@ onstart:
     check_engine()
     check_writable()
     lift_rate_limit()
+    look_at_few()
+    keep_the_graph()
     logger.addFilter(to_the_point)
 
 

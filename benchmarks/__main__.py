@@ -17,10 +17,13 @@ from benchmarks import (
     identification,
     lost_fits,
     many_spines,
+    parameters,
     real_geometry,
     sensitivity,
     study,
+    summary,
 )
+from benchmarks.memory import processes
 from benchmarks.timing import machine
 
 RESULTS = Path(__file__).parent / "results"
@@ -38,6 +41,7 @@ def main() -> None:
         "many_spines": many_spines_part,
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
+        "summary": lambda: summary.write(RESULTS),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("part", nargs="*", help=", ".join(parts))
@@ -62,7 +66,7 @@ def foundation() -> None:
         "|---|---|---|---|---|---|",
     ]
     engine_rows = []
-    for rows in (engine.equilibria(), engine.calibrations()):
+    for rows in (engine.equilibria(), parameters.calibrations()):
         for row in rows:
             engine_rows.append({**asdict(row), "ratio": row.ratio})
             peer = f"{row.peer} ({row.note})" if row.note else row.peer
@@ -156,31 +160,45 @@ def discrepancy_parts(small: bool) -> None:
 def many_spines_part() -> None:
     """One equilibrium by number of joints: among many, by the engine of record, by OpenSim."""
     about = _about()
-    lines = _head("Equilibria of many spines", about)
+    lines = _head("Equilibria by number of joints", about)
     lines += [
         "",
         "| joints | among many, us | engine of record with loading, us | OpenSim static, us "
-        "| agreement | handed on |",
-        "|---|---|---|---|---|---|",
+        "| OpenSim CPodes, ms | OpenSim default integrator, s (extrapolated) | agreement "
+        "| handed on |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    rows = []
+    rows, memory = [], []
     for row in many_spines.growth():
         rows.append(asdict(row))
         lines.append(
             f"| {row.joints} | {1e6 * row.together_s:.0f} | {1e6 * row.engine_s:.0f} "
-            f"| {1e6 * row.opensim_s:.0f} | {row.difference:.0e} | {100 * row.by_engine:.0f} % |"
+            f"| {1e6 * row.static_s:.0f} | {1e3 * row.cpodes_s:.0f} | {row.default_s:.0f} "
+            f"| {row.difference:.0e} | {100 * row.by_engine:.0f} % |"
         )
         print(lines[-1], flush=True)
-    _write("many_spines", lines, {"machine": about, "growth": rows})
+    lines += ["", "| largest memory of a process | MiB |", "|---|---|"]
+    for one in processes():
+        memory.append(asdict(one))
+        lines.append(f"| {one.what} | {one.peak_mib:.0f} |")
+        print(lines[-1], flush=True)
+    _write("many_spines", lines, {"machine": about, "growth": rows, "memory": memory})
 
 
 def sensitivity_parts() -> None:
     """Sobol studies of full size, and growth with the number of targets."""
     about = _about()
     lines = _head("Global sensitivity", about)
-    rows = _study_rows(lines, sensitivity.sobol_runs(), sensitivity.STUDY)
-    rows += _study_rows(lines, sensitivity.target_runs(), sensitivity.STUDY)
-    _write("sensitivity", lines, {"machine": about, "study": rows})
+    found: dict[str, list[dict[str, Any]]] = {"sobol": [], "targets": []}
+    for name, measured in (
+        ("sobol", sensitivity.sobol_runs()),
+        ("targets", sensitivity.target_runs()),
+    ):
+        lines += _study_head(sensitivity.STUDY)
+        for one in measured:
+            found[name].append(asdict(one))
+            _study_lines(lines, one.runs)
+    _write("sensitivity", lines, {"machine": about, **found})
 
 
 def real_geometry_part(given: str | None) -> None:
@@ -209,11 +227,19 @@ def _study_rows(
     lines: list[str], runs: Iterable[study.Run], name: str = study.STUDY
 ) -> list[dict[str, Any]]:
     """Append the table of workflow runs to the lines; the same as data."""
-    lines += [
+    lines += _study_head(name)
+    return _study_lines(lines, runs)
+
+
+def _study_head(name: str) -> list[str]:
+    return [
         "",
         f"| study {name}, 2 cores | wall s | memory MiB | Snakemake's own CPU s | goal |",
         "|---|---|---|---|---|",
     ]
+
+
+def _study_lines(lines: list[str], runs: Iterable[study.Run]) -> list[dict[str, Any]]:
     rows = []
     for run in runs:
         rows.append(asdict(run))

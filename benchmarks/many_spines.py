@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.engine import with_moments
+from benchmarks.engine import by_cpodes, by_default_integrator, with_moments
 from benchmarks.timing import cpu_seconds
 from spinepipe.statics import Chain, System, follow
 from spinepipe.statics.many import Cases, Spines, solve_many
@@ -28,14 +28,17 @@ class Growth:
     Attributes
     ----------
     together_s : among many at once. engine_s : by the engine of record, the model loaded first.
-    opensim_s : OpenSim's static root-find on a model that is built already.
+    static_s : OpenSim's static root-find on a model that is built already.
+    cpodes_s, default_s : 1.5 s of OpenSim's forward dynamics, the latter extrapolated.
     difference : largest between the first two, m or rad. by_engine : share that was handed on.
     """
 
     joints: int
     together_s: float
     engine_s: float
-    opensim_s: float
+    static_s: float
+    cpodes_s: float
+    default_s: float
     difference: float
     by_engine: float
 
@@ -93,6 +96,8 @@ def _row(joints: int) -> Growth:
         cpu_seconds(lambda: [follow(System(Chain(m), m, case)) for m in models], 3).median
         / CHECKED,
         cpu_seconds(lambda: opensim_peer.equilibrium_of(built, start=start), 5).median,
+        by_cpodes(chain),
+        by_default_integrator(chain),
         worst,
         float(found.by_engine.mean()),
     )

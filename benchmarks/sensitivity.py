@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pyarrow import parquet
+
 from benchmarks.study import Run, copy_of_project, run_workflow
 
 STUDY = "bench_factors"
@@ -43,9 +45,9 @@ class Size:
 
 SOBOL = (
     Size("L1-L4, Sobol, 24 factors, N = 1024", "palanca_l1l4", "s01", "sobol", 1024, "null",
-         "60 s runs, 60 s indices, 1.5 GB"),
+         "60 s, 1.5 GB"),
     Size("T12-S1, Sobol, 24 factors, N = 1024", "t12s1_phantom", "s01", "sobol", 1024, "null",
-         "120 s runs, 60 s indices"),
+         "120 s"),
 )  # fmt: skip
 TARGETS = tuple(
     Size(f"{n:,} samples, a target each", "palanca_l1l4", "s01", "latin_hypercube", n, "1", goal)
@@ -53,31 +55,69 @@ TARGETS = tuple(
 )
 
 
-def sobol_runs() -> Iterator[Run]:
+@dataclass(frozen=True)
+class Sobol:
+    """A study of full size: the spines' joints, and how many equilibria its responses took."""
+
+    joints: int
+    equilibria: int
+    responses: Run
+    indices: Run
+    rest: Run
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Runs of the workflow."""
+        return self.responses, self.indices, self.rest
+
+
+@dataclass(frozen=True)
+class Targets:
+    """A study of so many targets: cold, again, and after losing one sample in a hundred."""
+
+    targets: int
+    cold: Run
+    again: Run
+    lost: Run
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Runs of the workflow."""
+        return self.cold, self.again, self.lost
+
+
+def sobol_runs() -> Iterator[Sobol]:
     """Responses, then indices, of each study."""
     for size in SOBOL:
         with _project(size) as folder:
-            results = f"results/{STUDY}"
-            responses = [f"{results}/responses.parquet"]
-            yield run_workflow(f"{size.what}: responses", folder, responses, size.goal)
-            yield run_workflow(f"{size.what}: indices", folder, [f"{results}/indices.parquet"], "")
-            yield run_workflow(f"{size.what}: all the rest", folder, ["all"], "")
+            table, joints = f"results/{STUDY}/responses.parquet", len(JOINTS[size.cohort])
+            cold = run_workflow(f"{size.what}: responses", folder, [table], size.goal)
+            indices = [f"results/{STUDY}/indices.parquet"]
+            rows = parquet.read_metadata(Path(folder, table)).num_rows
+            yield Sobol(
+                joints,
+                rows // joints,
+                cold,
+                run_workflow(f"{size.what}: indices", folder, indices, "60 s"),
+                run_workflow(f"{size.what}: all the rest", folder, ["all"], ""),
+            )
 
 
-def target_runs() -> Iterator[Run]:
-    """Cold, again, and after losing one sample in a hundred."""
+def target_runs() -> Iterator[Targets]:
+    """Growth with the number of targets."""
     for size in TARGETS:
         with _project(size) as folder:
             wanted = [f"results/{STUDY}/responses.parquet"]
-            jobs = Path(folder, f"results/{STUDY}/jobs/responses")
-            yield run_workflow(f"{size.what}: cold", folder, wanted, size.goal)
             last = size.samples == TARGETS[-1].samples
-            yield run_workflow(f"{size.what}: nothing to do", folder, wanted, "20 s" * last)
+            cold = run_workflow(f"{size.what}: cold", folder, wanted, size.goal)
+            again = run_workflow(f"{size.what}: nothing to do", folder, wanted, "20 s" * last)
+            jobs = Path(folder, f"results/{STUDY}/jobs/responses")
             lost = sorted(jobs.glob("*/*.parquet"))[::100]
             for path in lost:
                 path.unlink()
             files = [path.relative_to(folder).as_posix() for path in lost]
-            yield run_workflow(f"{size.what}: 1 % lost", folder, [*wanted, *files], "30 s" * last)
+            run = run_workflow(f"{size.what}: 1 % lost", folder, [*wanted, *files], "30 s" * last)
+            yield Targets(size.samples, cold, again, run)
 
 
 @contextlib.contextmanager

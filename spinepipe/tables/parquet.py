@@ -54,13 +54,20 @@ def _check_keys(table: Table, rows: pa.Table) -> None:
         raise BadTable(f"{table.name}: {repeated} rows repeat the key of another")
 
 
+def _typed(values: Sequence[Any], kind: pa.DataType) -> pa.Array:
+    """Whole arrays are taken as they are: a list of them would be many times their size."""
+    if isinstance(values, pa.Array):
+        return values.cast(kind)
+    return pa.array(values if isinstance(values, np.ndarray) else list(values), type=kind)
+
+
 def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
     kind = TYPES[column.kind]
     try:
         if column.kind == "number":
             array = pa.array(np.asarray(values, dtype=float), type=kind, from_pandas=True)
         else:
-            array = pa.array(list(values), type=kind)
+            array = _typed(values, kind)
     except (pa.ArrowException, TypeError, ValueError) as error:
         raise BadTable(f"{table}.{column.name}: {error}") from None
     problem = _problem(column, array)

@@ -7,57 +7,13 @@ variance are (F_y s_x)^2 and (F_x s_y)^2 over their sum; nothing else moves the 
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
-from small_project import Project, copy_project
+from lever import FORCE_N, MEASURED_DEG, POINT_MM, lever, table
+from small_project import Project
 
-FORCE_N = (1.0, 2.0)
-OFFSET_SD_MM = 5.0
 SHARES = {"load_point_x": 0.8, "load_point_y": 0.2, "bending": 0.0, "dummy": 0.0}
-
-STUDY = """\
-study: {name}
-kind: global_sensitivity
-cohort: lever
-factors:
-  - {{of: load_point, axis: x, offset_mm: {{sd: 5}}}}
-  - {{of: load_point, axis: y, offset_mm: {{sd: 5}}}}
-  - {{of: stiffness, coordinate: right_bending, times: {{low: 0.5, high: 2}}, name: bending}}
-design: {{method: sobol, samples: {samples}, second_order: false}}
-outputs: {{motion: [extension], joint_load: [extension]}}
-bootstraps: 200
-{more}
-"""
-
-
-def lever(folder: Path, *studies: tuple[str, int, str]) -> Project:
-    """A project with the cohort of one joint and these studies: name, samples, more lines."""
-    project = copy_project(folder)
-    cohort = project.path("config/cohorts/lever")
-    cohort.mkdir()
-    (cohort / "cohort.yaml").write_text(
-        "cohort: lever\ntitle: one joint\nsource: written for the tests\n"
-        "vertebrae: [V2, V1]\ngravity: false\n"
-    )
-    (cohort / "specimens.csv").write_text("specimen\na\nb\n")
-    pose = "joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg"
-    rows = [f"{name},V1V2,0,0,0,0,0,0" for name in "ab"]
-    (cohort / "joints.csv").write_text("\n".join([f"specimen,{pose}", *rows]) + "\n")
-    x, y = FORCE_N
-    (cohort / "loads.csv").write_text(
-        "specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm\n"
-        f"*,push,0,V1,0,0,0,0,0,0,20,30,0\n*,push,1,V1,{x},{y},0,0,0,0,20,30,0\n"
-    )
-    for name, samples, more in studies:
-        text = STUDY.format(name=name, samples=samples, more=more)
-        project.path(f"config/studies/{name}.yaml").write_text(text)
-    names = ", ".join(name for name, _, _ in studies)
-    project.path("config/config.yaml").write_text(f"studies: [{names}]\n")
-    return project
-
-
-def table(project: Project, study: str, name: str) -> pd.DataFrame:
-    return pd.read_parquet(project.path(f"results/{study}/{name}.parquet"))
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +45,8 @@ def test_motion_is_the_lever_s(computed: Project) -> None:
     )
     responses = table(computed, "single", "responses")
     responses = responses[responses["specimen"] == "a"].set_index("sample")
-    x = (20.0 + design["load_point_x"]) / 1000.0
-    y = (30.0 + design["load_point_y"]) / 1000.0
+    x = (POINT_MM[0] + design["load_point_x"]) / 1000.0
+    y = (POINT_MM[1] + design["load_point_y"]) / 1000.0
     moment = x * FORCE_N[1] - y * FORCE_N[0]
     found = responses["load_extension_nm"].reindex(design.index)
     assert (found - moment).abs().max() < 2e-3 * moment.abs().max()
@@ -128,3 +84,29 @@ def test_a_lost_sample_is_computed_again_and_nothing_else_changes(
     others = {name for name in files if "/jobs/" in name and name != lost}
     assert all(after[name] == files[name] for name in others)
     assert project.contents() == before
+
+
+def test_calibrated_stiffness_is_the_lever_s(tmp_path: Path) -> None:
+    """Fitted to one reading, each sample's stiffness is its moment over that angle."""
+    more = "seed: 3\ncalibration: {free: [extension]}"
+    project = lever(tmp_path / "project", ("fitted", 16, more))
+    project.edit("config/studies/fitted.yaml", "sd: 5", "sd: 0.5")
+    project.edit("config/studies/fitted.yaml", "joint_load: [extension]}", "stiffness: true}")
+    project.run_all()
+    design = table(project, "fitted", "design").pivot(
+        index="sample", columns="factor", values="value"
+    )
+    fitted = table(project, "fitted", "calibrated")
+    assert (fitted["status"] == "converged").all()
+    fitted = fitted[fitted["specimen"] == "a"].set_index("sample")
+    x = (POINT_MM[0] + design["load_point_x"]) / 1000.0
+    y = (POINT_MM[1] + design["load_point_y"]) / 1000.0
+    expected = (x * FORCE_N[1] - y * FORCE_N[0]) / np.deg2rad(MEASURED_DEG)
+    ratio = fitted["extension_nm_per_rad"].reindex(design.index) / expected
+    assert ratio.between(0.99, 1.01).all()
+    indices = table(project, "fitted", "indices")
+    of_fit = indices[(indices["output"] == "stiffness") & (indices["index"] == "S1")]
+    assert set(of_fit["factor"]) == set(SHARES)
+    assert (of_fit["status"] == "done").all()
+    biggest = of_fit.loc[of_fit["estimate"].idxmax(), "factor"]
+    assert biggest == "load_point_x"

@@ -31,7 +31,9 @@ def results_of(kind):
 
 def selection():
     """Which studies are built; those of `all` are validated, all problems told at once."""
-    if not workflow.is_main_process:  # a job of a cluster: it was validated before it was submitted
+    if (
+        not workflow.is_main_process
+    ):  # a job of a cluster: it was validated before it was submitted
         return studies.Selection.model_construct(studies=(), full=())
     problems = []
     try:
@@ -119,7 +121,9 @@ def jobs_of_block(wildcards):
 
 def blocks_of_specimen(table):
     """Input function: the blocks of a table that hold the specimen at hand."""
-    return lambda wildcards: layout(wildcards.study).blocks_of(table, wildcards.specimen)
+    return lambda wildcards: layout(wildcards.study).blocks_of(
+        table, wildcards.specimen
+    )
 
 
 def stiffness_source(wildcards):

@@ -41,17 +41,6 @@ def share_a_process():
 share_a_process()
 
 
-def lift_rate_limit():
-    """Do without a limit of jobs per second, which no option turns off.
-
-    It starts a timer whenever Snakemake looks for jobs to run, and each timer makes it look again
-    through all that are ready (docs/decisions/0007).
-    """
-    if workflow.local_exec:
-        assert hasattr(workflow.scheduler, "job_rate_limiter"), "see decision 0007"
-        workflow.scheduler.job_rate_limiter = None
-
-
 def to_the_point(record):
     """Log filter: no two lines per job that starts, and of a failed job only its own words."""
     text = str(record.msg)

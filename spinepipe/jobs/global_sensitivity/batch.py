@@ -40,7 +40,7 @@ def batch_of(
     """
     size = study.batch_size(len(study.chosen_specimens(cohort)))
     first = number * size
-    values = drawn_values(design, study)[first : first + size]
+    values = drawn_values(design, study, slice(first, first + size))
     start = start_of_specimen(root, study.study, specimen, all_steps, cohort.digest)
     return Batch(first, len(values), start, vary(start, study.changes, values))
 

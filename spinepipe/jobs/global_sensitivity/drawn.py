@@ -28,13 +28,14 @@ def design_of(study: GlobalSensitivity) -> Design:
     )
 
 
-def drawn_values(path: str, study: GlobalSensitivity) -> Array:
-    """(n, D) values of ``design.parquet``, m, rad or multipliers."""
-    return _values(stamp(path), study.n_runs) / np.array(study.per_si)
+def drawn_values(path: str, study: GlobalSensitivity, part: slice) -> Array:
+    """(n, D) values of some samples of ``design.parquet``, m, rad or multipliers."""
+    result: Array = _values(stamp(path), len(study.factor_names))[part] / np.array(study.per_si)
+    return result
 
 
 @lru_cache(maxsize=2)
-def _values(where: Stamp, samples: int) -> Array:
+def _values(where: Stamp, factors: int) -> Array:
     column = pq.read_table(where[0], columns=["value"]).column("value")
-    values: Array = column.to_numpy().reshape(samples, -1)
+    values: Array = column.to_numpy().reshape(-1, factors)
     return values

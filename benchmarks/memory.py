@@ -1,0 +1,53 @@
+"""Largest memory of a process that solves T12-S1 once, with spinepipe's engine or OpenSim."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from benchmarks.study import ROOT
+
+_OURS = """
+from spinepipe.statics import Chain, System, follow
+from tests.reference.bridge import load_case, spine_model
+from tests.reference.peers.chain import t12_s1_chain
+
+chain = t12_s1_chain()
+model = spine_model(chain)
+follow(System(Chain(model), model, load_case(chain)))
+"""
+
+_THEIRS = """
+import numpy as np
+from tests.reference.peers import opensim_peer
+from tests.reference.peers.chain import t12_s1_chain
+
+opensim_peer.equilibrium(t12_s1_chain())
+"""
+
+_PEAK = """
+import resource
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a process did, and the most memory it held."""
+
+    what: str
+    peak_mib: float
+
+
+def processes() -> Iterator[Memory]:
+    """One process of each."""
+    yield Memory("spinepipe: equilibrium T12-S1", _peak_mib(_OURS))
+    yield Memory("OpenSim: equilibrium T12-S1", _peak_mib(_THEIRS))
+
+
+def _peak_mib(program: str) -> float:
+    done = subprocess.run(
+        [sys.executable, "-c", program + _PEAK],
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    return int(done.stdout.split()[-1]) / 1024  # Linux counts in KiB

@@ -1,0 +1,123 @@
+"""Ishigami's function in the place of the engine: the workflow's indices beside the closed form.
+
+Everything but the solve is the product's: the design, batches, tables, indices, convergence,
+figures and report. Ishigami & Homma 1990, a = 7, b = 0.1.
+"""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from lever import lever, table
+from small_project import Project
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+from known_indices import ishigami, morris_truth
+
+SAMPLES = {"sobol": 1024, "fast": 2048, "morris": 500}
+NAMES = {"load_point_x": "x1", "load_point_y": "x2", "load_point_z": "x3"}
+
+STUDY = """\
+study: {method}
+kind: global_sensitivity
+cohort: lever
+specimens: [a]
+factors:
+  - {{of: load_point, axis: x, offset_mm: {{low: -3.141592653589793, high: 3.141592653589793}}}}
+  - {{of: load_point, axis: y, offset_mm: {{low: -3.141592653589793, high: 3.141592653589793}}}}
+  - {{of: load_point, axis: z, offset_mm: {{low: -3.141592653589793, high: 3.141592653589793}}}}
+design: {{method: {method}, samples: {samples}}}
+outputs: {{motion: [extension], joint_load: []}}
+"""
+
+STAND_IN = '''
+"""Ishigami's function of the first three factors, in place of a solve."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from spinepipe.studies import check
+from spinepipe.tables import RESPONSES, to_arrow, write
+
+
+def run(root, study, design, specimen, batch, output):
+    settings, cohort = check(Path(root), study)
+    size = settings.batch_size(1)
+    values = pq.read_table(design).column("value").to_numpy().reshape(settings.n_runs, -1)
+    part = values[int(batch) * size : (int(batch) + 1) * size]
+    x, y, z = part[:, :3].T
+    table = RESPONSES.without("specimen")
+    columns = {column.name: [0.0] * len(part) for column in table.columns}
+    columns.update(
+        sample=[int(batch) * size + number for number in range(len(part))],
+        test=["push"] * len(part),
+        step=[1] * len(part),
+        joint=["V1V2"] * len(part),
+        predicted_extension_deg=np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x),
+        status=["converged"] * len(part),
+        message=[""] * len(part),
+    )
+    write(to_arrow(table, columns), output, {})
+'''
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """A study by each method, the engine of its copy of the project replaced."""
+    project = lever(tmp_path_factory.mktemp("ishigami") / "project")
+    project.path("spinepipe/jobs/global_sensitivity/respond.py").write_text(STAND_IN)
+    for method, samples in SAMPLES.items():
+        text = STUDY.format(method=method, samples=samples)
+        project.path(f"config/studies/{method}.yaml").write_text(text)
+    project.path("config/config.yaml").write_text(f"studies: [{', '.join(SAMPLES)}]\n")
+    project.run_all()
+    return project
+
+
+def beside_truth(rows: pd.DataFrame, truth: dict[tuple[str, str, str], float]) -> pd.DataFrame:
+    """Rows of known indices, with the column ``truth``."""
+    named = [
+        truth.get((row.index_, NAMES.get(row.factor, ""), NAMES.get(row.other, "")))
+        for row in rows.rename(columns={"index": "index_"}).itertuples()
+    ]
+    return rows.assign(truth=named).dropna(subset=["truth"])
+
+
+def test_sobol_indices_are_ishigami_s(computed: Project) -> None:
+    rows = beside_truth(table(computed, "sobol", "indices"), ishigami().truth)
+    assert len(rows) == 9  # S1 and ST of three factors, three pairs
+    assert (rows["estimate"] - rows["truth"]).abs().max() < 0.05
+    inside = (rows["ci_low"] <= rows["truth"]) & (rows["truth"] <= rows["ci_high"])
+    assert inside.sum() >= 8  # of nine intervals of 95 %
+
+
+def test_fast_indices_are_ishigami_s(computed: Project) -> None:
+    rows = beside_truth(table(computed, "fast", "indices"), ishigami().truth)
+    assert len(rows) == 6
+    assert (rows["estimate"] - rows["truth"]).abs().max() < 0.05
+
+
+def test_elementary_effects_are_ishigami_s(computed: Project) -> None:
+    rows = beside_truth(table(computed, "morris", "indices"), morris_truth(ishigami()))
+    assert len(rows) == 9
+    assert (rows["estimate"] - rows["truth"]).abs().max() < 0.08 * rows["truth"].max()
+
+
+def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Project) -> None:
+    rows = table(computed, "sobol", "indices")
+    total = rows[rows["index"] == "ST"].set_index("factor")
+    assert total.loc["dummy", "estimate"] == pytest.approx(0.0, abs=1e-12)
+    assert not total.loc["dummy", "above_floor"]
+    assert total.loc[list(NAMES), "above_floor"].all()
+
+
+def test_estimates_settle_with_the_size_of_the_design(computed: Project) -> None:
+    grown = table(computed, "sobol", "convergence")
+    x2 = grown[(grown["factor"] == "load_point_y") & (grown["index"] == "S1")]
+    width = (x2["ci_high"] - x2["ci_low"]).to_numpy()
+    order = x2["runs"].to_numpy().argsort()
+    assert x2["runs"].max() == 1024 * (2 * 4 + 2)
+    assert width[order][-1] < 0.5 * width[order][0]
