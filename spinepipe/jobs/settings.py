@@ -24,7 +24,7 @@ _FRAMES = {"poses", "pose_sd"}
 
 
 _RESPONDING = {"specimens", "tests", "steps", "stiffness", "level_stiffness", "damping", "loading"}
-_ANALYSING = {"bootstraps", "confidence", "most_failed", "outputs"}
+_ANALYSING = {"bootstraps", "confidence", "indices", "most_failed", "outputs"}
 """Settings of global sensitivity: what the samples are done with, and what is made of them."""
 
 

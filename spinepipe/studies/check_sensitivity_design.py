@@ -5,7 +5,7 @@ from math import log2
 
 from spinepipe.cohort.read_yaml import Document
 from spinepipe.problems import Problem, one_of
-from spinepipe.studies.global_sensitivity import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity import DUMMY, INDICES, GlobalSensitivity
 from spinepipe.studies.places import at
 
 __all__ = ["check_sensitivity_design"]
@@ -17,6 +17,7 @@ FEWEST = 2
 def check_sensitivity_design(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
     """Everything about names, groups and numbers that a method cannot do with."""
     yield from _samples(document, study)
+    yield from _indices(document, study)
     yield from _names(document, study)
     yield from _groups(document, study)
     compared = [name for name in study.compared if name != DUMMY]
@@ -44,6 +45,16 @@ def _samples(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
         allowed = "an even number: steps of half the levels must stay on the grid"
         levels = str(design.levels)
         yield Problem(*at(document, "design.levels"), levels, allowed, "take one more or one less")
+
+
+def _indices(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+    """Each method has indices of its own."""
+    there = INDICES[study.design.method]
+    for number, index in enumerate(study.indices or ()):
+        if index not in there:
+            place = at(document, f"indices.{number}")
+            allowed = f"with method {study.design.method}: {one_of(there)}"
+            yield Problem(*place, index, allowed, "delete it, or choose another method")
 
 
 def _names(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:

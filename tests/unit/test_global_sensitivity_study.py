@@ -158,6 +158,18 @@ def test_changes_name_places_and_axes(tmp_path: Path) -> None:
     )
 
 
+def test_delta_is_computed_only_where_it_is_named(tmp_path: Path) -> None:
+    short = UNGROUPED.replace("method: sobol", "method: latin_hypercube")
+    plain = sound(tmp_path / "plain", short)
+    assert plain.chosen_indices == ("S1_RBD", "PAWN", "KS_low", "KS_high")
+    named = sound(tmp_path / "named", short + "indices: [delta, PAWN]\n")
+    assert named.chosen_indices == ("delta", "PAWN")
+
+
+def test_methods_have_the_indices_of_the_analysis() -> None:
+    assert {method.value: names for method, names in INDICES.items()} == study_file.INDICES
+
+
 @pytest.mark.parametrize(
     ("more", "specimens", "size"),
     [
@@ -220,8 +232,9 @@ CASES = [
     Case("group named dummy", "axis: x, offset_mm: {sd: 1.0}, group: L3_landmarks", "axis: x, offset_mm: {sd: 1.0}, group: dummy", 7, "factors.1.group", "rename the group"),
     Case("groups of a hypercube", "method: sobol", "method: latin_hypercube", 7, "factors.1.group", "method one of sobol, morris"),
     Case("groups of fast", "method: sobol, samples: 64", "method: fast, samples: 65", 8, "factors.2.group", "method one of sobol, morris"),
-    Case("few samples of fast", "method: sobol", "method: fast", 4, "design.samples", "at least 65 with method fast and 4 harmonics"),
+    Case("few samples of fast", "method: sobol", "method: fast", 4, "design.samples", "at least 705 with method fast, 4 harmonics and 12 factors"),
     Case("odd levels of morris", "method: sobol, samples: 64", "method: morris, samples: 30, levels: 5", 4, "design.levels", "an even number"),
+    Case("index of another method", None, "indices: [S1, PAWN]\n", 17, "indices.1", "with method sobol: one of S1, ST, S2"),
 ]
 # fmt: on
 
@@ -338,7 +351,7 @@ def test_calibrated_stiffness_needs_motion(tmp_path: Path) -> None:
 
 def test_methods_without_groups_take_factors_alone(tmp_path: Path) -> None:
     for method in ("latin_hypercube", "fast", "morris"):
-        design = f"design: {{method: {method}, samples: 70}}\n"
+        design = f"design: {{method: {method}, samples: 800}}\n"
         study = UNGROUPED.replace("design: {method: sobol, samples: 64}\n", design)
         assert sound(tmp_path / method, study).design.method == method
 

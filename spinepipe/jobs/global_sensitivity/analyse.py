@@ -59,6 +59,7 @@ def _asked(settings: GlobalSensitivity) -> Settings:
         confidence=settings.confidence,
         seed=settings.seed,
         most_failed=settings.most_failed,
+        wanted=settings.chosen_indices,
     )
 
 
