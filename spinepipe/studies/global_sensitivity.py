@@ -51,8 +51,8 @@ class SensitivityDesign(BaseModel):
 
     method: Literal["sobol", "latin_hypercube", "morris", "fast"] = Field(
         default="sobol",
-        description="sobol: indices S1, ST, S2; latin_hypercube: S1_RBD, PAWN, KS_low, KS_high, delta; "
-        "morris: mu, mu_star, sigma; fast: S1, ST",
+        description="sobol: indices S1, ST, S2; latin_hypercube: S1_RBD, PAWN, KS_low, KS_high, "
+        "delta; morris: mu, mu_star, sigma; fast: S1, ST",
     )
     samples: int = Field(
         default=256,
@@ -142,8 +142,8 @@ class GlobalSensitivity(Study):
     )
     indices: EachOnce[IndexName] | None = Field(
         default=None,
-        description="indices; null: all of the design's method but delta, which takes minutes where "
-        "the others take seconds (5 s per output with 24 factors and 1,024 samples)",
+        description="indices; null: all of the design's method but delta, which takes minutes "
+        "where the others take seconds (5 s per output with 24 factors and 1,024 samples)",
     )
     bootstraps: int = Field(
         default=1000, ge=2, le=100_000, description="resamples for the intervals of indices"
