@@ -39,6 +39,7 @@ def main() -> None:
         "cohort": cohort_parts,
         "discrepancy": lambda: discrepancy_parts(options.small),
         "many_spines": many_spines_part,
+        "memory": memory_part,
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
         "summary": lambda: summary.write(RESULTS),
@@ -168,7 +169,7 @@ def many_spines_part() -> None:
         "| handed on |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    rows, memory = [], []
+    rows = []
     for row in many_spines.growth():
         rows.append(asdict(row))
         lines.append(
@@ -177,12 +178,20 @@ def many_spines_part() -> None:
             f"| {row.difference:.0e} | {100 * row.by_engine:.0f} % |"
         )
         print(lines[-1], flush=True)
-    lines += ["", "| largest memory of a process | MiB |", "|---|---|"]
+    _write("many_spines", lines, {"machine": about, "growth": rows})
+
+
+def memory_part() -> None:
+    """Largest memory of one process of each."""
+    about = _about()
+    lines = _head("Memory", about)
+    lines += ["", "| a process, and all it did | MiB |", "|---|---|"]
+    rows = []
     for one in processes():
-        memory.append(asdict(one))
+        rows.append(asdict(one))
         lines.append(f"| {one.what} | {one.peak_mib:.0f} |")
         print(lines[-1], flush=True)
-    _write("many_spines", lines, {"machine": about, "growth": rows, "memory": memory})
+    _write("memory", lines, {"machine": about, "processes": rows})
 
 
 def sensitivity_parts() -> None:

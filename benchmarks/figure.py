@@ -21,7 +21,7 @@ def speed_figure(parts: dict[str, Data]) -> Figure:
     _joints(joints, parts["many_spines"]["growth"])
     _unknowns(unknowns, parts["foundation"]["engine"])
     _targets(targets, parts["sensitivity"]["targets"])
-    _memory(memory, parts["sensitivity"]["targets"], parts["many_spines"]["memory"])
+    _memory(memory, parts["sensitivity"]["targets"], parts["memory"]["processes"])
     return figure
 
 

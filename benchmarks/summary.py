@@ -11,7 +11,7 @@ from spinepipe.report.style import save, style
 Data = dict[str, Any]
 
 PARTS = ("foundation", "identification", "cohort", "whole_study", "discrepancy", "many_spines",
-         "sensitivity")  # fmt: skip
+         "memory", "sensitivity")  # fmt: skip
 """Parts whose figures are gathered."""
 
 CORES = 2
@@ -88,12 +88,12 @@ def _workflows(parts: dict[str, Data]) -> Iterator[str]:
     for name, run in _runs(parts):
         goal = f" (goal {run['goal']})" if run["goal"] else ""
         took = f"{run['wall_s']:.1f} s, {run['peak_mib']:.0f} MiB"
-        yield f"| {run['what']}{goal} | {took} | | | | {_link(name)} |"
-    ours, theirs = parts["many_spines"]["memory"]
+        yield f"| {name}: {run['what']}{goal} | {took} | | | | {_link(name)} |"
+    ours, theirs = parts["memory"]["processes"]
     yield (
         f"| largest memory of a process that solves T12-S1 | {ours['peak_mib']:.0f} MiB | OpenSim "
         f"| {theirs['peak_mib']:.0f} MiB | {theirs['peak_mib'] / ours['peak_mib']:.1f} "
-        f"| {_link('many_spines')} |"
+        f"| {_link('memory')} |"
     )
 
 
