@@ -207,6 +207,17 @@ def sensitivity_parts() -> None:
         for one in measured:
             found[name].append(asdict(one))
             _study_lines(lines, one.runs)
+    lines += [
+        "",
+        "| joints | solved by the engine of record | bytes per row: drawing the design "
+        "| joining responses |",
+        "|---|---|---|---|",
+    ]
+    for row in found["sobol"]:
+        shares = ", ".join(f"{test} {share:.1%}" for test, share in row["handed_on"].items())
+        sizes = f"{row['design_bytes']:.0f} | {row['join_bytes']:.0f}"
+        lines.append(f"| {row['joints']} | {shares} | {sizes} |")
+        print(lines[-1], flush=True)
     _write("sensitivity", lines, {"machine": about, **found})
 
 

@@ -1,4 +1,4 @@
-"""Largest memory of a process that solves T12-S1 once, with spinepipe's engine or OpenSim."""
+"""Largest memory of a process: one that solves T12-S1 once, and single jobs."""
 
 import subprocess
 import sys
@@ -44,6 +44,12 @@ def processes() -> Iterator[Memory]:
     """One process of each."""
     yield Memory("spinepipe: equilibrium T12-S1", _peak_mib(_OURS))
     yield Memory("OpenSim: equilibrium T12-S1", _peak_mib(_THEIRS))
+
+
+def per_row(job: str, call: str, rows: int) -> float:
+    """Bytes per row that a job of `spinepipe.jobs` holds at most, beyond those of its modules."""
+    imported = f"import spinepipe.jobs.{job} as job\n"
+    return (_peak_mib(imported + call) - _peak_mib(imported)) * 2**20 / rows
 
 
 def _peak_mib(program: str) -> float:

@@ -7,7 +7,15 @@ from pathlib import Path
 
 from pyarrow import parquet
 
+from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
+from spinepipe.cohort.varied.vary import vary
+from spinepipe.jobs.global_sensitivity.batch import start_of_specimen
+from spinepipe.jobs.global_sensitivity.drawn import design_of
+from spinepipe.sensitivity.global_indices import values_of
+from spinepipe.statics.many import solve_many
+from spinepipe.studies import GlobalSensitivity, check
+from spinepipe.studies.drawn_from import spreads_of
 
 STUDY = "bench_factors"
 JOINTS = {
@@ -17,6 +25,9 @@ JOINTS = {
 ROTATIONS = ("extension", "right_bending", "left_rotation")
 FACTORS = 23
 """Factors of each study; the dummy is the 24th."""
+
+FIRST_SAMPLES = 2000
+"""Of which it is counted how many the engine of record had to solve."""
 
 _TEXT = """\
 study: {study}
@@ -57,10 +68,20 @@ TARGETS = tuple(
 
 @dataclass(frozen=True)
 class Sobol:
-    """A study of full size: the spines' joints, and how many equilibria its responses took."""
+    """A study of full size.
+
+    Attributes
+    ----------
+    equilibria : that its responses took. handed_on : share of them, of its first samples, that the
+        engine of record had to solve, in each test.
+    design_bytes, join_bytes : memory per row of drawing the design and of joining the responses.
+    """
 
     joints: int
     equilibria: int
+    handed_on: dict[str, float]
+    design_bytes: float
+    join_bytes: float
     responses: Run
     indices: Run
     rest: Run
@@ -97,10 +118,39 @@ def sobol_runs() -> Iterator[Sobol]:
             yield Sobol(
                 joints,
                 rows // joints,
+                _handed_on(folder, size.specimen),
+                _design_bytes(folder),
+                _join_bytes(folder, rows),
                 cold,
                 run_workflow(f"{size.what}: indices", folder, indices, "60 s"),
                 run_workflow(f"{size.what}: all the rest", folder, ["all"], ""),
             )
+
+
+def _handed_on(folder: str, specimen: str) -> dict[str, float]:
+    """Share of spines that are not solved among many, by test."""
+    study, cohort = check(Path(folder), STUDY)
+    assert isinstance(study, GlobalSensitivity)
+    values = values_of(design_of(study), spreads_of(study))[:FIRST_SAMPLES]
+    start = start_of_specimen(folder, STUDY, specimen, False, cohort.digest)
+    varied = vary(start, study.changes, values)
+    return {
+        cases.like.test: float(solve_many(varied.spines, cases).by_engine.mean())
+        for cases in varied.cases
+    }
+
+
+def _design_bytes(folder: str) -> float:
+    rows = parquet.read_metadata(f"{folder}/results/{STUDY}/design.parquet").num_rows
+    call = f"job.run({folder!r}, {STUDY!r}, {f'{folder}/drawn.parquet'!r})"
+    return per_row("global_sensitivity.design", call, rows)
+
+
+def _join_bytes(folder: str, rows: int) -> float:
+    blocks = Path(folder, f"results/{STUDY}/blocks/responses").rglob("*.parquet")
+    paths = [str(path) for path in sorted(blocks)]
+    call = f"job.run('responses', {paths!r}, {f'{folder}/joined.parquet'!r})"
+    return per_row("collect", call, rows)
 
 
 def target_runs() -> Iterator[Targets]:

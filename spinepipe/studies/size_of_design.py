@@ -27,14 +27,18 @@ COPIES = 3
 FILE_ON_DISK = 12_000
 """Bytes of a job file besides its rows: columns' descriptions and provenance."""
 
-DESIGN_IN_MEMORY, RESPONSE_IN_MEMORY = 400, 750
-"""Bytes per row while a table is made of its parts: columns, their copies and the keys."""
+DESIGN_IN_MEMORY, RESPONSE_IN_MEMORY = 300, 200
+"""Bytes per row while a table is made of its parts: columns, their copies and the keys.
+
+Measured with a million rows and more (230 to 280 and 120 to 160); a smaller table's are in what
+is there at least.
+"""
 
 OUTPUT_IN_MEMORY = 24
 """Bytes per run and output while indices are computed: numbers, centred, in blocks."""
 
-AT_LEAST_IN_MEMORY = 600_000_000
-"""Bytes of the workers with their libraries, and of the resamples of a bootstrap."""
+AT_LEAST_IN_MEMORY = 900_000_000
+"""Bytes of Snakemake and the workers with their libraries, and of the resamples of a bootstrap."""
 
 
 @dataclass(frozen=True)
