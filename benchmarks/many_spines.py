@@ -90,10 +90,11 @@ def _row(joints: int) -> Growth:
     )
     built = opensim_peer.build(chain)
     start = np.zeros((joints, 6))
+    repeats = 11 if joints <= BENT_JOINTS else 3
     return Growth(
         joints,
-        cpu_seconds(lambda: solve_many(spines, cases), 3).median / COUNT,
-        cpu_seconds(lambda: [follow(System(Chain(m), m, case)) for m in models], 3).median
+        cpu_seconds(lambda: solve_many(spines, cases), repeats).median / COUNT,
+        cpu_seconds(lambda: [follow(System(Chain(m), m, case)) for m in models], repeats).median
         / CHECKED,
         cpu_seconds(lambda: opensim_peer.equilibrium_of(built, start=start), 5).median,
         by_cpodes(chain),

@@ -27,11 +27,11 @@ COPIES = 3
 FILE_ON_DISK = 12_000
 """Bytes of a job file besides its rows: columns' descriptions and provenance."""
 
-DESIGN_IN_MEMORY, RESPONSE_IN_MEMORY = 300, 200
+DESIGN_IN_MEMORY, RESPONSE_IN_MEMORY = 300, 400
 """Bytes per row while a table is made of its parts: columns, their copies and the keys.
 
-Measured with a million rows and more (230 to 280 and 120 to 160); a smaller table's are in what
-is there at least.
+`python -m benchmarks sensitivity`: 290 with 1.2 million rows and 450 with 0.9 million, of which 110
+are libraries that are loaded on the way.
 """
 
 OUTPUT_IN_MEMORY = 24

@@ -103,7 +103,7 @@ def test_bytes_grow_with_rows() -> None:
     one = Size(1000, 6, 5000, 10**6, 0, 10)
     ten = Size(1000, 6, 5000, 10**7, 0, 10)
     assert ten.on_disk - one.on_disk == 3 * 120 * 9 * 10**6
-    assert ten.in_memory - one.in_memory == 200 * 9 * 10**6
+    assert ten.in_memory - one.in_memory == 400 * 9 * 10**6
 
 
 def test_stated_bytes_per_row_hold(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from lever import lever
 from small_project import Project, copy_project
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
@@ -25,6 +26,8 @@ STUDY = (
     "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
 )
 MOVES_PER_SUBMITTED_JOB = 8
+SAMPLES = 48
+"""Runs of each specimen of the sensitivity study: one submitted job."""
 SUBMIT = """\
 #!/bin/sh
 # Stands in for a queue: the job script runs in a session of its own, as nobody's child.
@@ -38,7 +41,11 @@ NOTE = "\nPath('queue', f'{os.getpid()}.start').touch()\n"
 def new_project(folder: Path) -> Project:
     project = copy_project(folder)
     grid_cases.project(folder, STUDY, specimens=("a",))
-    (folder / "queue").mkdir()
+    return with_queue(project)
+
+
+def with_queue(project: Project) -> Project:
+    project.path("queue").mkdir()
     snakefile = project.path("Snakefile")
     snakefile.write_text(snakefile.read_text() + NOTE)
     submit = project.path("submit.sh")
@@ -52,7 +59,7 @@ def run_on_cluster(project: Project) -> str:
     done = project.snakemake(
         *("all", "--profile", "profiles/slurm", "--executor", "cluster-generic"),
         *("--cluster-generic-submit-cmd", "./submit.sh", "--jobs", "2", "--cores", "2"),
-        *("--group-components", f"moves={MOVES_PER_SUBMITTED_JOB}"),
+        *("--group-components", f"moves={MOVES_PER_SUBMITTED_JOB}", f"responses={SAMPLES}"),
         *("--seconds-between-status-checks", "1", "--latency-wait", "10"),
     )
     logs = "\n".join(path.read_text() for path in project.path("queue").glob("*.log"))
@@ -60,9 +67,25 @@ def run_on_cluster(project: Project) -> str:
     return done.stdout
 
 
-@pytest.mark.skipif(
+needs_plugin = pytest.mark.skipif(
     importlib.util.find_spec(PLUGIN.replace("-", "_")) is None, reason=f"{PLUGIN} is not installed"
 )
+
+
+@needs_plugin
+def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) -> None:
+    study = ("factors", SAMPLES // 6, "")
+    local = lever(tmp_path / "local", study)
+    local.run_all()
+    cluster = with_queue(lever(tmp_path / "cluster", study))
+    said = run_on_cluster(cluster)
+    assert cluster.contents() == local.contents()
+    of_samples = re.findall(r"Submitted group job .*", said)
+    assert len(list(cluster.path("results/factors/jobs/responses").rglob("*.parquet"))) == 96
+    assert 2 <= len(of_samples) <= 4  # the samples of two specimens, figures and report
+
+
+@needs_plugin
 def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: Path) -> None:
     local, cluster = new_project(tmp_path / "local"), new_project(tmp_path / "cluster")
     local.run_all()
