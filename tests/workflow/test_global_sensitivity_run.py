@@ -16,6 +16,13 @@ from small_project import Project
 SHARES = {"load_point_x": 0.8, "load_point_y": 0.2, "bending": 0.0, "dummy": 0.0}
 
 
+def moment_nm(design: pd.DataFrame) -> "pd.Series[float]":
+    """Of the force about the joint, by sample."""
+    x = (POINT_MM[0] + design["load_point_x"]) / 1000.0
+    y = (POINT_MM[1] + design["load_point_y"]) / 1000.0
+    return x * FORCE_N[1] - y * FORCE_N[0]
+
+
 @pytest.fixture(scope="module")
 def computed(tmp_path_factory: pytest.TempPathFactory) -> Project:
     """Two studies alike but for how many samples a job computes."""
@@ -45,9 +52,7 @@ def test_motion_is_the_lever_s(computed: Project) -> None:
     )
     responses = table(computed, "single", "responses")
     responses = responses[responses["specimen"] == "a"].set_index("sample")
-    x = (POINT_MM[0] + design["load_point_x"]) / 1000.0
-    y = (POINT_MM[1] + design["load_point_y"]) / 1000.0
-    moment = x * FORCE_N[1] - y * FORCE_N[0]
+    moment = moment_nm(design)
     found = responses["load_extension_nm"].reindex(design.index)
     assert (found - moment).abs().max() < 2e-3 * moment.abs().max()
     motion = responses["predicted_extension_deg"].reindex(design.index)
@@ -99,9 +104,7 @@ def test_calibrated_stiffness_is_the_lever_s(tmp_path: Path) -> None:
     fitted = table(project, "fitted", "calibrated")
     assert (fitted["status"] == "converged").all()
     fitted = fitted[fitted["specimen"] == "a"].set_index("sample")
-    x = (POINT_MM[0] + design["load_point_x"]) / 1000.0
-    y = (POINT_MM[1] + design["load_point_y"]) / 1000.0
-    expected = (x * FORCE_N[1] - y * FORCE_N[0]) / np.deg2rad(MEASURED_DEG)
+    expected = moment_nm(design) / np.deg2rad(MEASURED_DEG)
     ratio = fitted["extension_nm_per_rad"].reindex(design.index) / expected
     assert ratio.between(0.99, 1.01).all()
     indices = table(project, "fitted", "indices")

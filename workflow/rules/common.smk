@@ -31,9 +31,8 @@ def results_of(kind):
 
 def selection():
     """Which studies are built; those of `all` are validated, all problems told at once."""
-    if (
-        not workflow.is_main_process
-    ):  # a job of a cluster: it was validated before it was submitted
+    # A job of a cluster was validated before it was submitted.
+    if not workflow.is_main_process:
         return studies.Selection.model_construct(studies=(), full=())
     problems = []
     try:
