@@ -9,13 +9,14 @@ from benchmarks.engine import Result, off, with_moments
 from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import MeasuredCase, Problem, fit, pool
-from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.layouts import files_of
 from spinepipe.model import LoadCase
-from spinepipe.statics import Chain, System, follow, free_parameters, moved
-from spinepipe.studies import CohortStiffness, check
+from spinepipe.statics import System, follow, free_parameters, moved
+from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.read import check
 from spinepipe.units import STIFFNESS_COLUMNS
+from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_calibration
 from tests.reference.peers.chain import Chain as PeerChain

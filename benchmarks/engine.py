@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.timing import cpu_seconds
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import Chain as PeerChain
@@ -61,19 +62,28 @@ def equilibria() -> Iterator[Result]:
     static = cpu_seconds(lambda: opensim_peer.equilibrium_of(built, start=start), 20)
     found = opensim_peer.equilibrium_of(built, start=start)
     yield Result(
-        "equilibrium T12-S1", ours.median, "OpenSim static root-find", static.median,
+        "equilibrium T12-S1",
+        ours.median,
+        "OpenSim static root-find",
+        static.median,
         _largest_difference(pose, found),
-    )  # fmt: skip
+    )
     settled = opensim_peer.settle(peer_chain, RUN_S)[-1]
     yield Result(
-        "equilibrium T12-S1", ours.median, "OpenSim CPodes, 1.5 s run", by_cpodes(peer_chain, 5),
+        "equilibrium T12-S1",
+        ours.median,
+        "OpenSim CPodes, 1.5 s run",
+        by_cpodes(peer_chain, 5),
         _largest_difference(pose, settled),
-    )  # fmt: skip
+    )
     yield Result(
-        "equilibrium T12-S1", ours.median, "OpenSim default integrator, 1.5 s run",
-        by_default_integrator(peer_chain), "",
+        "equilibrium T12-S1",
+        ours.median,
+        "OpenSim default integrator, 1.5 s run",
+        by_default_integrator(peer_chain),
+        "",
         f"extrapolated from {1000 * EXTRAPOLATED_FROM_S:.0f} ms",
-    )  # fmt: skip
+    )
 
 
 def by_cpodes(chain: PeerChain, repeats: int = 3) -> float:

@@ -6,7 +6,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.panels import log_ticks
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, blank
 
 Data = dict[str, Any]

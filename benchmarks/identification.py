@@ -15,16 +15,23 @@ import numpy as np
 
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import Problem, fit
-from spinepipe.calibrate.forward_cost import ForwardCost
-from spinepipe.calibrate.forward_runs import DEFAULT_STEP, MOST_EVALUATIONS, fit_by_cost
-from spinepipe.calibrate.gradients import exact_gradient, relative_error
+from spinepipe.calibrate.forward_runs import (
+    DEFAULT_STEP,
+    MOST_EVALUATIONS,
+    ForwardCost,
+    exact_gradient,
+    fit_by_cost,
+    relative_error,
+)
 from spinepipe.effects.contract import Array
-from spinepipe.jobs import bootstrap, build_models, sample_landmarks
 from spinepipe.jobs.inputs import sampled_poses, specimen_inputs, study_and_cohort
-from spinepipe.jobs.problem import calibration_problem
 from spinepipe.model import LoadStep, SpineModel
-from spinepipe.sensitivity.success import near_start
 from spinepipe.statics import Course, Program, System, settle
+from spinepipe.studies.joint_pose_sensitivity import bootstrap
+from spinepipe.studies.joint_pose_sensitivity import poses as build_models
+from spinepipe.studies.joint_pose_sensitivity import poses as sample_landmarks
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.success import near_start
 from tests.reference.bridge import system
 from tests.reference.peers import chain as chains
 from tests.reference.peers import opensim_peer
@@ -111,8 +118,8 @@ def problems(numbers: Sequence[int] = SAMPLED) -> Iterator[tuple[str, Problem]]:
     settings, cohort = study_and_cohort(ROOT, STUDY)
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
         landmarks, poses, model = (f"{folder}/{n}" for n in ("l.parquet", "p.parquet", "m.yaml"))
-        sample_landmarks.run(ROOT, STUDY, landmarks)
-        build_models.run(ROOT, STUDY, landmarks, poses, model)
+        sample_landmarks.sample(ROOT, STUDY, landmarks)
+        build_models.build(ROOT, STUDY, landmarks, poses, model)
         sampled = sampled_poses(poses)
     own = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).nominal
     yield "the cohort's own", calibration_problem(ROOT, settings, SPECIMEN, own)

@@ -7,8 +7,9 @@ import numpy as np
 
 from benchmarks.engine import by_cpodes, by_default_integrator, with_moments
 from benchmarks.timing import cpu_seconds
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
 from spinepipe.statics.many import Cases, Spines, solve_many
+from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import Chain as PeerChain

@@ -55,6 +55,9 @@ def per_row(job: str, call: str, rows: int) -> float:
 def _peak_mib(program: str) -> float:
     done = subprocess.run(
         [sys.executable, "-c", program + _PEAK],
-        cwd=ROOT, check=True, capture_output=True, text=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     return int(done.stdout.split()[-2]) / 1024  # VmHWM: 12345 kB

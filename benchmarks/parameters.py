@@ -9,8 +9,9 @@ from benchmarks.engine import Result, off, with_moments
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import Chain, FreeParameter, System, follow, moved
+from spinepipe.statics import FreeParameter, System, follow, moved
 from spinepipe.units import STIFFNESS_COLUMNS
+from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_calibration
 from tests.reference.peers.chain import Chain as PeerChain

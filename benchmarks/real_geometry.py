@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 
 from benchmarks.study import Run, copy_of_project, run_workflow
 from spinepipe.jobs.layouts import files_of
-from spinepipe.studies import RangeOfMotion, check
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.read import check
 
 STUDY = "real_geometry"
 COHORT_VARIABLE = "SPINEPIPE_REAL_COHORT"

@@ -9,13 +9,12 @@ from pyarrow import parquet
 
 from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
-from spinepipe.cohort.varied.vary import vary
-from spinepipe.jobs.global_sensitivity.batch import start_of_specimen
-from spinepipe.jobs.global_sensitivity.drawn import design_of
 from spinepipe.sensitivity.global_indices import values_of
 from spinepipe.statics.many import solve_many
-from spinepipe.studies import GlobalSensitivity, check
-from spinepipe.studies.drawn_from import spreads_of
+from spinepipe.studies.global_sensitivity.batch import design_of, start_of_specimen
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.vary import vary
+from spinepipe.studies.read import check
 
 STUDY = "bench_factors"
 JOINTS = {
@@ -55,11 +54,25 @@ class Size:
 
 
 SOBOL = (
-    Size("L1-L4, Sobol, 24 factors, N = 1024", "palanca_l1l4", "s01", "sobol", 1024, "null",
-         "60 s, 1.5 GB"),
-    Size("T12-S1, Sobol, 24 factors, N = 1024", "t12s1_phantom", "s01", "sobol", 1024, "null",
-         "120 s"),
-)  # fmt: skip
+    Size(
+        "L1-L4, Sobol, 24 factors, N = 1024",
+        "palanca_l1l4",
+        "s01",
+        "sobol",
+        1024,
+        "null",
+        "60 s, 1.5 GB",
+    ),
+    Size(
+        "T12-S1, Sobol, 24 factors, N = 1024",
+        "t12s1_phantom",
+        "s01",
+        "sobol",
+        1024,
+        "null",
+        "120 s",
+    ),
+)
 TARGETS = tuple(
     Size(f"{n:,} samples, a target each", "palanca_l1l4", "s01", "latin_hypercube", n, "1", goal)
     for n, goal in ((100, ""), (1000, ""), (5000, ""), (20_000, "240 s"))

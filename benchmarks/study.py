@@ -14,7 +14,8 @@ from pathlib import Path
 import psutil
 
 from spinepipe.jobs.layouts import files_of
-from spinepipe.studies import JointPoseSensitivity, check
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.read import check
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "l1l4_joint_pose"

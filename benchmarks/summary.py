@@ -10,8 +10,16 @@ from spinepipe.report.style import save, style
 
 Data = dict[str, Any]
 
-PARTS = ("foundation", "identification", "cohort", "whole_study", "discrepancy", "many_spines",
-         "memory", "sensitivity")  # fmt: skip
+PARTS = (
+    "foundation",
+    "identification",
+    "cohort",
+    "whole_study",
+    "discrepancy",
+    "many_spines",
+    "memory",
+    "sensitivity",
+)
 """Parts whose figures are gathered."""
 
 CORES = 2

@@ -1,8 +1,7 @@
 """Calibration: stiffness from measured motion, with its uncertainty and its honest status."""
 
 from spinepipe.calibrate.fit import Fit, Optimum, fit
-from spinepipe.calibrate.pooled import CohortSpread, Pooled, PooledSpecimen
-from spinepipe.calibrate.pooling import pool
+from spinepipe.calibrate.pooling import CohortSpread, Pooled, PooledSpecimen, pool
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty
 

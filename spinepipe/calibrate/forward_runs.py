@@ -7,19 +7,177 @@ fmincon's rule for steps: a share of the unknown, by default the root of the mac
 The barrier starts at its end: bounds are far from every start, and each further barrier would cost
 a search of its own. trust-constr also differentiates at points that it refuses, which fmincon does
 not: fmincon needs about half the runs.
+
+One forward run as users of multibody tools make it: a general-purpose implicit integrator.
+
+It stands beside `spinepipe.statics.settle`, whose end is a smoother function of the stiffness than
+that of any of these tools; that smoothness is what a fit by difference quotients lives on.
+
+The integrator is LSODA (scipy's; variable order, variable step, its own difference Jacobian): of
+what scipy has, its noise is nearest to that of OpenSim's CPodes, of the same family. Relative
+error of the cost's derivative (difference step 1.5e-8 of the stiffness, 12 stiffness sets, the
+L1-L4 segment, accuracy 1e-5), median and largest:
+
+    OpenSim 4.6 CPodes                  0.5     7
+    LSODA, difference Jacobian          0.06    0.3     <- here
+    scipy's BDF, difference Jacobian    2e-4    2e-3
+    LSODA, exact Jacobian               7e-6    1e-2
+    scipy's BDF, exact Jacobian         8e-8    2e-7
+    `settle`                            6e-8    3e-7
+
+At a step of 1e-3 all have 1.7e-3, the curvature of the cost. So the noise is that of iterating
+with a rough Jacobian, and what follows from it is understated here. OpenSim's default integrator,
+explicit Runge-Kutta-Merson, has 1e-3 (one stiffness set), at 29 s per run. scipy's VODE, nearest
+kin of CPodes, transposes the Jacobian in release 1.17 (scipy issue 24933) and cannot be used.
+
+The cost of a calibration problem by forward runs: all that a published optimiser was given.
+
+Derivative of a problem's cost at its start: exact, and by careful differences to check it.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.differentiate import jacobian
+from scipy.integrate import ode
+from scipy.linalg.lapack import dpotrf, dpotrs
 from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
-from spinepipe.calibrate.forward_cost import LOST, ForwardCost, OutOfRuns
-from spinepipe.calibrate.problem import Problem
+from spinepipe.calibrate.problem import Evaluator, Problem
 from spinepipe.effects.contract import Array
-from spinepipe.statics import Status
+from spinepipe.model import LoadStep, RefusedModel
+from spinepipe.statics import Course, Loading, System, moved, no_settling
+from spinepipe.statics.holding import NO_STATES
+from spinepipe.statics.motion import ChainMotion
+from spinepipe.status import Status
+
+ABSOLUTE_SHARE = 0.1
+"""Absolute tolerance (m, rad, m/s, rad/s) per relative one: that of Simbody's CPodes integrator."""
+
+MOST_STEPS = 5000
+"""A run to rest takes some 200; one that needs so many is lost."""
+
+
+def forward_run(
+    system: System, loading: Loading, duration_s: float, accuracy: float
+) -> Array | None:
+    """(n,) pose after a time under constant load, from rest in the neutral pose; None if lost.
+
+    The caller sees to it that the chain has inertia and no path effects.
+    """
+    motion = _Motion(system, loading)
+    integrator = ode(motion.rate).set_integrator(
+        "lsoda",
+        rtol=accuracy,
+        atol=ABSOLUTE_SHARE * accuracy,
+        nsteps=MOST_STEPS,
+        with_jacobian=True,  # its own, by differences: no user of these tools has an exact one
+    )
+    integrator.set_initial_value(np.zeros(2 * system.chain.n), 0.0)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # why a run is lost: the caller learns that it is
+        end: Array = integrator.integrate(duration_s)
+    pose = end[: system.chain.n]
+    return pose if integrator.successful() and np.isfinite(pose).all() else None
+
+
+class _Motion:
+    """The damped equations of motion under a constant load, as a first-order system."""
+
+    def __init__(self, system: System, loading: Loading) -> None:
+        self.system, self.loading = system, loading
+        self.damping = system.model.damping.ravel()
+        self.gravity = loading.share * system.model.gravity
+        self._pose, self._held, self._lower = b"", np.empty(0), np.empty(0)
+
+    def rate(self, _time: float, state: Array) -> Array:
+        """(2n,) rate of change of pose and rate."""
+        q, rate = state[: self.system.chain.n], state[self.system.chain.n :]
+        self._place(q)
+        inertia_and_weight = self.system.chain.bias(q, rate, self.gravity)
+        force = -self._held - inertia_and_weight - self.damping * rate
+        acceleration, _ = dpotrs(self._lower, force, lower=True)
+        return np.concatenate([rate, acceleration])
+
+    def _place(self, q: Array) -> None:
+        """What depends on the pose alone; asked for again when only rates have been varied."""
+        if q.tobytes() == self._pose:
+            return
+        chain = self.system.chain
+        motion = ChainMotion(chain, q)
+        self._held = self.system.weightless_residual(motion, self.loading, NO_STATES)
+        self._lower, _ = dpotrf(chain.mass_matrix(q), lower=True)
+        self._pose = q.tobytes()
+
+
+LOST = 1e6
+"""Cost (mm2, deg2) of a point whose run is lost: any optimiser turns back there."""
+
+
+class OutOfRuns(Exception):
+    """The optimiser has had all the runs it may have."""
+
+
+class ForwardCost(Evaluator):
+    """The cost of a problem by forward runs; each point is run once."""
+
+    def __init__(self, problem: Problem, duration_s: float, accuracy: float, most: int) -> None:
+        """Load the chain; ``most`` points may be run.
+
+        Raises
+        ------
+        RefusedModel
+            When nothing that was measured has a weight, or the model cannot move in time.
+        """
+        super().__init__(replace(problem, course=None))
+        self.duration_s, self.accuracy, self.most = duration_s, accuracy, most
+        self.costs: dict[bytes, float] = {}
+        refusal = no_settling(self._systems[0])
+        if refusal:
+            raise RefusedModel(refusal)
+
+    def cost(self, x: Array) -> float:
+        """Sum of weight times squared error (mm2, deg2) with the unknowns at x (m,).
+
+        Raises
+        ------
+        OutOfRuns
+            For a new point when as many as allowed have been run.
+        """
+        point = x.tobytes()
+        if point not in self.costs:
+            if len(self.costs) >= self.most:
+                raise OutOfRuns
+            self.costs[point] = self._run(x)
+        return self.costs[point]
+
+    def end(self, system: System, step: LoadStep) -> Array | None:
+        """(n,) pose at the end of the run under a load step; None when the run is lost."""
+        loading = system.slots.loading(step.wrenches)
+        return forward_run(system, loading, self.duration_s, self.accuracy)
+
+    def _run(self, x: Array) -> float:
+        model = moved(self.problem.model, self.problem.free, x)
+        known: dict[tuple[object, ...], Array | None] = {}  # cycles repeat their loads
+        total = 0.0
+        for number, system in enumerate(self._systems):
+            there = system.with_model(model)
+            ends = []
+            for step in there.case.steps:
+                loading = there.slots.loading(step.wrenches)
+                key = (there.case.test, there.slots, loading.key)
+                if key not in known:
+                    known[key] = self.end(there, step)
+                ends.append(known[key])
+            poses = [end for end in ends if end is not None]
+            if len(poses) < len(ends):
+                return LOST
+            residual = self._residual(number, there, np.stack(poses))
+            total += float(residual @ residual)
+        return min(total, LOST)
+
 
 DEFAULT_STEP = float(np.sqrt(np.finfo(float).eps))
 """Difference step of an optimiser that is told none, relative to the unknown."""
@@ -174,3 +332,44 @@ class _Search:
         x, problem = self.x(self.last), self.runs.problem
         inside = np.all(x > problem.lower + NEAR_BOUND) and np.all(x < problem.upper - NEAR_BOUND)
         return True, Status.CONVERGED if inside else Status.CONVERGED_AT_BOUND, message
+
+
+FIRST_STEP = 0.05
+"""Of a logarithm: far enough from a pose that snaps, and halved until the error is rounding."""
+
+
+def exact_gradient(problem: Problem, course: Course | None = None) -> Array | None:
+    """(m,) derivative of the cost by the unknowns at the start; None where nothing stands there.
+
+    With a course, that of runs which end after it.
+    """
+    start = np.zeros(len(problem.free))
+    found = Evaluator(replace(problem, course=course)).at(start)
+    if found.residual is None or found.jacobian is None:
+        return None
+    return 2.0 * found.residual @ found.jacobian
+
+
+def differenced_gradient(problem: Problem) -> Array | None:
+    """The same at rest by central differences of high order, with steps that adapt (scipy's)."""
+    evaluator = Evaluator(replace(problem, course=None))
+    found = jacobian(
+        lambda points: np.apply_along_axis(lambda x: _cost(evaluator, x), 0, points),
+        np.zeros(len(problem.free)),
+        initial_step=FIRST_STEP,
+    )
+    gradient: Array = found.df
+    return gradient if np.isfinite(gradient).all() else None
+
+
+def relative_error(gradient: Array | None, exact: Array | None) -> float | None:
+    """Size of a gradient's error relative to the exact one's size; None without both."""
+    if gradient is None or exact is None:
+        return None
+    size = float(np.linalg.norm(exact))
+    return float(np.linalg.norm(gradient - exact)) / size if size > 0.0 else None
+
+
+def _cost(evaluator: Evaluator, x: Array) -> float:
+    residual = evaluator.at(np.ascontiguousarray(x)).residual
+    return np.nan if residual is None else float(residual @ residual)

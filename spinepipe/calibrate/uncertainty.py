@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.problem import Evaluation, Problem
-from spinepipe.calibrate.zeroing import shared_sums
+from spinepipe.calibrate.problem import Evaluation, Problem, shared_sums
 from spinepipe.effects.contract import Array
 from spinepipe.units import BORDER_PER_SI
 

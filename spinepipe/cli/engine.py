@@ -5,7 +5,8 @@ import numpy as np
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 
 MOMENT_NM = 7.5
 STIFFNESS = np.array([1e5, 1e6, 1e5, 50.0, 60.0, 70.0])

@@ -12,8 +12,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.inputs import bushing_model, sampled_poses, start_stiffness
 from spinepipe.problems import InputError, Problem
-from spinepipe.statics.status import Status
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 

@@ -7,7 +7,7 @@ from spinepipe import cohort as cohorts
 from spinepipe import studies
 from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.study import COHORTS
 
 STUDIES = Path("config") / "studies"

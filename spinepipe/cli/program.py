@@ -25,9 +25,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="spinepipe",
         description="Spine models calibrated on measured motion.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="commands:\n" + "\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
+        epilog="commands:\n"
+        + "\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
         + "\n\n`spinepipe COMMAND --help` says more.",
-    )  # fmt: skip
+    )
     _add_root(parser, Path.cwd())
     parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="see below")
     parser.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)

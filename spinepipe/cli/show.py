@@ -5,9 +5,8 @@ from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
 from spinepipe.problems import InputError, Problem
-from spinepipe.report.specimen import draw_specimen
+from spinepipe.report.specimen import draw_specimen, view_of
 from spinepipe.report.specimen_text import describe
-from spinepipe.report.specimen_view import view_of
 from spinepipe.report.style import save, style
 
 PICTURES = (".png", ".svg", ".pdf")

@@ -1,15 +1,109 @@
-"""Are the loads unambiguous, and do they act on something that can move?"""
+"""Are the loads unambiguous, and do they act on something that can move?
 
+Is the cohort's name its folder's, and are the vertebrae a chain?
+
+Does each row of a table speak of something no other row speaks of?
+
+Was every measured motion caused by a load that is given?
+
+Do the tables speak of specimens, vertebrae and joints that exist?
+
+Do the steps of every test count 0, 1, 2 without a gap?
+"""
+
+import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isnan
 
-from spinepipe.cohort.applied_loads import AppliedLoad
-from spinepipe.cohort.draft import Draft
-from spinepipe.problems import Problem
+from spinepipe.cohort.cohort import joint_names
+from spinepipe.cohort.columns import TABLES
+from spinepipe.cohort.draft import AppliedLoad, Draft
+from spinepipe.cohort.text import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
 
-__all__ = ["check_loads"]
+MOST_JOINTS = 20
+"""The physics engine is wrong without notice above 120 coordinates, six to a joint."""
+
+REGIONS = "SLTC"
+"""Sacral, lumbar, thoracic, cervical: caudal to cranial."""
+
+
+def check_header(document: Document, folder: str) -> Iterator[Problem]:
+    """Problems of ``cohort.yaml`` which its schema cannot see."""
+    name = document.data.get("cohort")
+    if isinstance(name, str) and name != folder:
+        place = (document.file, document.line_of("cohort"), "cohort")
+        remedy = "rename the folder or change the key"
+        yield Problem(*place, f"'{name}'", f"the folder's name, '{folder}'", remedy)
+    vertebrae = document.data.get("vertebrae")
+    if isinstance(vertebrae, list):
+        names = [name for name in vertebrae if isinstance(name, str)]
+        yield from _chain_problems(document, names, len(vertebrae))
+
+
+def usable_vertebrae(document: Document) -> tuple[str, ...]:
+    """The vertebrae when they are a sound chain; none otherwise, so that one fault stays one."""
+    names = document.data.get("vertebrae")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return ()
+    return () if any(_chain_problems(document, names, len(names))) else tuple(names)
+
+
+def _chain_problems(document: Document, names: list[str], count: int) -> Iterator[Problem]:
+    place = (document.file, document.line_of("vertebrae"), "vertebrae")
+    if count < 2:
+        found = f"{count} vertebra{'' if count == 1 else 'e'}"
+        yield Problem(*place, found, "at least 2", "list every vertebra, caudal to cranial")
+    if count - 1 > MOST_JOINTS:
+        allowed = f"at most {MOST_JOINTS}"
+        yield Problem(*place, f"{count - 1} joints", allowed, "leave vertebrae out at an end")
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            yield Problem(*place, f"'{name}' twice", "each vertebra once", "delete one")
+    for lower, upper in pairwise(names):
+        low, high = _height(lower), _height(upper)
+        if low is not None and high is not None and low > high:
+            found = f"'{lower}' before '{upper}'"
+            yield Problem(*place, found, "caudal to cranial, as in [L4, L3]", "turn the list round")
+
+
+def _height(name: str) -> tuple[int, int] | None:
+    """Sort key of an anatomical name, growing cranially; None for other names."""
+    match = re.fullmatch(r"([SLTC])(\d+)", name)
+    return (REGIONS.index(match[1]), -int(match[2])) if match else None
+
+
+def check_keys(draft: Draft) -> Iterator[Problem]:
+    """Repeated keys in every table but ``loads.csv``, whose wildcards ask for more care."""
+    for stem, form in TABLES.items():
+        if stem != "loads":
+            yield from _repeated_keys(draft, stem, form.keys)
+
+
+def _repeated_keys(draft: Draft, stem: str, keys: tuple[str, ...]) -> Iterator[Problem]:
+    seen: dict[tuple[object, ...], int] = {}
+    for line, cells in draft.rows(stem, *keys):
+        cells = tuple(map(_numbered, keys, cells))
+        if any(isinstance(cell, float) and isnan(cell) for cell in cells):
+            continue  # a bad or empty cell, reported there
+        first = seen.setdefault(cells, line)
+        if first != line:
+            found = "again " + ", ".join(_shown(cell) for cell in cells)
+            allowed = f"one row per {' x '.join(keys)}"
+            remedy = f"delete one (the other is line {first})"
+            yield Problem(draft.file(stem), line, None, found, allowed, remedy)
+
+
+def _numbered(key: str, cell: object) -> object:
+    """The cell, an empty cycle as the first."""
+    return 1.0 if key == "cycle" and isinstance(cell, float) and isnan(cell) else cell
+
+
+def _shown(cell: object) -> str:
+    return f"{cell:g}" if isinstance(cell, float) else str(cell)
+
 
 POINT = ("px_mm", "py_mm", "pz_mm")
 FORCE = ("fx_n", "fy_n", "fz_n")
@@ -17,14 +111,14 @@ FORCE = ("fx_n", "fy_n", "fz_n")
 
 def check_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     """Problems of ``loads.csv`` beyond its cells and names."""
-    yield from _repeated(draft, applied)
+    yield from _repeated_loads(draft, applied)
     yield from _on_the_fixed_vertebra(draft)
     yield from _partial_points(draft)
     yield from _without_a_point(draft, applied)
     yield from _times(draft)
 
 
-def _repeated(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def _repeated_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     seen: dict[tuple[object, ...], int] = {}
     reported = set()
     for load in applied:
@@ -103,3 +197,128 @@ def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Itera
             yield Problem(file, line, "time_s", found, "one time per step", "correct the time")
         if step < later_step and later <= time:
             yield Problem(file, line, "time_s", found, "times that increase", "correct the time")
+
+
+def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+    """Motion without loads; said once per test, cycle or step of a specimen."""
+    if "motion" in draft.absent or not ("loads" in draft.tables or "loads" in draft.absent):
+        return
+    file = draft.file("motion")
+    if "loads" in draft.absent:
+        remedy = "add loads.csv, or take motion.csv out"
+        yield Problem(file, None, None, "motion without loads", "motion with loads.csv", remedy)
+        return
+    known = _prefixes(applied)
+    tests = sorted({load.test for load in applied})
+    reported = set()
+    rows = draft.rows("motion", "specimen", "test", "cycle", "step")
+    specimens = set(draft.specimens)  # rows of an unknown one are reported as such
+    for line, (specimen, test, cycle, step) in rows:
+        if specimen not in specimens or not isinstance(test, str) or isnan(step):
+            continue
+        key = (specimen, test, 1 if isnan(cycle) else int(cycle), int(step))
+        missing = next((key[:n] for n in (2, 3, 4) if key[:n] not in known), None)
+        unclear = (*key[:3], None) in known  # a bad step cell may be the one looked for
+        if missing is not None and missing not in reported and not unclear:
+            reported.add(missing)
+            yield _problem(file, line, missing, tests)
+
+
+def _prefixes(applied: list[AppliedLoad]) -> set[tuple[object, ...]]:
+    """(specimen, test), with cycle, and with cycle and step, of every load."""
+    known: set[tuple[object, ...]] = set()
+    for load in applied:
+        key = (load.specimen, load.test, load.cycle, load.step)
+        known |= {key[:2], key[:3], key}
+    return known
+
+
+def _problem(file: str, line: int, key: tuple[object, ...], tests: list[str]) -> Problem:
+    column = ("test", "cycle", "step")[len(key) - 2]
+    found = f"{column} '{key[-1]}' of specimen '{key[0]}', which has no load"
+    allowed = "a specimen, test, cycle and step of loads.csv"
+    remedy = "add the load or delete the motion"
+    if column == "test" and key[1] not in tests:
+        remedy = did_you_mean(str(key[1]), tests, remedy)
+    return Problem(file, line, column, found, allowed, remedy)
+
+
+SPECIMEN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+"""Specimens become folder names of results."""
+
+
+def check_names(draft: Draft) -> Iterator[Problem]:
+    """Unknown names in every table, and specimen names no folder can have."""
+    for line, (name,) in draft.rows("specimens", "specimen"):
+        if isinstance(name, str) and not SPECIMEN_NAME.fullmatch(name):
+            allowed = "letters, digits, _ . - and a letter or digit first"
+            place = (draft.file("specimens"), line, "specimen")
+            yield Problem(*place, f"'{name}'", allowed, "rename the specimen in every file")
+    known = {
+        "specimen": draft.specimens,
+        "vertebra": draft.vertebrae,
+        "joint": draft.joint_names,
+    }
+    for stem, form in TABLES.items():
+        for column, names in known.items():
+            if names and column in form.names and stem != "specimens":
+                wildcard = ("*",) if (stem, column) == ("loads", "specimen") else ()
+                yield from _unknown(draft, stem, column, (*names, *wildcard))
+
+
+def _unknown(draft: Draft, stem: str, column: str, names: tuple[str, ...]) -> Iterator[Problem]:
+    allowed = set(names)
+    for line, (name,) in draft.rows(stem, column):
+        if isinstance(name, str) and name not in allowed:
+            place = (draft.file(stem), line, column)
+            remedy = _remedy(draft, column, name, names)
+            yield Problem(*place, f"unknown {column} '{name}'", one_of(names), remedy)
+
+
+def _remedy(draft: Draft, column: str, name: str, names: tuple[str, ...]) -> str:
+    source = "specimens.csv" if column == "specimen" else "vertebrae in cohort.yaml"
+    otherwise = f"correct the name or add it to {source}"
+    if column == "joint" and name in joint_names(draft.vertebrae[::-1]):
+        swapped = names[::-1][joint_names(draft.vertebrae[::-1]).index(name)]
+        return f"a joint is named upper vertebra first: '{swapped}'"
+    return did_you_mean(name, names, otherwise)
+
+
+def check_steps(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+    """Gaps in ``loads.csv`` and, joint by joint, in ``motion.csv``."""
+    loads = (((a.specimen, a.test, a.cycle), a.step, a.line) for a in applied)
+    remedy = "add the row, with zeros where nothing acts"
+    yield from _gaps(draft.file("loads"), loads, remedy)
+    columns = ("specimen", "test", "cycle", "joint", "step")
+    motion = (
+        (
+            (specimen, test, 1 if isnan(cycle) else cycle, joint),
+            None if isnan(step) else int(step),
+            line,
+        )
+        for line, (specimen, test, cycle, joint, step) in draft.rows("motion", *columns)
+        if all(isinstance(name, str) for name in (specimen, test, joint))
+    )
+    remedy = "add the row, with empty cells where nothing was measured"
+    yield from _gaps(draft.file("motion"), motion, remedy)
+
+
+def _gaps(
+    file: str, rows: Iterable[tuple[tuple[object, ...], int | None, int]], remedy: str
+) -> Iterator[Problem]:
+    series: dict[tuple[object, ...], list[tuple[int, int]]] = defaultdict(list)
+    unclear = set()  # a bad cell hides one step, and is reported there
+    for key, step, line in rows:
+        if step is None:
+            unclear.add(key)
+        else:
+            series[key].append((step, line))
+    for key, steps in series.items():
+        before = -1
+        for step, line in sorted(steps):
+            if step > before + 1 and key not in unclear:
+                last = f"after step {before}" if before >= 0 else "first"
+                found = f"step {step} {last} in test '{key[1]}'"
+                allowed = "steps 0, 1, 2, … without a gap"
+                yield Problem(file, line, "step", found, allowed, remedy)
+            before = step

@@ -1,15 +1,18 @@
-"""A cohort while it is being checked: whatever could be read of it."""
+"""A cohort while it is being checked: whatever could be read of it.
 
+Loads row by row for one specimen and one cycle each, wildcards written out.
+"""
+
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isnan
 from typing import Any
 
 import pandas as pd
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import TABLES
-
-__all__ = ["Draft"]
 
 
 @dataclass(frozen=True)
@@ -53,3 +56,44 @@ class Draft:
         if table is not None:
             cells = (table[column].tolist() for column in columns)
             yield from zip(table.index.tolist(), zip(*cells, strict=True), strict=True)
+
+
+@dataclass(frozen=True)
+class AppliedLoad:
+    """One row of ``loads.csv`` as it acts on one specimen in one cycle.
+
+    Attributes
+    ----------
+    line : its line in ``loads.csv``.
+    step : None when the cell is bad.
+    """
+
+    line: int
+    specimen: str
+    test: str
+    cycle: int
+    step: int | None
+    vertebra: str
+
+
+def applied_loads(draft: Draft) -> Iterator[AppliedLoad]:
+    """Every load on every specimen in every cycle; rows without a name are left out."""
+    cycles = _known_cycles(draft)
+    everyone = draft.specimens or ("*",)
+    keys = ("specimen", "test", "cycle", "step", "vertebra")
+    for line, (specimen, test, cycle, step, vertebra) in draft.rows("loads", *keys):
+        if not all(isinstance(name, str) for name in (specimen, test, vertebra)):
+            continue
+        known_step = None if isnan(step) else int(step)
+        for name in everyone if specimen == "*" else (specimen,):
+            for number in cycles[test] if isnan(cycle) else (int(cycle),):
+                yield AppliedLoad(line, name, test, number, known_step, vertebra)
+
+
+def _known_cycles(draft: Draft) -> dict[str, tuple[int, ...]]:
+    """Cycles of each test that either file numbers; 1 when none does."""
+    cycles: dict[str, set[int]] = defaultdict(set)
+    for stem in ("loads", "motion"):
+        for _, (test, cycle) in draft.rows(stem, "test", "cycle"):
+            cycles[test] |= set() if isnan(cycle) else {int(cycle)}
+    return {test: tuple(sorted(numbers)) or (1,) for test, numbers in cycles.items()}

@@ -6,22 +6,20 @@ from pathlib import Path
 
 import pandas as pd
 
-from spinepipe.cohort.applied_loads import applied_loads
-from spinepipe.cohort.check_bodies import check_bodies
-from spinepipe.cohort.check_geometry import check_geometry
-from spinepipe.cohort.check_header import check_header, usable_vertebrae
-from spinepipe.cohort.check_keys import check_keys
-from spinepipe.cohort.check_loads import check_loads
-from spinepipe.cohort.check_motion import check_motion
-from spinepipe.cohort.check_names import check_names
-from spinepipe.cohort.check_steps import check_steps
-from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.check_geometry import check_bodies, check_geometry
+from spinepipe.cohort.checks import (
+    check_header,
+    check_keys,
+    check_loads,
+    check_motion,
+    check_names,
+    check_steps,
+    usable_vertebrae,
+)
+from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
-from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.header import CohortHeader
-from spinepipe.cohort.read_table import read_table
-from spinepipe.cohort.read_yaml import Document, read_yaml
-from spinepipe.cohort.validate import validate
+from spinepipe.cohort.draft import Draft, applied_loads
+from spinepipe.cohort.text import Document, read_table, read_yaml, validate
 from spinepipe.problems import InputError, Problem
 
 __all__ = ["read"]

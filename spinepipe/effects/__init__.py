@@ -21,8 +21,7 @@ from spinepipe.effects.contract import (
     PlacementByParameter,
     Wrench,
 )
-from spinepipe.effects.registry import create, register, registered
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, create, register, registered
 
 __all__ = [
     "Advance",

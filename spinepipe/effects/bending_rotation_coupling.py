@@ -8,8 +8,7 @@ import numpy as np
 
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import PER_JOINT, Trial
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 # Typical size and bound by the number of translations in the pair. Rotations: a fifth of the
@@ -35,7 +34,7 @@ class BendingRotationCoupling:
         variants=tuple({"pair": pair} for pair in combinations(ROTATIONS, 2)),
         spreads=PER_JOINT,
         told_by="motion measured in both coordinates while one of them is loaded",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pair", tuple(self.pair))  # a model file holds a list

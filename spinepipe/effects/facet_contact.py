@@ -7,9 +7,8 @@ import numpy as np
 
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import register
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import ramp
-from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 SIDES = ("positive", "negative")
@@ -40,7 +39,7 @@ class FacetContact:
         variants=tuple({"coordinate": c, "side": s} for c in ROTATIONS for s in SIDES),
         spreads=PER_JOINT,
         told_by="several load steps beyond the gap and within it, in both directions",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, COORDINATES)

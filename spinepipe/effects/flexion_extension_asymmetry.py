@@ -5,9 +5,8 @@ from typing import ClassVar
 
 from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
 from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import register
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import sign
-from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 ROUNDED_RAD, ROUNDED_M = 1.7e-3, 1e-5
@@ -33,7 +32,7 @@ class FlexionExtensionAsymmetry(CarriedShare):
         variants=tuple({"coordinate": c} for c in ROTATIONS),
         spreads=PER_JOINT,
         told_by="the same load in both directions",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, COORDINATES)

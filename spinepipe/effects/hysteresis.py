@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.contract import Advance, Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import PER_JOINT, Trial
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.units import COORDINATES, ROTATIONS
 
 ROUNDING = 1e-4

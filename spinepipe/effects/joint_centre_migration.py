@@ -12,8 +12,7 @@ from spinepipe.effects.contract import (
     Placement,
     PlacementByParameter,
 )
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.effects.turning import turning
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M
 

@@ -15,8 +15,7 @@ from spinepipe.effects.contract import (
     Parameter,
     Wrench,
 )
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.effects.vertebra_points import nothing_applied
 
 TYPICAL_RAD = float(np.deg2rad(3.0))

@@ -14,8 +14,7 @@ from spinepipe.effects.contract import (
     Parameter,
     Wrench,
 )
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, register
 
 TYPICAL_NM = 0.3
 

@@ -13,8 +13,7 @@ from spinepipe.effects.carried_share import (
     require,
 )
 from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.units import COORDINATES, ROTATIONS
 
 

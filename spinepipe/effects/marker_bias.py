@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.contract import Array, Kind, Observation, Parameter
-from spinepipe.effects.registry import register
+from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.effects.tilting import tilt_parameters, tilted, tilted_by_tilt
-from spinepipe.effects.trial import Spread, Trial
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 FORMS = ("offset", "tilt")

@@ -7,9 +7,8 @@ import numpy as np
 
 from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
 from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import register
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import ramp
-from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 ROUNDED = 0.1
@@ -41,7 +40,7 @@ class NeutralZone(CarriedShare):
         variants=tuple({"coordinate": c} for c in ROTATIONS),
         spreads=PER_JOINT,
         told_by="load steps small enough to stay near the neutral pose, and large ones",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, COORDINATES)
@@ -50,9 +49,16 @@ class NeutralZone(CarriedShare):
     def parameters(self) -> tuple[Parameter, ...]:
         """The stiffness ratio inside the zone, and the zone's half width."""
         ratio = Parameter(
-            "stiffness_ratio", "1", 0.0, 1.0, 0.3, 0.5, False,
-            f"stiffness in {self.coordinate} inside the zone over that outside", off=1.0,
-        )  # fmt: skip
+            "stiffness_ratio",
+            "1",
+            0.0,
+            1.0,
+            0.3,
+            0.5,
+            False,
+            f"stiffness in {self.coordinate} inside the zone over that outside",
+            off=1.0,
+        )
         meaning = f"half width of the neutral zone in {self.coordinate}"
         if self.coordinate in TRANSLATIONS:
             return ratio, Parameter("width", "m", 1e-6, 0.02, 1e-4, 1.0, True, meaning)

@@ -9,9 +9,8 @@ from numpy.polynomial.polynomial import polyval
 
 from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
 from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import register
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import magnitude
-from spinepipe.effects.trial import PER_JOINT, Trial
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 SHAPES = ("exponential", "tangent", "cubic")
@@ -72,7 +71,7 @@ class NonlinearStiffening(CarriedShare):
         variants=tuple({"coordinate": c, "shape": s} for c in ROTATIONS for s in SHAPES),
         spreads=PER_JOINT,
         told_by="several load steps up to a large motion, in both directions",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, COORDINATES)

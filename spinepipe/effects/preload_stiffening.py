@@ -7,8 +7,7 @@ import numpy as np
 
 from spinepipe.effects.carried_share import ALL_ROTATIONS, columns_of, require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import PER_JOINT, Trial
+from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.units import COORDINATES, ROTATIONS
 
 _SUPERIOR = COORDINATES.index("superior")
@@ -33,7 +32,7 @@ class PreloadStiffening:
         variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
         spreads=PER_JOINT,
         told_by="the same moments under two different compressive preloads",
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, (*ROTATIONS, ALL_ROTATIONS))

@@ -14,8 +14,7 @@ from spinepipe.effects.contract import (
     Parameter,
     Wrench,
 )
-from spinepipe.effects.registry import register
-from spinepipe.effects.trial import Spread, Trial
+from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.effects.vertebra_points import centres, nothing_applied
 
 WHERE = ("each", "top")

@@ -2,14 +2,22 @@
 
 Snakemake sees neither imported modules nor parts of a configuration, so the rules carry these
 digests in their `params`.
+
+Where a result file comes from: digests, seed and versions, for its Parquet metadata.
 """
 
 import ast
 import hashlib
 import json
+import platform
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.settings import relevant_settings
+from spinepipe.studies.study import Study
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = "spinepipe"
@@ -150,3 +158,32 @@ def _data_files(modules: set[str]) -> list[Path]:
 def _bytes_digest(path: Path) -> str:
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     return f"{path.relative_to(_ROOT).as_posix()} {digest}"
+
+
+_LIBRARIES = (
+    *("numpy", "scipy", "pandas", "pyarrow", "pybullet", "SALib", "scikit-learn", "statsmodels"),
+    *("matplotlib", "plotly", "Jinja2", "spinepipe"),
+)
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Version of Python and of each library that results depend on."""
+    found = {f"version_{name.lower()}": version(name) for name in _LIBRARIES}
+    return {"version_python": platform.python_version(), **found}
+
+
+def provenance(job: str, study: Study, cohort: Cohort) -> dict[str, str]:
+    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study.
+
+    ``config_digest`` covers the settings that the job depends on, no others.
+    """
+    return {
+        "study": study.study,
+        "kind": study.kind,
+        "seed": str(getattr(study, "seed", "")),
+        "cohort_digest": cohort.digest,
+        "config_digest": value_digest(relevant_settings(job, study)),
+        "code_digest": code_digest(f"spinepipe.jobs.{job}"),
+        **versions(),
+    }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from spinepipe.report.page import Results
+from spinepipe.report.page.document import Results
 from spinepipe.tables import read_frames
 
 

@@ -21,9 +21,11 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
-from spinepipe.statics import Status
-from spinepipe.studies import JointPoseSensitivity, LevelStiffness, Study, check, read
-from spinepipe.studies.coordinates import Stiffness
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.parts import LevelStiffness, Stiffness
+from spinepipe.studies.read import check, read
+from spinepipe.studies.study import Study
 from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
@@ -87,9 +89,14 @@ def _poses(where: Stamp) -> Poses:
     frames: dict[tuple[str, int], tuple[Pose, ...]] = {}
     refused: dict[tuple[str, int], str] = {}
     rows = zip(
-        frame["specimen"], frame["pose"], frame["status"], frame["message"], origins, angles,
+        frame["specimen"],
+        frame["pose"],
+        frame["status"],
+        frame["message"],
+        origins,
+        angles,
         strict=True,
-    )  # fmt: skip
+    )
     for specimen, pose, status, message, origin, angle in rows:
         key = (specimen, int(pose))
         if status == Status.REFUSED:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from spinepipe.studies import Study
+from spinepipe.studies.study import Study
 
 _SOLVING = {"loading", "settle_time_s"}
 _GROUPING = {"best_models", "block"}

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from spinepipe.studies import Study
+from spinepipe.studies.study import Study
 
 
 @dataclass(frozen=True)

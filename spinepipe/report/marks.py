@@ -1,4 +1,11 @@
-"""How a sample is drawn in a row: its density, the middle half, the median, the middle 90 %."""
+"""How a sample is drawn in a row: its density, the middle half, the median, the middle 90 %.
+
+How an estimate with its interval is drawn.
+
+Numbers that are zero but for rounding: an exact fit leaves errors of 1e-16.
+
+How single results are drawn in a row: every one as a dot, their range and their median.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +14,30 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde
 
-from spinepipe.report.style import BLACK
+from spinepipe.report.style import BLACK, WHITE
+
+CROWDED_ALPHA = 0.5
+
+
+def draw_interval(
+    panel: Axes, x: float, ends: tuple[float, float], y: float, color: str, crowded: bool = False
+) -> None:
+    """A dot with a line from end to end; fainter where many share a row."""
+    alpha = CROWDED_ALPHA if crowded else 1.0
+    panel.plot(ends, [y, y], color=color, lw=1.2, alpha=alpha, solid_capstyle="butt", zorder=3)
+    panel.plot(
+        [x],
+        [y],
+        "o",
+        color=color,
+        ms=3.0 if crowded else 4.0,
+        mec=WHITE,
+        mew=0.4,
+        alpha=alpha,
+        zorder=4,
+        clip_on=False,
+    )
+
 
 Array = NDArray[np.float64]
 
@@ -67,8 +97,9 @@ def draw_upright(panel: Axes, values: Array, x: float, color: str, width: float)
     shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * width
     panel.plot(x + shift, values, "o", color=color, ms=1.8, mew=0.0, alpha=0.5, zorder=3)
     found = quartiles(values)
-    panel.plot([x, x], [found.low, found.high], color=color, lw=BAR_PT, solid_capstyle="butt",
-               zorder=4)  # fmt: skip
+    panel.plot(
+        [x, x], [found.low, found.high], color=color, lw=BAR_PT, solid_capstyle="butt", zorder=4
+    )
     panel.plot([x], [found.median], "_", color=BLACK, ms=1.6 * BAR_PT + 0.6, mew=1.0, zorder=5)
 
 
@@ -93,3 +124,47 @@ def draw_density(
     top = base + height * density / density.max()
     panel.fill_between(x, base, top, color=color, alpha=0.3, lw=0, zorder=2)
     panel.plot(x, top, color=color, lw=0.6, zorder=2)
+
+
+EXACT_BELOW = 1e-9
+"""Errors below this, mm or degrees, are rounding: no instrument and no fit resolves them."""
+
+EXACT = "exact to rounding"
+
+
+def rounded(values: object) -> Array:
+    """The values as an array, those that are only rounding as zero."""
+    array = np.asarray(values, dtype=float)
+    return np.where(np.abs(array) < EXACT_BELOW, 0.0, array)
+
+
+def exact(values: object) -> bool:
+    """Whether there are values and all of them are zero but for rounding."""
+    array = np.asarray(values, dtype=float)
+    return bool(array.size) and bool((np.abs(array) < EXACT_BELOW).all())
+
+
+STRIP_KEY = "dot: one fit, line: range, tick: median"
+
+_MOST_OUTLINES = 400
+"""More dots than this become a picture inside the SVG, which stays small."""
+
+
+def draw_strip(
+    panel: Axes, values: Array, y: float, color: str, height: float = 0.3, size_pt: float = 2.0
+) -> None:
+    """Dots spread over a height around y, always alike; finite values (n,), n at least 1."""
+    shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * height
+    panel.plot(
+        values,
+        y + shift,
+        "o",
+        color=color,
+        ms=size_pt,
+        mew=0.0,
+        alpha=0.45,
+        zorder=3,
+        rasterized=len(values) > _MOST_OUTLINES,
+    )
+    panel.plot([values.min(), values.max()], [y, y], color=color, lw=0.8, zorder=4)
+    panel.plot([np.median(values)], [y], "|", color=BLACK, ms=7.0, mew=1.0, zorder=5)

@@ -1,16 +1,115 @@
-"""Panels side by side that share their rows."""
+"""Panels side by side that share their rows.
+
+Logarithmic axes that people can read.
+
+Which rows a panel has: a specimen, a joint, or a joint of a specimen, cranial on top.
+
+Sections of panels below each other, each with rows of its own.
+"""
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, log10
 
+import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from spinepipe.report.rows import Rows
-from spinepipe.report.spread import BAR_PT
+from spinepipe.report.marks import BAR_PT
 from spinepipe.report.style import GREY, blank
+from spinepipe.report.words import tick
+
+_STEPS: tuple[tuple[float, ...], ...] = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
+
+
+def log_ticks(axis: Axis, low: float, high: float, most: int = 4) -> None:
+    """Few ticks with plain numbers: even ones within half a decade, else 1, 2, 5 or fewer.
+
+    Where even decades are more than ``most``, only some of them have a number.
+    """
+    decades = log10(high / low)
+    if decades < 0.5:
+        even = [x for x in MaxNLocator(most).tick_values(low, high) if low <= x <= high]
+        axis.set_major_locator(FixedLocator(even))
+        axis.set_minor_locator(NullLocator())
+    else:
+        subs = next((s for s in _STEPS if len(_within(low, high, s)) <= most), _STEPS[-1])
+        axis.set_major_locator(LogLocator(subs=subs, numticks=most if subs == _STEPS[-1] else None))
+        axis.set_minor_locator(LogLocator(subs=range(1, 10)))
+    axis.set_major_formatter(lambda x, _: tick(x))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _within(low: float, high: float, subs: Sequence[float]) -> list[float]:
+    """Multiples of the decades from low to high."""
+    ends = floor(log10(low)), floor(log10(high)) + 1
+    found = [s * 10.0**decade for decade in range(*ends) for s in subs]
+    return [x for x in found if low <= x <= high]
+
+
+MOST_ROWS = 40
+"""More rows than this on one page cannot be read: then specimens are pooled."""
+
+MOST_ROWS_WITH_NUMBERS = 8
+EVERY_JOINT = "*"
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a panel from the bottom up; ``note`` says what was pooled, or nothing."""
+
+    labels: tuple[str, ...]
+    frames: tuple[pd.DataFrame, ...]
+    note: str
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.labels)
+
+    @property
+    def with_numbers(self) -> bool:
+        """Whether there is room to write numbers beside each row."""
+        return len(self) <= MOST_ROWS_WITH_NUMBERS
+
+
+def rows_of(frame: pd.DataFrame, specimens: Sequence[str], joints: Sequence[str]) -> Rows:
+    """Split rows with columns ``specimen`` and ``joint``; combinations without rows are left out.
+
+    Parameters
+    ----------
+    specimens : in the order in which they are read, from the top.
+    joints : caudal to cranial, or ``("*",)`` where all joints share a row.
+    """
+    keys = [(joint, specimen) for joint in joints for specimen in reversed(specimens)]
+    pooled = len(keys) > MOST_ROWS and len(specimens) > 1
+    if pooled:
+        keys = [(joint, EVERY_JOINT) for joint in joints]
+    found = [(key, _part(frame, *key)) for key in keys]
+    kept = [(key, part) for key, part in found if len(part)]
+    labels = tuple(_label(joint, specimen, len(specimens)) for (joint, specimen), _ in kept)
+    note = f"{len(specimens)} specimens pooled" if pooled else ""
+    return Rows(labels, tuple(part for _, part in kept), note)
+
+
+def _part(frame: pd.DataFrame, joint: str, specimen: str) -> pd.DataFrame:
+    chosen = frame["joint"] == joint
+    if specimen != EVERY_JOINT:
+        chosen &= frame["specimen"] == specimen
+    return frame[chosen]
+
+
+def _label(joint: str, specimen: str, n_specimens: int) -> str:
+    if joint == EVERY_JOINT:
+        return "all specimens" if specimen == EVERY_JOINT else specimen
+    if specimen == EVERY_JOINT or n_specimens == 1:
+        return joint
+    return f"{specimen}  {joint}"
+
 
 _ABOVE_AND_BELOW_MM = 14.0
 _KEY_MM = 17.0
@@ -83,3 +182,38 @@ def explain_marks(
         borderaxespad=0.2,
     )
     legend.get_title().set_multialignment("center")
+
+
+MOST_ACROSS = 3
+
+
+def across_of(n: int, most: int = MOST_ACROSS) -> int:
+    """How many of n panels stand side by side, so that the lines are about equally long."""
+    return -(-n // -(-n // most))
+
+
+def sections(
+    parts: Sequence[tuple[int, float]], key_mm: float, most_across: int = MOST_ACROSS
+) -> tuple[list[list[Axes]], Figure]:
+    """Panels of each section, and their figure.
+
+    Parameters
+    ----------
+    parts : of each section, the number of panels and the height of one, mm.
+    key_mm : height below all panels for what explains them.
+    most_across : most panels side by side.
+    """
+    across = across_of(max(n for n, _ in parts), most_across)
+    heights = [height for n, height in parts for _ in range(-(-n // across))]
+    figure = blank(sum(heights) + key_mm)
+    lines = figure.subplots(len(heights), across, squeeze=False, height_ratios=heights)
+    found: list[list[Axes]] = []
+    first = 0
+    for n, _ in parts:
+        down = -(-n // across)
+        panels = list(lines[first : first + down].ravel())
+        for spare in panels[n:]:
+            spare.set_visible(False)
+        found.append(panels[:n])
+        first += down
+    return found, figure

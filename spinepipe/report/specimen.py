@@ -1,4 +1,7 @@
-"""Figure: one specimen from its right side and from behind, with frames, landmarks and loads."""
+"""Figure: one specimen from its right side and from behind, with frames, landmarks and loads.
+
+What is shown of one specimen: its frames, points, bodies, loads and measured motion.
+"""
 
 from dataclasses import dataclass
 
@@ -8,12 +11,58 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import (
+    Landmarks,
+    MeasuredMotion,
+    bodies,
+    joint_frames,
+    landmarks,
+    load_cases,
+    measured_motion,
+)
 from spinepipe.effects.contract import Array, Wrench
-from spinepipe.model import LoadCase
-from spinepipe.report.specimen_view import SpecimenView
+from spinepipe.frames import Pose
+from spinepipe.model import Body, LoadCase
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, blank
 from spinepipe.report.words import count
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M
+
+
+@dataclass(frozen=True)
+class SpecimenView:
+    """One specimen; SI, ground axes, neutral pose.
+
+    Attributes
+    ----------
+    frames : of the joints, caudal to cranial. points : landmarks, empty where there are none.
+    bodies : the moving vertebrae that have a mass. cases, motions : one per test and cycle.
+    """
+
+    specimen: str
+    frames: tuple[Pose, ...]
+    points: Landmarks
+    bodies: tuple[Body, ...]
+    cases: tuple[LoadCase, ...]
+    motions: tuple[MeasuredMotion, ...]
+
+
+def view_of(cohort: Cohort, specimen: str, study: JointPoseSensitivity | None) -> SpecimenView:
+    """A specimen of a cohort, with the tests and the load shift of a study where there is one."""
+    tests = cohort.tests if study is None else study.tests or cohort.tests
+    shift = np.zeros(3)
+    if study is not None:
+        shift = np.array(study.load_point_shift_mm.in_order()) / MM_PER_M
+    cases = () if cohort.loads is None else load_cases(cohort, specimen, tests, shift)
+    return SpecimenView(
+        specimen=specimen,
+        frames=joint_frames(cohort, specimen),
+        points={} if cohort.landmarks is None else landmarks(cohort, specimen),
+        bodies=tuple(body for body in bodies(cohort, specimen) if body.mass > 0.0),
+        cases=cases,
+        motions=measured_motion(cohort, specimen, cases),
+    )
+
 
 AXIS_COLORS = {"anterior": VERMILLION, "superior": GREEN, "right": BLUE}
 """Colours of the x, y and z axes of joint frames."""
@@ -109,9 +158,16 @@ def _bodies(axis: Axes, side: _Side, view: SpecimenView) -> None:
         axis.plot(*at, "o", mfc="white", mec=BLACK, ms=5.0, mew=0.7, zorder=2)
         axis.plot(*at, "+", color=BLACK, ms=5.0, mew=0.7, zorder=2)
         axis.annotate(
-            body.name, _spot(at), (-4, -3), textcoords="offset points", fontsize=7.5, weight="bold",
-            ha="right", va="top", zorder=6,
-        )  # fmt: skip
+            body.name,
+            _spot(at),
+            (-4, -3),
+            textcoords="offset points",
+            fontsize=7.5,
+            weight="bold",
+            ha="right",
+            va="top",
+            zorder=6,
+        )
 
 
 def _frames(axis: Axes, side: _Side, cohort: Cohort, view: SpecimenView) -> None:

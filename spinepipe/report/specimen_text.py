@@ -6,7 +6,7 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import zxy_angles
-from spinepipe.report.specimen_view import SpecimenView
+from spinepipe.report.specimen import SpecimenView
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, from_si
 
 Cells = Sequence[object]

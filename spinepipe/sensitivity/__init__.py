@@ -1,13 +1,7 @@
 """Sensitivity: what an output hangs on, from tables of results (not from derivatives)."""
 
+from spinepipe.sensitivity.shares import MeanSquares, Share, Shares, mean_squares, variance_shares
 from spinepipe.sensitivity.tree import Tree, regression_tree
-from spinepipe.sensitivity.two_factor import (
-    MeanSquares,
-    Share,
-    Shares,
-    mean_squares,
-    variance_shares,
-)
 
 __all__ = [
     "MeanSquares",

@@ -1,17 +1,30 @@
 """Statics: equilibria of a spine model, their stability and sensitivities, and settling in time."""
 
 from spinepipe.statics.equilibrium import Equilibrium
-from spinepipe.statics.free import FreeParameter, declared, free_parameters, moved
 from spinepipe.statics.load_sensitivity import LoadSensitivity, by_load
-from spinepipe.statics.loading import Loading, Slots
 from spinepipe.statics.path import SolvedStep, carried_over, follow
 from spinepipe.statics.pose_sensitivity import by_joint_pose
-from spinepipe.statics.program import Course, Program
-from spinepipe.statics.sensitivity import by_parameters, observe, observed_by_parameters
-from spinepipe.statics.settling import END_ONLY, Settled, move, no_settling, settle
-from spinepipe.statics.settling_sensitivity import settled_by_parameters
-from spinepipe.statics.status import Status
-from spinepipe.statics.system import Balance, System
+from spinepipe.statics.sensitivity import (
+    FreeParameter,
+    by_parameters,
+    declared,
+    free_parameters,
+    moved,
+    observe,
+    observed_by_parameters,
+)
+from spinepipe.statics.settling import (
+    END_ONLY,
+    Course,
+    Program,
+    Settled,
+    move,
+    no_settling,
+    settle,
+    settled_by_parameters,
+)
+from spinepipe.statics.system import Balance, Loading, Slots, System
+from spinepipe.status import Status
 from spinepipe.world import Chain
 
 __all__ = [

@@ -8,12 +8,10 @@ import numpy as np
 from spinepipe.effects import Advance
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics.equilibrium import Equilibrium, solve
+from spinepipe.statics.equilibrium import Equilibrium, Factored, solve
 from spinepipe.statics.holding import States, states_after
-from spinepipe.statics.linear import Factored
-from spinepipe.statics.loading import Loading
-from spinepipe.statics.status import Status
-from spinepipe.statics.system import System
+from spinepipe.statics.system import Loading, System
+from spinepipe.status import Status
 
 
 @dataclass(frozen=True)

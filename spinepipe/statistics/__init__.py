@@ -1,19 +1,20 @@
 """Statistics: tests of arrays, each with statistic, p, effect size, status and message."""
 
 from spinepipe.statistics.agreement import Agreement, bland_altman
-from spinepipe.statistics.correction import corrected, family_size
 from spinepipe.statistics.correlation import kendall, spearman
-from spinepipe.statistics.kruskal import critical_h, kruskal_wallis
-from spinepipe.statistics.mean import Mean, mean_of
-from spinepipe.statistics.nested import f_test_nested
 from spinepipe.statistics.normality import (
     chi_squared_normality,
+    f_test_nested,
     kolmogorov_smirnov_normality,
     lilliefors_normality,
 )
-from spinepipe.statistics.outcome import Ended, Outcome
-from spinepipe.statistics.ranks import friedman
-from spinepipe.statistics.signed_rank import wilcoxon_signed_rank
+from spinepipe.statistics.outcome import Ended, Mean, Outcome, corrected, family_size, mean_of
+from spinepipe.statistics.rank_tests import (
+    critical_h,
+    friedman,
+    kruskal_wallis,
+    wilcoxon_signed_rank,
+)
 
 __all__ = [
     "Agreement",

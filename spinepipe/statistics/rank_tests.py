@@ -1,4 +1,13 @@
-"""Kruskal-Wallis test of independent groups, with a p that also holds for few values."""
+"""Kruskal-Wallis test of independent groups, with a p that also holds for few values.
+
+Rank tests of grouped values.
+
+Exact distribution of Wilcoxon's signed rank sum, also with ties.
+
+scipy's exact one holds without ties only, and its permutations take a second for 14 differences.
+
+Wilcoxon's signed rank test of paired values.
+"""
 
 from collections.abc import Sequence
 from math import factorial, prod
@@ -7,7 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite, tied
+from spinepipe.statistics.outcome import (
+    Array,
+    Ended,
+    Outcome,
+    Test,
+    constant,
+    finite,
+    finite_pairs,
+    tied,
+)
 
 FEWEST_GROUPS = 2
 
@@ -49,7 +67,7 @@ def kruskal_wallis(groups: Sequence[ArrayLike]) -> Outcome:
     h = max(float(found.statistic), 0.0)  # groups of the same mean rank may leave -1e-15
     critical = f"H_c {critical_h(len(values)):.2f} (df {len(values) - 1})"
     ties = tied(np.concatenate(values))
-    p, how = _p(values, float(found.pvalue))
+    p, how = _p_of_groups(values, float(found.pvalue))
     message = [critical, how, f"ties: {ties} of {n} values" if ties else ""]
     return KRUSKAL_WALLIS.done(h, p, n, h / (n - 1), "; ".join(filter(None, message)))
 
@@ -80,7 +98,7 @@ def _refused(groups: Sequence[Array], n: int) -> Outcome | None:
     return None
 
 
-def _p(groups: Sequence[Array], approximate: float) -> tuple[float, str]:
+def _p_of_groups(groups: Sequence[Array], approximate: float) -> tuple[float, str]:
     """p, and where it comes from."""
     sizes = [len(group) for group in groups]
     ways = factorial(sum(sizes)) // prod(factorial(size) for size in sizes)
@@ -113,3 +131,123 @@ def _between(*ranks: NDArray[np.float64], axis: int) -> Array:
     shares = [group.sum(axis=axis) ** 2 / group.shape[axis] for group in ranks]
     total: Array = np.sum(shares, axis=0)
     return total
+
+
+FEWEST_BLOCKS, FEWEST_TREATMENTS = 2, 3
+
+FRIEDMAN = Test("Friedman", "chi2", "Kendall's W")
+
+
+def friedman(grid: ArrayLike) -> Outcome:
+    """Friedman's rank sum test of unreplicated complete blocks, corrected for ties.
+
+    Parameters
+    ----------
+    grid : (blocks, treatments); the values of a block are ranked among each other.
+
+    Effect size: Kendall's W = chi2 / (blocks (treatments - 1)), 0 no agreement between the
+    blocks' orders, 1 the same order in all.
+    """
+    values = finite(grid, dimensions=2)
+    blocks, treatments = values.shape
+    if blocks < FEWEST_BLOCKS or treatments < FEWEST_TREATMENTS:
+        return FRIEDMAN.without(
+            Ended.TOO_FEW,
+            blocks,
+            f"{blocks} blocks of {treatments} treatments; at least "
+            f"{FEWEST_BLOCKS} of {FEWEST_TREATMENTS} are needed",
+        )
+    if (values == values[:, :1]).all():
+        return FRIEDMAN.without(Ended.CONSTANT, blocks, "within every block all values are equal")
+    found = stats.friedmanchisquare(*values.T)
+    effect = found.statistic / (blocks * (treatments - 1))
+    tied = sum(len(np.unique(block)) < treatments for block in values)
+    message = f"ties: in {tied} of {blocks} blocks" if tied else ""
+    return FRIEDMAN.done(found.statistic, found.pvalue, blocks, effect, message)
+
+
+LARGEST = 50
+"""Up to so many differences."""
+
+
+def exact_p(v: float, ranks: Array) -> float:
+    """Two-sided p of a rank sum v: the doubled smaller tail over all signs of the ranks (n,)."""
+    share, place = _distribution(ranks), round(2.0 * v)
+    return float(min(1.0, 2.0 * min(share[: place + 1].sum(), share[place:].sum())))
+
+
+def _distribution(ranks: Array) -> Array:
+    """Probability that twice the rank sum is 0, 1, ...; mid-ranks are halves, doubled whole."""
+    doubled = np.rint(2.0 * ranks).astype(int)
+    share = np.eye(1, doubled.sum() + 1)[0]
+    for rank in doubled:
+        moved = np.zeros_like(share)
+        moved[rank:] = share[:-rank]  # nothing is lost off the end: no sum is above the total
+        share = 0.5 * (share + moved)
+    return share
+
+
+FEWEST = 4
+"""Fewer differing pairs have p of 0.25 or more, whatever their values."""
+
+SAME = 1e-12
+"""Differences closer than this share of the largest value are equal: 0.3 - 0.2 = 0.2 - 0.1."""
+
+SIGNED_RANK = Test("Wilcoxon signed rank", "V", "rank-biserial r")
+
+
+def wilcoxon_signed_rank(x: ArrayLike, y: ArrayLike) -> Outcome:
+    """Wilcoxon's signed rank test of pairs x (n,) and y (n,), two-sided.
+
+    The statistic V is the sum of the ranks of the pairs with x above y. Pairs without a
+    difference are left out (Wilcoxon's way) and counted in the message; n counts them too.
+
+    p is exact up to 50 differences, also with ties; above, it is scipy's normal approximation
+    with correction for ties and continuity.
+
+    Effect size: matched-pairs rank-biserial correlation (Kerby 2014), the share of the rank sum
+    with x above y less the share below: 1 if x is always above, -1 if always below.
+    """
+    first, second = finite_pairs(x, y)
+    n, differences = len(first), _differences(first, second)
+    left = len(differences)
+    if left == 0 < n:
+        return SIGNED_RANK.without(Ended.CONSTANT, n, f"all {n} pairs are equal")
+    if left < FEWEST:
+        message = f"{left} of {n} pairs differ; at least {FEWEST} are needed"
+        return SIGNED_RANK.without(Ended.TOO_FEW, n, message)
+    ranks = stats.rankdata(np.abs(differences))
+    v, total = float(ranks[differences > 0.0].sum()), left * (left + 1) / 2
+    message = _message(differences, n - left)
+    return SIGNED_RANK.done(
+        v, _p_of_pairs(differences, ranks, v), n, 2.0 * v / total - 1.0, message
+    )
+
+
+def _differences(x: Array, y: Array) -> Array:
+    """x - y where they differ, in steps of what rounding can tell apart."""
+    largest = max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0))
+    if largest == 0.0:
+        return np.empty(0)
+    steps: Array = np.round((x / largest - y / largest) / SAME)
+    return steps[steps != 0.0]
+
+
+def _p_of_pairs(differences: Array, ranks: Array, v: float) -> float:
+    """Two-sided p."""
+    if len(ranks) <= LARGEST:
+        return exact_p(v, ranks)
+    return float(stats.wilcoxon(differences, correction=True).pvalue)
+
+
+def _message(differences: Array, equal: int) -> str:
+    """What a reader of the numbers must know."""
+    left, ties = len(differences), tied(np.abs(differences))
+    lowest = 2.0 ** (1 - left)
+    parts = (
+        "exact p" if left <= LARGEST else "approximate p",
+        f"equal pairs left out: {equal}" if equal else "",
+        f"ties: {ties} of {left} differences" if ties else "",
+        f"with {left} differences p is never below {lowest:.3g}" if lowest > 0.05 else "",
+    )
+    return "; ".join(filter(None, parts))

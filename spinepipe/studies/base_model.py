@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import ModelFile, effects_for
-from spinepipe.studies.coordinates import FORM
+from spinepipe.studies.parts import FORM
 
 __all__ = ["BUSHING", "Base", "beside_bushings", "made_by", "own_values"]
 

@@ -1,19 +1,22 @@
-"""Choices that are made for each of the six coordinates of a joint."""
+"""Choices that are made for each of the six coordinates of a joint.
 
-from typing import Annotated, Literal, Self
+Lists in study files: something in them, and nothing twice.
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+Published stiffness that studies start from where a study file names none.
+"""
 
-__all__ = [
-    "FORM",
-    "Coordinate",
-    "Damping",
-    "Rotational",
-    "Shift",
-    "Stiffness",
-    "Translational",
-    "Weights",
-]
+from typing import Annotated, Literal, Self, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
+
+from spinepipe.anatomy import published
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 """Unknown keys, `yes` for a number and NaN are errors."""
@@ -100,4 +103,75 @@ class Shift(BaseModel):
 
     def in_order(self) -> tuple[float, ...]:
         """(3,) mm: x anterior, y superior, z right."""
+        return tuple(dict(self).values())
+
+
+def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names as they are.
+
+    Raises
+    ------
+    ValueError
+        For a name that stands there twice.
+    """
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
+    return names
+
+
+Item = TypeVar("Item")
+EachOnce = Annotated[tuple[Item, ...], Field(strict=False, min_length=1), AfterValidator(distinct)]
+"""One item at least, and none twice."""
+
+Tests = EachOnce[Annotated[str, StringConstraints(min_length=1)]]
+"""Load cases of a cohort."""
+
+Coordinates = EachOnce[Coordinate]
+"""Coordinates of a joint."""
+
+
+_UNIFORM = {
+    name: float(value)
+    for name, value in published("gould_2024b")["uniform_stiffness"].items()
+    if name != "where"
+}
+
+
+class PublishedStiffness(Stiffness):
+    """Diagonal stiffness of a joint; what is not named is that of Gould 2024b, Table 2, uniform."""
+
+    anterior_n_per_m: Translational = Field(
+        default=_UNIFORM["anterior_n_per_m"], description="anterior stiffness, N/m"
+    )
+    superior_n_per_m: Translational = Field(
+        default=_UNIFORM["superior_n_per_m"], description="superior stiffness, N/m"
+    )
+    right_n_per_m: Translational = Field(
+        default=_UNIFORM["right_n_per_m"], description="lateral stiffness, N/m"
+    )
+    extension_nm_per_rad: Rotational = Field(
+        default=_UNIFORM["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
+    )
+    right_bending_nm_per_rad: Rotational = Field(
+        default=_UNIFORM["right_bending_nm_per_rad"],
+        description="lateral bending stiffness, N m/rad",
+    )
+    left_rotation_nm_per_rad: Rotational = Field(
+        default=_UNIFORM["left_rotation_nm_per_rad"],
+        description="axial rotation stiffness, N m/rad",
+    )
+
+
+class LevelStiffness(BaseModel):
+    """Rotational stiffness of one joint, where joints differ."""
+
+    model_config = FORM
+
+    extension_nm_per_rad: Rotational = Field(description="flexion-extension stiffness, N m/rad")
+    right_bending_nm_per_rad: Rotational = Field(description="lateral bending stiffness, N m/rad")
+    left_rotation_nm_per_rad: Rotational = Field(description="axial rotation stiffness, N m/rad")
+
+    def in_order(self) -> tuple[float, ...]:
+        """(3,) N m/rad in the order of the rotations."""
         return tuple(dict(self).values())

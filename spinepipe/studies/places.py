@@ -1,11 +1,16 @@
-"""Places in a study file, and what all kinds of studies check of the tests it names."""
+"""Places in a study file, and what all kinds of studies check of the tests it names.
+
+Which readings of a cohort a study has before it: what was measured, and what again.
+"""
 
 from collections.abc import Iterator, Sequence
 
-from spinepipe.cohort.read_yaml import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+import pandas as pd
 
-__all__ = ["at", "unknown_names", "unknown_tests"]
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 
 def at(document: Document, key: str) -> tuple[str, int | None, str]:
@@ -38,3 +43,40 @@ def unknown_names(
             remedy = did_you_mean(name, known, "delete it or correct its name")
             place = at(document, f"{key}.{index}")
             yield Problem(*place, f"unknown {what} '{name}'", one_of(known), remedy)
+
+
+_PLACE = ["specimen", "test", "step", "joint"]
+
+
+def readings(
+    cohort: Cohort, tests: Sequence[str] | None, coordinates: Sequence[str] | None
+) -> pd.DataFrame:
+    """Rows of motion with a reading, and their columns of the coordinates; None stands for all.
+
+    Zeros that zeroing made are no readings.
+
+    Parameters
+    ----------
+    cohort : with motion.
+    """
+    assert cohort.motion is not None
+    columns = [
+        column
+        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
+        if name in (coordinates or COORDINATES)
+    ]
+    zeros = cohort.zeroed_at_step_0 & (cohort.motion["step"] == 0)
+    read = cohort.motion[columns].notna().any(axis=1) & ~zeros
+    chosen = cohort.motion["test"].isin(list(tests or cohort.tests))
+    return cohort.motion.loc[read & chosen, [*_PLACE, "cycle", *columns]]
+
+
+def measured_columns(rows: pd.DataFrame) -> list[str]:
+    """Columns of coordinates that have a reading, in their order."""
+    return [c for c in COORDINATE_COLUMNS if c in rows and bool(rows[c].notna().any())]
+
+
+def repeated(rows: pd.DataFrame, columns: Sequence[str]) -> bool:
+    """Whether any coordinate was read at the same place in two cycles of a test."""
+    counts = rows.groupby(_PLACE)[list(columns)].count()
+    return bool((counts > 1).to_numpy().any())

@@ -1,18 +1,32 @@
-"""Read one study file, or say everything that is wrong with it."""
+"""Read one study file, or say everything that is wrong with it.
 
+A study together with its cohort: do the two fit each other?
+
+Which studies a run builds.
+"""
+
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Annotated, Any
 
-from spinepipe.cohort.read_yaml import Document, read_yaml
-from spinepipe.cohort.validate import validate
+from pydantic import BaseModel, Field
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
-from spinepipe.studies.cohort_stiffness import CohortStiffness
-from spinepipe.studies.discrepancy import Discrepancy
-from spinepipe.studies.global_sensitivity import GlobalSensitivity
-from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
-from spinepipe.studies.range_of_motion import RangeOfMotion
-from spinepipe.studies.study import Study
-
-__all__ = ["KINDS", "STUDIES", "displayed", "load", "read"]
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.discrepancy.checks import check_base_model, check_discrepancy
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
+from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.parts import FORM
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion, check_range_of_motion
+from spinepipe.studies.study import COHORTS, Study, cohort_folder
 
 STUDIES = Path("config") / "studies"
 
@@ -82,3 +96,141 @@ def _name_problems(document: Document, stem: str) -> list[Problem]:
     place = (document.file, document.line_of("study"), "study")
     remedy = "rename the file or change the key"
     return [Problem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
+
+
+CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
+    "joint_pose_sensitivity": check_joint_pose_sensitivity,
+    "range_of_motion": check_range_of_motion,
+    "cohort_stiffness": check_cohort_stiffness,
+    "discrepancy": check_discrepancy,
+    "global_sensitivity": check_global_sensitivity,
+}
+"""What each kind of study demands of its cohort."""
+
+FILE_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
+    "cohort_stiffness": check_cohort_base,
+    "discrepancy": check_base_model,
+}
+"""What kinds of studies demand of further files, whose paths count from the Snakefile."""
+
+ROOM_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
+    "global_sensitivity": check_size_of_design,
+}
+"""What kinds of studies need of the machine; asked when all else is sound."""
+
+
+def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Cohort]:
+    """Read a study and its cohort and hold them against each other.
+
+    Parameters
+    ----------
+    root : folder of the Snakefile.
+    study_name : name of a file in ``config/studies``, without ``.yaml``.
+    starting : whether the study is yet to start, so that the machine must have room for it; a
+        job of a study that runs has its own share in what is short.
+
+    Raises
+    ------
+    InputError
+        With every problem of the study and of its cohort; when each is sound by itself, with
+        every way in which they do not fit.
+    """
+    document, study, problems = load(root / STUDIES / f"{study_name}.yaml", root)
+    cohort, faults = _cohort(document, root)
+    problems += faults
+    if document and study and cohort:
+        problems += CHECKS[study.kind](document, study, cohort)
+        if study.kind in FILE_CHECKS:
+            problems += FILE_CHECKS[study.kind](document, study, cohort, root)
+        if starting and not problems and study.kind in ROOM_CHECKS:
+            problems += ROOM_CHECKS[study.kind](document, study, cohort, root)
+    if problems or study is None or cohort is None:
+        raise InputError(problems)
+    return study, cohort
+
+
+def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[Problem]]:
+    """The cohort a study file names, though the rest of the file may be unsound."""
+    name = document.data.get("cohort") if document else None
+    if document is None or not isinstance(name, str) or not name:
+        return None, []
+    folder = cohort_folder(name, root)
+    if not folder.is_dir():
+        known = sorted(path.name for path in (root / COHORTS).glob("*") if path.is_dir())
+        remedy = did_you_mean(name, known, f"add the folder {folder}")
+        allowed = f"{one_of(known)}, or the path of a folder"
+        place = (document.file, document.line_of("cohort"), "cohort")
+        return None, [Problem(*place, f"unknown cohort '{name}'", allowed, remedy)]
+    try:
+        return cohorts.read(folder), []
+    except InputError as error:
+        return None, list(error.problems)
+
+
+CONFIG = Path("config") / "config.yaml"
+
+_Names = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class Selection(BaseModel):
+    """The keys of ``config/config.yaml``."""
+
+    model_config = FORM
+
+    studies: _Names = Field(min_length=1, description="studies that a plain run builds")
+    full: _Names = Field(default=(), description="long studies, built by `make full` only")
+
+
+def read_selection(root: Path) -> Selection:
+    """Read ``config/config.yaml`` and look for the file of every study it names.
+
+    Parameters
+    ----------
+    root : folder of the Snakefile.
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
+    """
+    path = root / CONFIG
+    file = displayed(path, root)
+    if not path.is_file():
+        allowed = "a file with `studies: [...]`"
+        raise InputError([Problem(file, None, None, "no such file", allowed, "add it")])
+    document, problems = read_yaml(path, file)
+    if document is None:
+        raise InputError(problems)
+    selection, faults = validate(Selection, document)
+    problems += faults
+    if selection is not None:
+        problems += _unknown_names(selection, document, root)
+    if problems or selection is None:
+        raise InputError(problems)
+    return selection
+
+
+def names_of_kind(root: Path, kind: str) -> tuple[str, ...]:
+    """Names of the study files of a kind, sound or not; those that cannot be read have none."""
+    found = []
+    for path in sorted((root / STUDIES).glob("*.yaml")):
+        document, _ = read_yaml(path, displayed(path, root))
+        if document is not None and document.data.get("kind") == kind:
+            found.append(path.stem)
+    return tuple(found)
+
+
+def _unknown_names(selection: Selection, document: Document, root: Path) -> list[Problem]:
+    known = sorted(path.stem for path in (root / STUDIES).glob("*.yaml"))
+    problems = []
+    seen: set[str] = set()
+    for key in ("studies", "full"):
+        for index, name in enumerate(getattr(selection, key)):
+            place = (document.file, document.line_of(f"{key}.{index}"), f"{key}.{index}")
+            if name in seen:
+                problems.append(Problem(*place, f"'{name}' again", "each once", "delete one"))
+            elif name not in known:
+                remedy = did_you_mean(name, known, f"add {(STUDIES / name).as_posix()}.yaml")
+                problems.append(Problem(*place, f"unknown study '{name}'", one_of(known), remedy))
+            seen.add(name)
+    return problems

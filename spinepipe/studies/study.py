@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field
 
-from spinepipe.studies.coordinates import FORM
+from spinepipe.studies.parts import FORM
 
 __all__ = ["COHORTS", "Study", "cohort_folder"]
 

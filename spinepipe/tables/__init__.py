@@ -1,16 +1,34 @@
 """Result tables: one schema each, from which files are checked and the docs are generated."""
 
-from spinepipe.tables.cohort_stiffness import ERRORS, FITS, POOLING, SIGN_CHECKS, STIFFNESS
-from spinepipe.tables.cohort_stiffness_analyses import FINDINGS, MAE, RANKING
-from spinepipe.tables.discrepancy import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
-from spinepipe.tables.global_sensitivity import (
+from spinepipe.studies.cohort_stiffness.tables import (
+    ERRORS,
+    FINDINGS,
+    FITS,
+    MAE,
+    POOLING,
+    RANKING,
+    SIGN_CHECKS,
+    STIFFNESS,
+)
+from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.global_sensitivity.tables import (
     CALIBRATED,
     CONVERGENCE,
     DESIGN,
     INDICES,
     RESPONSES,
 )
-from spinepipe.tables.identification import (
+from spinepipe.studies.joint_pose_sensitivity.tables import (
+    AGREEMENT,
+    CALIBRATIONS,
+    IMPORTANCE,
+    LANDMARKS,
+    POSES,
+    SIMULATIONS,
+    STATISTICS,
+    VARIANCE_SHARES,
+)
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
     AGAINST_GOULD_2024A,
     AGAINST_GOULD_2024B,
     BOOTSTRAP,
@@ -23,7 +41,13 @@ from spinepipe.tables.identification import (
     SUCCESS_BY_METHOD,
     SUMMARY,
 )
-from spinepipe.tables.joint_pose_sensitivity import CALIBRATIONS, LANDMARKS, POSES, SIMULATIONS
+from spinepipe.studies.range_of_motion.tables import (
+    FRAMES,
+    RANGE_OF_MOTION,
+    ROM_SUMMARY,
+    ROM_VARIANCE,
+    STIFFNESS_SETS,
+)
 from spinepipe.tables.parquet import (
     BadTable,
     from_rows,
@@ -34,15 +58,7 @@ from spinepipe.tables.parquet import (
     to_arrow,
     write,
 )
-from spinepipe.tables.range_of_motion import (
-    FRAMES,
-    RANGE_OF_MOTION,
-    ROM_SUMMARY,
-    ROM_VARIANCE,
-    STIFFNESS_SETS,
-)
 from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.statistics import AGREEMENT, IMPORTANCE, STATISTICS, VARIANCE_SHARES
 
 TABLES = {
     table.name: table

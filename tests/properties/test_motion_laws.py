@@ -11,7 +11,8 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, coordinates_of, joint_pose, reexpress, rotation_zxy, transform_of
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 
 FEW = settings(derandomize=True, max_examples=15, deadline=None, database=None)
 
@@ -54,10 +55,11 @@ def random_spine(seed: int, n: int, gravity: bool = True) -> Loaded:
         inertia = 0.1 * (np.sum(spread**2) * np.eye(3) - spread.T @ spread)
         bodies.append(Body("L", rng.uniform(0.1, 1.0), origin + rng.normal(0, 0.01, 3), inertia))
     wrenches = [
-        Wrench(body, origins[body] + rng.normal(0, 0.02, 3), rng.normal(0, 15, 3),
-               rng.normal(0, 2, 3))
+        Wrench(
+            body, origins[body] + rng.normal(0, 0.02, 3), rng.normal(0, 15, 3), rng.normal(0, 2, 3)
+        )
         for body in {n - 1, max(n - 3, 0)}
-    ]  # fmt: skip
+    ]
     model = SpineModel(
         specimen="random",
         joints=tuple(f"J{j}" for j in range(n)),
@@ -86,15 +88,20 @@ def mirrored(spine: Loaded) -> Loaded:
     return Loaded(
         replace(
             model,
-            frames=tuple(Pose(MIRROR @ f.rotation @ MIRROR, MIRROR @ f.origin)
-                         for f in model.frames),
-            bodies=tuple(replace(b, com=MIRROR @ b.com, inertia=MIRROR @ b.inertia @ MIRROR)
-                         for b in model.bodies),
+            frames=tuple(
+                Pose(MIRROR @ f.rotation @ MIRROR, MIRROR @ f.origin) for f in model.frames
+            ),
+            bodies=tuple(
+                replace(b, com=MIRROR @ b.com, inertia=MIRROR @ b.inertia @ MIRROR)
+                for b in model.bodies
+            ),
             gravity=MIRROR @ model.gravity,
         ),
-        tuple(Wrench(w.body, MIRROR @ w.point, MIRROR @ w.force, -MIRROR @ w.moment)
-              for w in spine.wrenches),
-    )  # fmt: skip
+        tuple(
+            Wrench(w.body, MIRROR @ w.point, MIRROR @ w.force, -MIRROR @ w.moment)
+            for w in spine.wrenches
+        ),
+    )
 
 
 @FEW
@@ -112,13 +119,17 @@ def carried(spine: Loaded, place: Pose) -> Loaded:
         replace(
             model,
             frames=tuple(place @ frame for frame in model.frames),
-            bodies=tuple(replace(b, com=place.apply(b.com), inertia=turn @ b.inertia @ turn.T)
-                         for b in model.bodies),
+            bodies=tuple(
+                replace(b, com=place.apply(b.com), inertia=turn @ b.inertia @ turn.T)
+                for b in model.bodies
+            ),
             gravity=turn @ model.gravity,
         ),
-        tuple(Wrench(w.body, place.apply(w.point), turn @ w.force, turn @ w.moment)
-              for w in spine.wrenches),
-    )  # fmt: skip
+        tuple(
+            Wrench(w.body, place.apply(w.point), turn @ w.force, turn @ w.moment)
+            for w in spine.wrenches
+        ),
+    )
 
 
 @FEW
@@ -214,8 +225,9 @@ def test_the_top_joint_holds_the_forces_on_the_top_vertebra(seed: int, n: int) -
 @given(seeds)
 def test_motion_told_in_another_frame_and_back_is_the_same(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    one, other = (Pose(Rotation.random(rng=rng).as_matrix(), rng.normal(0, 0.1, 3))
-                  for _ in range(2))  # fmt: skip
+    one, other = (
+        Pose(Rotation.random(rng=rng).as_matrix(), rng.normal(0, 0.1, 3)) for _ in range(2)
+    )
     q = np.concatenate([rng.normal(0, 0.01, 3), rng.normal(0, 0.3, 3)])
     again = reexpress(reexpress(q, one, other), other, one)
     np.testing.assert_allclose(again, q, rtol=0, atol=1e-12)

@@ -14,18 +14,26 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.comparison import GOULD_2024A, Claim, NotComputed, Ours, Range, Run, judge, judged
-from spinepipe.comparison.ranges import (
+from spinepipe.comparison.claim import (
+    Claim,
+    NotComputed,
+    Ours,
+    Range,
+    Run,
     binomial,
+    judge,
+    judged,
     kendall_p,
     normal_iqr,
     spearman_interval,
     spearman_p,
     spearman_threshold,
 )
-from spinepipe.jobs import against_gould_2024a
-from spinepipe.sensitivity.precision import required_precision
-from spinepipe.tables import AGAINST_GOULD_2024A, TABLES, from_rows, read, read_frame
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import against as against_gould_2024a
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
+from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
+from spinepipe.tables import TABLES, from_rows, read, read_frame
 
 ROOT = Path(__file__).parents[2]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
@@ -128,17 +136,30 @@ def statistics() -> pd.DataFrame:
         outcome("normality", "chi_squared", "*", "L3L4_anterior_origin", "", p=0.20),
     ]
     rows += [
-        outcome(cell, "spearman", "L2L3", "anterior_error", "anterior_stiffness", effect=effect,
-               p=p, p_bonferroni=3.0 * p, stratum=stratum)
+        outcome(
+            cell,
+            "spearman",
+            "L2L3",
+            "anterior_error",
+            "anterior_stiffness",
+            effect=effect,
+            p=p,
+            p_bonferroni=3.0 * p,
+            stratum=stratum,
+        )
         for stratum, effect, p in zip(poses, (-0.96, -0.98, 0.3), (0.001, 0.002, 0.4), strict=True)
-    ]  # fmt: skip
+    ]
     return frame("statistics", rows)
 
 
 def tables() -> dict[str, pd.DataFrame]:
     """A complete small set."""
-    fit = {"joint": "*", "anterior_n_per_m": 12000.0, "superior_n_per_m": 430000.0,
-           "extension_nm_per_rad": 15.0}  # fmt: skip
+    fit = {
+        "joint": "*",
+        "anterior_n_per_m": 12000.0,
+        "superior_n_per_m": 430000.0,
+        "extension_nm_per_rad": 15.0,
+    }
     best = {"stiffness": "calibrated", "pose": 1, "step": 1, "test": "flexion"}
     grid = {"joint": "L2L3", "coordinate": "anterior"}
     return {
@@ -148,9 +169,7 @@ def tables() -> dict[str, pd.DataFrame]:
         "calibrations": frame(
             "calibrations", [fit | {"pose": 0, "cost": 0.1}, fit | {"pose": 1, "cost": 0.2}]
         ),
-        "success": frame(
-            "success", [{"pose": 0, "reduced": False}, {"pose": 1, "reduced": True}]
-        ),
+        "success": frame("success", [{"pose": 0, "reduced": False}, {"pose": 1, "reduced": True}]),
         "simulations": frame(
             "simulations",
             [
@@ -178,42 +197,63 @@ def tables() -> dict[str, pd.DataFrame]:
         "landmark_precision": frame(
             "landmark_precision",
             [
-                {"stiffness": "calibrated", "motion": "translation", "sd_mm": sd, "n": 60,
-                 "limit": 1.0, "below": below, "below_low": 0.8, "below_high": 1.0}
+                {
+                    "stiffness": "calibrated",
+                    "motion": "translation",
+                    "sd_mm": sd,
+                    "n": 60,
+                    "limit": 1.0,
+                    "below": below,
+                    "below_low": 0.8,
+                    "below_high": 1.0,
+                }
                 for sd, below in ((1.0, 1.0), (2.0, 0.9), (4.0, 0.5))
             ],
         ),
         "required_precision": frame(
             "required_precision",
             [
-                {"stiffness": "calibrated", "motion": "both", "share": 0.95, "sd_mm": 1.5,
-                 "sd_low_mm": 1.2, "message": ""},
+                {
+                    "stiffness": "calibrated",
+                    "motion": "both",
+                    "share": 0.95,
+                    "sd_mm": 1.5,
+                    "sd_low_mm": 1.2,
+                    "message": "",
+                },
             ],
         ),
         "landmarks": frame(
             "landmarks",
-            [{"landmark": "superior_endplate_centre", "sd_mm": 1.2},
-             {"landmark": "left_pedicle_base", "sd_mm": 2.0}],
+            [
+                {"landmark": "superior_endplate_centre", "sd_mm": 1.2},
+                {"landmark": "left_pedicle_base", "sd_mm": 2.0},
+            ],
         ),
         "bootstrap": frame(
             "bootstrap",
             [
-                {"bootstrap": "start", "loading": "quasi_static", "set": number, "joint": "L2L3",
-                 "anterior_n_per_m": value}
+                {
+                    "bootstrap": "start",
+                    "loading": "quasi_static",
+                    "set": number,
+                    "joint": "L2L3",
+                    "anterior_n_per_m": value,
+                }
                 for number, value in enumerate((2.0, 2.01, 2.5))
             ],
         ),
-    }  # fmt: skip
+    }
 
 
 @cache
 def complete() -> tuple[Any, ...]:
     """All rows of the complete set."""
-    return tuple(judged(GOULD_2024A, Run(tables())))
+    return tuple(judged(CLAIMS, Run(tables())))
 
 
 def row_of(name: str, run: Run) -> dict[str, Any]:
-    (claim,) = [claim for claim in GOULD_2024A if claim.id == name]
+    (claim,) = [claim for claim in CLAIMS if claim.id == name]
     return judge(claim, run)
 
 
@@ -226,9 +266,17 @@ def missing(run: Run) -> Ours:
 
 def claim(value: float | None, low: float | None, high: float | None, wrong: str = "") -> Claim:
     return Claim(
-        "a", "Table 1", "something", "mm", 2.0, Range(low, high, "the paper's IQR"),
-        missing if value is None else lambda run: Ours(value), "for a reason", "a note", wrong,
-    )  # fmt: skip
+        "a",
+        "Table 1",
+        "something",
+        "mm",
+        2.0,
+        Range(low, high, "the paper's IQR"),
+        missing if value is None else lambda run: Ours(value),
+        "for a reason",
+        "a note",
+        wrong,
+    )
 
 
 @pytest.mark.parametrize(
@@ -422,7 +470,7 @@ def test_every_contradiction_of_the_paper_is_told() -> None:
         rows = [row for row in csv.reader(file) if row and row[0] == "gould-2024a"]
     wrong = {row[1] for row in rows if any("disagree" in cell for cell in row)}
     wrong |= set(ALSO_CONTRADICTED)
-    told = " ".join(str(row["reason"]) for row in judged(GOULD_2024A, EMPTY_RUN))
+    told = " ".join(str(row["reason"]) for row in judged(CLAIMS, EMPTY_RUN))
     named = {check for check in wrong if f"{check}:" in told or f"({check}" in told}
     assert len(wrong) > 15
     assert wrong - named == set(NOT_APPLICABLE)
@@ -430,7 +478,7 @@ def test_every_contradiction_of_the_paper_is_told() -> None:
 
 def test_contradicted_cells() -> None:
     """Which cells of Tables 2, 3, 6 and 8 exclude each other, by their consistency checks."""
-    found = {claim.id: claim.contradicted.split(":")[0] for claim in GOULD_2024A}
+    found = {claim.id: claim.contradicted.split(":")[0] for claim in CLAIMS}
     table = {name: check for name, check in found.items() if check}
     percents = {
         name.removesuffix(".largest_percent"): check
@@ -463,8 +511,8 @@ def test_contradicted_cells() -> None:
 
 
 def test_ids_are_unique_and_every_claim_has_a_reason() -> None:
-    assert len({claim.id for claim in GOULD_2024A}) == len(GOULD_2024A)
-    assert [claim.id for claim in GOULD_2024A if not (claim.outside or claim.contradicted)] == []
+    assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
+    assert [claim.id for claim in CLAIMS if not (claim.outside or claim.contradicted)] == []
 
 
 @pytest.mark.parametrize("name", sorted(tables()))
@@ -473,7 +521,7 @@ def test_a_missing_or_empty_table_is_told(name: str) -> None:
     whole = tables()
     rest = {key: table for key, table in whole.items() if key != name}
     for run in (Run(rest), Run(rest | {name: whole[name].iloc[:0]})):
-        after = judged(GOULD_2024A, run)
+        after = judged(CLAIMS, run)
         changed = [new for old, new in zip(complete(), after, strict=True) if old != new]
         assert changed
         assert {row["verdict"] for row in changed} <= {"not_computed", "contradicted"}
@@ -487,7 +535,7 @@ def test_stiffness_per_joint_is_not_compared_with_one_of_all_joints() -> None:
         for name, table in tables().items()
         if "joint" in table
     }
-    rows = {row["id"]: row for row in judged(GOULD_2024A, Run(tables() | changed))}
+    rows = {row["id"]: row for row in judged(CLAIMS, Run(tables() | changed))}
     for name in ("reduced.stiffness.anterior.median", "best_model.stiffness.anterior"):
         assert rows[name]["verdict"] == "not_computed"
 
@@ -504,6 +552,6 @@ def test_job_writes_the_table_with_its_origin(tmp_path: Path) -> None:
     output = tmp_path / "against_gould_2024a.parquet"
     against_gould_2024a.run(str(ROOT), "l1l4_joint_pose", [], str(output))
     rows = read_frame(output)
-    assert list(rows["id"]) == [claim.id for claim in GOULD_2024A]
+    assert list(rows["id"]) == [claim.id for claim in CLAIMS]
     assert set(rows["verdict"]) == {"not_computed", "contradicted", "recomputed"}
     assert read(output).schema.metadata[b"study"] == b"l1l4_joint_pose"

@@ -16,15 +16,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.comparison import GOULD_2024B, Run, judge, judged
-from spinepipe.comparison.gould_2024b.samples import largest_of, median_of, smallest_of
-from spinepipe.comparison.ranges import binomial
-from spinepipe.jobs.cohort_stiffness import against_gould_2024b
-from spinepipe.jobs.cohort_stiffness.predict import error_rows
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.comparison.claim import Run, binomial, judge, judged
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies import CohortStiffness
-from spinepipe.tables import AGAINST_GOULD_2024B, TABLES, from_rows, read, read_frame
+from spinepipe.studies.cohort_stiffness.gould_2024b import against as against_gould_2024b
+from spinepipe.studies.cohort_stiffness.gould_2024b.against import CLAIMS
+from spinepipe.studies.cohort_stiffness.gould_2024b.stiffness import (
+    largest_of,
+    median_of,
+    smallest_of,
+)
+from spinepipe.studies.cohort_stiffness.predict import error_rows
+from spinepipe.studies.cohort_stiffness.problem import specimen_tests
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024B
+from spinepipe.tables import TABLES, from_rows, read, read_frame
 
 ROOT = Path(__file__).parents[2]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
@@ -72,15 +77,21 @@ def places(test: str) -> list[tuple[str, dict[str, str]]]:
 def stiffness() -> pd.DataFrame:
     """60, 64, ... 80 N m/rad by specimen in all coordinates; twice that at L1L2 in level_ratio."""
     rows = [
-        {"specimen": specimen, **key, "joint": joint, "coordinate": name, "identifiable": True,
-         "stiffness": (60.0 + 4.0 * number) * (2.0 if ratio and joint == "L1L2" else 1.0)}
+        {
+            "specimen": specimen,
+            **key,
+            "joint": joint,
+            "coordinate": name,
+            "identifiable": True,
+            "stiffness": (60.0 + 4.0 * number) * (2.0 if ratio and joint == "L1L2" else 1.0),
+        }
         for test in TESTS
         for stage, key in places(test)
         if stage == "fitted"
         for ratio in [key["representation"] == "level_ratio"]
         for number, specimen in enumerate(SPECIMENS)
         for joint, name in product(JOINTS, LOADED.values())
-    ]  # fmt: skip
+    ]
     return frame("stiffness", rows)
 
 
@@ -91,31 +102,47 @@ def errors() -> pd.DataFrame:
     """
     size = {"literature": -2.0, "fitted": 0.5, "left_out_specimen": 1.0}
     rows = [
-        {"specimen": specimen, **key, "stage": stage, "test": test, "joint": joint,
-         "coordinate": name, "loaded": loaded, "measured_peak": -5.0 if loaded else 0.0,
-         "peak_error": size[stage] * (1.0 if loaded else 0.1) * (-1.0 if place % 2 and
-                       stage == "fitted" else 1.0)}
+        {
+            "specimen": specimen,
+            **key,
+            "stage": stage,
+            "test": test,
+            "joint": joint,
+            "coordinate": name,
+            "loaded": loaded,
+            "measured_peak": -5.0 if loaded else 0.0,
+            "peak_error": size[stage]
+            * (1.0 if loaded else 0.1)
+            * (-1.0 if place % 2 and stage == "fitted" else 1.0),
+        }
         for test in TESTS
         for stage, key in places(test)
         for specimen in SPECIMENS
         for place, joint in enumerate(JOINTS)
         for name in LOADED.values()
         for loaded in [name == LOADED[test]]
-    ]  # fmt: skip
+    ]
     return frame("errors", rows)
 
 
 def mae() -> pd.DataFrame:
     """2 deg (1.5 to 3) of 10 deg by literature, 1 deg by fits; at all steps something else."""
     rows = [
-        {**key, "stage": stage, "test": test, "steps": steps, "mae_deg": value,
-         "low_quartile_deg": 0.75 * value, "high_quartile_deg": 1.5 * value,
-         "mae_percent": 10.0 * value}
+        {
+            **key,
+            "stage": stage,
+            "test": test,
+            "steps": steps,
+            "mae_deg": value,
+            "low_quartile_deg": 0.75 * value,
+            "high_quartile_deg": 1.5 * value,
+            "mae_percent": 10.0 * value,
+        }
         for test in TESTS
         for stage, key in places(test)
         for steps in ("peak", "all")
         for value in [(2.0 if stage == "literature" else 1.0) + 7.0 * (steps == "all")]
-    ]  # fmt: skip
+    ]
     return frame("mae", rows)
 
 
@@ -123,11 +150,17 @@ def fits() -> pd.DataFrame:
     """All converged but that of s03 in axial rotation."""
     lost = {("s03", "left_axial_rotation", "per_specimen"): "not_converged"}
     rows = [
-        {"specimen": specimen, "representation": model, "fitted_to": test, "unknowns": unknowns,
-         "iterations": 6, "status": lost.get((specimen, test, model), "converged_at_bound")}
+        {
+            "specimen": specimen,
+            "representation": model,
+            "fitted_to": test,
+            "unknowns": unknowns,
+            "iterations": 6,
+            "status": lost.get((specimen, test, model), "converged_at_bound"),
+        }
         for model, unknowns in (("per_specimen", 3), ("level_ratio", 3), ("per_joint", 18))
         for specimen, test in product(SPECIMENS, TESTS)
-    ]  # fmt: skip
+    ]
     return frame("fits", rows)
 
 
@@ -142,9 +175,17 @@ def statistics() -> pd.DataFrame:
                     ("Kruskal-Wallis", "Friedman"), ("loaded_error", "rotation_error")
                 ):
                     rows.append(
-                        {"specimen": "*", "family": family, "test": name, "response": response,
-                         "stratum": test, "p": p, "statistic": 9.0, "n": 36}
-                    )  # fmt: skip
+                        {
+                            "specimen": "*",
+                            "family": family,
+                            "test": name,
+                            "response": response,
+                            "stratum": test,
+                            "p": p,
+                            "statistic": 9.0,
+                            "n": 36,
+                        }
+                    )
     for comparison, model, test in product(
         ("literature_against_fitted", "fitted_against_left_out_specimen"),
         ("per_specimen", "level_ratio"),
@@ -154,17 +195,32 @@ def statistics() -> pd.DataFrame:
         for number, specimen in enumerate(SPECIMENS):
             p = 0.001 if number < 2 else 0.04
             rows.append(
-                {"specimen": specimen, "family": family, "test": "Wilcoxon signed rank", "p": p,
-                 "p_bonferroni": min(1.0, 6.0 * p), "response": "rotation_error",
-                 "stratum": test, "n": 18}
-            )  # fmt: skip
+                {
+                    "specimen": specimen,
+                    "family": family,
+                    "test": "Wilcoxon signed rank",
+                    "p": p,
+                    "p_bonferroni": min(1.0, 6.0 * p),
+                    "response": "rotation_error",
+                    "stratum": test,
+                    "n": 18,
+                }
+            )
     for test, name in product(TESTS, (*LOADED.values(), "overall")):
         family = f"per_specimen_against_level_ratio/{test}"
         for kind, p in (("Kruskal-Wallis", 0.01), ("Wilcoxon signed rank", 0.03)):
             rows.append(
-                {"specimen": "*", "family": family, "test": kind, "response": f"{name}_rmse",
-                 "stratum": "fitted", "p": p, "statistic": 6.6, "n": 12}
-            )  # fmt: skip
+                {
+                    "specimen": "*",
+                    "family": family,
+                    "test": kind,
+                    "response": f"{name}_rmse",
+                    "stratum": "fitted",
+                    "p": p,
+                    "statistic": 6.6,
+                    "n": 12,
+                }
+            )
     common = {"joint": "*", "status": "done", "message": ""}
     return frame("statistics", [common | row for row in rows])
 
@@ -182,14 +238,14 @@ def tables() -> dict[str, pd.DataFrame]:
 
 @cache
 def complete() -> tuple[Any, ...]:
-    return tuple(judged(GOULD_2024B, Run(tables())))
+    return tuple(judged(CLAIMS, Run(tables())))
 
 
 def row_of(name: str, run: Run | None = None) -> dict[str, Any]:
     if run is None:
         (row,) = [row for row in complete() if row["id"] == name]
         return dict(row)
-    (claim,) = [claim for claim in GOULD_2024B if claim.id == name]
+    (claim,) = [claim for claim in CLAIMS if claim.id == name]
     return judge(claim, run)
 
 
@@ -338,7 +394,7 @@ def test_a_fit_that_did_not_move_is_counted() -> None:
 
 def test_only_what_was_put_in_is_circular() -> None:
     """Of Table 3 these are the loaded coordinates alone; nothing that was fitted in Table 4."""
-    found = {claim.id for claim in GOULD_2024B if claim.evidence.value == "circular"}
+    found = {claim.id for claim in CLAIMS if claim.evidence.value == "circular"}
     of_table_3 = {name for name in found if name.startswith("table_3")}
     pairs = LOADED.items()
     assert {tuple(name.split(".")[1:3]) for name in of_table_3} == set(pairs)
@@ -350,7 +406,7 @@ def test_only_what_was_put_in_is_circular() -> None:
 
 def test_every_cell_of_the_tables_has_its_row() -> None:
     """Tables 3 and 6 as distributions: 9 rows in 4 numbers, 12 groups of six."""
-    names = [claim.id for claim in GOULD_2024B]
+    names = [claim.id for claim in CLAIMS]
     assert len(set(names)) == len(names)
     of = {key: sum(name.startswith(f"{key}.") for name in names) for key in ("table_3", "mae")}
     assert of == {"table_3": 9 * 4, "mae": 2 * 3 * 2 * 3}
@@ -366,16 +422,19 @@ def test_every_contradiction_of_the_paper_is_told() -> None:
         pytest.skip("the list of consistency checks does not lie beside this repository")
     with CHECKS.open(encoding="utf-8") as file:
         rows = [row for row in csv.reader(file) if row and row[0] == "gould-2024b"]
-    wrong = {row[1] for row in rows if any(cell.startswith(("disagree", "typo", "differs"))
-             for cell in row)}  # fmt: skip
-    told = " ".join(str(row["reason"]) for row in judged(GOULD_2024B, EMPTY_RUN))
+    wrong = {
+        row[1]
+        for row in rows
+        if any(cell.startswith(("disagree", "typo", "differs")) for cell in row)
+    }
+    told = " ".join(str(row["reason"]) for row in judged(CLAIMS, EMPTY_RUN))
     named = {check for check in wrong if f"{check}:" in told}
     assert len(wrong) > 10
     assert wrong - named == set(NOT_APPLICABLE)
 
 
 def test_every_claim_has_a_reason() -> None:
-    bare = [claim.id for claim in GOULD_2024B if not (claim.outside or claim.contradicted)]
+    bare = [claim.id for claim in CLAIMS if not (claim.outside or claim.contradicted)]
     assert bare == []
 
 
@@ -395,7 +454,7 @@ def test_a_missing_or_empty_table_is_told(name: str) -> None:
     whole = tables()
     rest = {key: table for key, table in whole.items() if key != name}
     for run in (Run(rest), Run(rest | {name: whole[name].iloc[:0]})):
-        after = judged(GOULD_2024B, run)
+        after = judged(CLAIMS, run)
         changed = [new for old, new in zip(complete(), after, strict=True) if old != new]
         assert changed
         assert {row["verdict"] for row in changed} <= {"not_computed", "contradicted"}
@@ -437,7 +496,7 @@ def test_job_writes_the_table_with_its_origin(tmp_path: Path) -> None:
     output = tmp_path / "against_gould_2024b.parquet"
     against_gould_2024b.run(str(ROOT), STUDY, [], str(output))
     rows = read_frame(output)
-    assert list(rows["id"]) == [claim.id for claim in GOULD_2024B]
+    assert list(rows["id"]) == [claim.id for claim in CLAIMS]
     assert set(rows["verdict"]) == {"not_computed", "contradicted", "recomputed"}
     assert read(output).schema.metadata[b"study"] == STUDY.encode()
 
@@ -469,7 +528,14 @@ def _mean_rotation(root: Path) -> dict[str, float]:
     specimen = cohort.specimen_names[0]
     rows = error_rows(cohort, specimen, specimen_tests(settings, cohort, specimen), stiff)
     return {
-        test: float(np.mean([abs(row["peak_error"] + row["measured_peak"]) for row in rows
-                             if row["loaded"] and row["test"] == test]))
+        test: float(
+            np.mean(
+                [
+                    abs(row["peak_error"] + row["measured_peak"])
+                    for row in rows
+                    if row["loaded"] and row["test"] == test
+                ]
+            )
+        )
         for test in TESTS
-    }  # fmt: skip
+    }

@@ -13,10 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.jobs.cohort_stiffness import fit
-from spinepipe.jobs.discrepancy import search
-from spinepipe.jobs.discrepancy.layout import OTHERS, TABLES
-from spinepipe.studies import CohortStiffness, check
+from spinepipe.studies.cohort_stiffness import fit
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.discrepancy import job as search
+from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
+from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
 ROOT = Path(__file__).parents[2]

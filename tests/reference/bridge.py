@@ -5,8 +5,8 @@ import numpy as np
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import Equilibrium, System, follow
+from spinepipe.world import Chain as LoadedChain
 from tests.reference.peers.chain import Array, Chain
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
-from spinepipe.statics import Status, free_parameters
+from spinepipe.statics import free_parameters
+from spinepipe.status import Status
 from spinepipe.units import STIFFNESS_COLUMNS
 from tests.reference import bridge
 from tests.reference.peers import chain as chains

@@ -8,7 +8,8 @@ from scipy.optimize import brentq
 
 from spinepipe.frames import Pose
 from spinepipe.model import Body, RefusedModel
-from spinepipe.statics import Status, follow
+from spinepipe.statics import follow
+from spinepipe.status import Status
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers import newton

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinepipe.calibrate.forward_run import forward_run
+from spinepipe.calibrate.forward_runs import forward_run
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers.chain import Array, Chain, Load

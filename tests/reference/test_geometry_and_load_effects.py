@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
-from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import System, follow, observe
+from spinepipe.world import Chain as LoadedChain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load

@@ -14,8 +14,8 @@ from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion,
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.problems import InputError
-from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import System, follow
+from spinepipe.world import Chain as LoadedChain
 from tests.reference.peers.chain import Chain, Load
 
 pytest.importorskip("opensim")

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
-from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import System, follow
 from spinepipe.units import COORDINATES
+from spinepipe.world import Chain as LoadedChain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers.chain import Array, Chain
@@ -55,24 +55,57 @@ def on(
 
 
 ONE_COORDINATE = [
-    *(on("nonlinear_stiffening", c, ((12.0,), (4.0,), (25.0,)), EXPONENTIAL, 1e-4,
-         shape="exponential") for c in COORDINATES[3:]),
-    *(on("nonlinear_stiffening", c, ((30.0,), (75.0,), (9.0,)), TANGENT, shape="tangent")
-      for c in COORDINATES[3:]),
-    *(on("nonlinear_stiffening", c, ((50.0,), (20.0,), (400.0,)), CUBIC, shape="cubic")
-      for c in COORDINATES[3:]),
-    on("nonlinear_stiffening", "superior", ((500.0,), (200.0,), (900.0,)), EXPONENTIAL, 1e-6,
-       shape="exponential"),
-    *(on("neutral_zone", c, ((0.3, 0.03), (0.6, 0.04), (0.1, 0.01)), NEUTRAL_ZONE)
-      for c in COORDINATES[3:]),
+    *(
+        on(
+            "nonlinear_stiffening",
+            c,
+            ((12.0,), (4.0,), (25.0,)),
+            EXPONENTIAL,
+            1e-4,
+            shape="exponential",
+        )
+        for c in COORDINATES[3:]
+    ),
+    *(
+        on("nonlinear_stiffening", c, ((30.0,), (75.0,), (9.0,)), TANGENT, shape="tangent")
+        for c in COORDINATES[3:]
+    ),
+    *(
+        on("nonlinear_stiffening", c, ((50.0,), (20.0,), (400.0,)), CUBIC, shape="cubic")
+        for c in COORDINATES[3:]
+    ),
+    on(
+        "nonlinear_stiffening",
+        "superior",
+        ((500.0,), (200.0,), (900.0,)),
+        EXPONENTIAL,
+        1e-6,
+        shape="exponential",
+    ),
+    *(
+        on("neutral_zone", c, ((0.3, 0.03), (0.6, 0.04), (0.1, 0.01)), NEUTRAL_ZONE)
+        for c in COORDINATES[3:]
+    ),
     on("neutral_zone", "anterior", ((0.3, 1e-4), (0.6, 2e-4), (0.4, 1e-3)), NEUTRAL_ZONE),
-    *(on("flexion_extension_asymmetry", c, ((0.2,), (-0.4,), (0.7,)), ASYMMETRY, 1.7e-3)
-      for c in COORDINATES[3:]),
-    *(on("facet_contact", c, ((100.0, 0.01), (300.0, 0.005), (50.0, 0.0)), STOP, 3.5e-3, side=side)
-      for c in COORDINATES[3:] for side in ("positive", "negative")),
+    *(
+        on("flexion_extension_asymmetry", c, ((0.2,), (-0.4,), (0.7,)), ASYMMETRY, 1.7e-3)
+        for c in COORDINATES[3:]
+    ),
+    *(
+        on(
+            "facet_contact",
+            c,
+            ((100.0, 0.01), (300.0, 0.005), (50.0, 0.0)),
+            STOP,
+            3.5e-3,
+            side=side,
+        )
+        for c in COORDINATES[3:]
+        for side in ("positive", "negative")
+    ),
     *(on("level_dependence", c, ((1.3,), (0.5,), (2.0,)), SCALED) for c in COORDINATES[2:]),
     *(on("local_laxity", c, ((0.3,), (0.0,), (0.6,)), LAX) for c in COORDINATES[2:]),
-]  # fmt: skip
+]
 
 AGREEMENT = 1e-12
 """m and rad: both solve to rounding; these laws move the chains by 1e-5 and more."""
@@ -171,10 +204,14 @@ def add_bushing(model: Any, chain: Chain, joint: int, moments: dict[str, str]) -
 
 
 @SEEDS
-@pytest.mark.parametrize("pair", [
-    ("extension", "right_bending"), ("extension", "left_rotation"),
-    ("right_bending", "left_rotation"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ("extension", "right_bending"),
+        ("extension", "left_rotation"),
+        ("right_bending", "left_rotation"),
+    ],
+)
 def test_coupling_of_two_rotations(seed: int, n_joints: int, pair: tuple[str, str]) -> None:
     chain = chain_of(seed, n_joints)
     first, second = pair

@@ -9,7 +9,8 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 
 # One upright weightless joint with a spring k under a moment M about its axis of extension
 
@@ -27,10 +28,14 @@ def angle(
     springs = ScopedEffect(create("linear_bushing"), (0,), np.array([[1e5, UP, 1e5, K, K, TURN]]))
     law = ScopedEffect(create(name, options), (0,), np.array([values]))
     model = SpineModel(
-        "one", ("J0",), (Pose(np.eye(3), np.zeros(3)),),
+        "one",
+        ("J0",),
+        (Pose(np.eye(3), np.zeros(3)),),
         (Body("V0", 0.1, np.array([0.0, 0.02, 0.0]), 1e-4 * np.eye(3)),),
-        np.zeros(3), np.array([[1e3] * 3 + [2.0] * 3]), (springs, law),
-    )  # fmt: skip
+        np.zeros(3),
+        np.array([[1e3] * 3 + [2.0] * 3]),
+        (springs, law),
+    )
     force, turning = np.array([0.0, -compression, 0.0]), np.array([0.0, 0.0, moment])
     wrenches = (Wrench(0, np.zeros(3), force, turning),)
     case = LoadCase("test", 1, (LoadStep(0, wrenches),))
@@ -81,8 +86,10 @@ class TestOneJoint:
         assert found[3] == pytest.approx(expected, abs=1e-14)
 
     def test_level_and_laxity(self, moment: float) -> None:
-        stiff, lax = (angle(moment, n, {}, v)[3] for n, v in (("level_dependence", 1.3),
-                                                             ("local_laxity", 0.3)))  # fmt: skip
+        stiff, lax = (
+            angle(moment, n, {}, v)[3]
+            for n, v in (("level_dependence", 1.3), ("local_laxity", 0.3))
+        )
         assert stiff == pytest.approx(moment / (1.3 * K), abs=1e-14)
         assert lax == pytest.approx(moment / (0.7 * K), abs=1e-14)
 

@@ -7,9 +7,11 @@ import pytest
 
 from spinepipe.effects import create
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, Status, System, follow
+from spinepipe.statics import System, follow
 from spinepipe.statics.holding import hold
 from spinepipe.statics.many import Cases, Spines, solve_many
+from spinepipe.status import Status
+from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 
@@ -31,9 +33,11 @@ def varied(model: SpineModel, rng: np.random.Generator) -> Spines:
         inertias=spines.inertias * scale[..., None, None],
         coms=spines.coms + rng.normal(0.0, 3e-3, shape),
         damping=spines.damping * np.exp(rng.normal(0.0, 0.3, spines.damping.shape)),
-        values=(spines.values[0] * np.exp(rng.normal(0.0, 0.2, spines.values[0].shape)),
-                *spines.values[1:]),
-    )  # fmt: skip
+        values=(
+            spines.values[0] * np.exp(rng.normal(0.0, 0.2, spines.values[0].shape)),
+            *spines.values[1:],
+        ),
+    )
 
 
 def loaded(case: LoadCase, rng: np.random.Generator, share: float = 1.0) -> Cases:

@@ -9,7 +9,8 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 
 SPRING = 40.0
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}

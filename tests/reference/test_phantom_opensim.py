@@ -13,8 +13,8 @@ from spinepipe.cohort import read
 from spinepipe.cohort.specimen import joint_frames, load_cases, spine_model
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
-from spinepipe.statics import Chain as LoadedChain
 from spinepipe.statics import System, follow
+from spinepipe.world import Chain as LoadedChain
 from tests.generators.phantom import SEED, Phantom, phantom
 from tests.reference.peers.chain import Array, Chain, Load
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinepipe.statics import Program, Status, settle
+from spinepipe.statics import Program, settle
+from spinepipe.status import Status
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load

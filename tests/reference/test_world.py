@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Chain as LoadedChain
+from spinepipe.world import Chain as LoadedChain
 from spinepipe.world import StaleChain
 from tests.reference.bridge import spine_model, system
 from tests.reference.peers import chain as chains

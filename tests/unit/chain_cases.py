@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from spinepipe.jobs.cohort_stiffness import fit, left_out, literature, pool
+from spinepipe.studies.cohort_stiffness import fit, left_out, literature, pool
 from spinepipe.tables import read_frame
 
 STUDY = "probe"

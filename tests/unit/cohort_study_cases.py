@@ -11,7 +11,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.studies import CohortStiffness
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.tables import TABLES, from_rows
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, STIFFNESS_UNITS
 
@@ -55,8 +55,13 @@ class Size:
 
 def study_of(size: Size, **more: Any) -> CohortStiffness:
     """A study of the cohort."""
-    return CohortStiffness(study="probe", kind="cohort_stiffness", cohort="made_up",
-                           representations=size.representations, **more)  # fmt: skip
+    return CohortStiffness(
+        study="probe",
+        kind="cohort_stiffness",
+        cohort="made_up",
+        representations=size.representations,
+        **more,
+    )
 
 
 def cohort_of(size: Size) -> Cohort:
@@ -152,8 +157,10 @@ def _stiffness(size: Size, rng: np.random.Generator) -> Iterator[Row]:
 
 
 def _errors(size: Size, rng: np.random.Generator) -> Iterator[Row]:
-    keys = [(name, "nothing", "literature", "literature")
-            for name in ("literature", "literature_levels")]  # fmt: skip
+    keys = [
+        (name, "nothing", "literature", "literature")
+        for name in ("literature", "literature_levels")
+    ]
     keys += list(_stages(size))
     for (name, label, source, stage), specimen, test, joint, coordinate in product(
         keys, size.specimens, size.tests, size.joints, COORDINATES

@@ -11,7 +11,8 @@ import pandas as pd
 import pyarrow as pa
 from chain_cases import JOINTS, ROTATIONS, STUDY, Chains
 
-from spinepipe.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE, Table, from_rows, write
+from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.tables import Table, from_rows, write
 
 Rows = list[dict[str, Any]]
 
@@ -65,10 +66,21 @@ _COMMON = {
         },
     ],
     "noise": {"source": "repeats", "rotation_sd_deg": 0.1, "serial_correlation": 0.3},
-    "rms_residual": {"unit": "noise sd", "base": 1.01, "with_effects": 1.01,
-                     "held_out_base": 1.04, "held_out_with_effects": 1.04},
-    "gap": {"unit": "noise sd", "base": 0.14, "with_effects": 0.14, "held_out_base": 0.28,
-            "held_out_with_effects": 0.28, "held_out_closed": None},
+    "rms_residual": {
+        "unit": "noise sd",
+        "base": 1.01,
+        "with_effects": 1.01,
+        "held_out_base": 1.04,
+        "held_out_with_effects": 1.04,
+    },
+    "gap": {
+        "unit": "noise sd",
+        "base": 0.14,
+        "with_effects": 0.14,
+        "held_out_base": 0.28,
+        "held_out_with_effects": 0.28,
+        "held_out_closed": None,
+    },
     "smallest_detectable": [
         {"name": name, "gap": round(0.15 + 0.3 * absorbed, 2)}
         for name, (_, absorbed, _) in EFFECTS.items()
@@ -77,45 +89,79 @@ _COMMON = {
     "suspected_data_errors": [],
     "why": "",
     "threshold": {"log_evidence": 6.2, "false_alarm": 0.01, "draws": 500},
-}  # fmt: skip
+}
 _OPEN = {
-    "rms_residual": {"unit": "noise sd", "base": 4.1, "with_effects": 1.02,
-                     "held_out_base": 4.3, "held_out_with_effects": 1.06},
-    "gap": {"unit": "noise sd", "base": 3.98, "with_effects": 0.2, "held_out_base": 4.18,
-            "held_out_with_effects": 0.35, "held_out_closed": 0.97},
-}  # fmt: skip
+    "rms_residual": {
+        "unit": "noise sd",
+        "base": 4.1,
+        "with_effects": 1.02,
+        "held_out_base": 4.3,
+        "held_out_with_effects": 1.06,
+    },
+    "gap": {
+        "unit": "noise sd",
+        "base": 3.98,
+        "with_effects": 0.2,
+        "held_out_base": 4.18,
+        "held_out_with_effects": 0.35,
+        "held_out_closed": 0.97,
+    },
+}
 VERDICTS: dict[str, dict[str, Any]] = {
-    "NAMED": _COMMON | _OPEN | {
+    "NAMED": _COMMON
+    | _OPEN
+    | {
         "verdict": "NAMED",
         "effects": [_NAMED],
         "why": "the neutral zone beats every rival by more than the margin",
         "detected_from": "flexion",
     },
     "NULL": _COMMON | {"verdict": "NULL"},
-    "SET": _COMMON | _OPEN | {
+    "SET": _COMMON
+    | _OPEN
+    | {
         "verdict": "SET",
         "candidates_in_set": [
             _NAMED,
-            {"name": "nonlinear_stiffening", "kind": "joint law", "scope": _SCOPE,
-             "log_evidence": 86.5},
+            {
+                "name": "nonlinear_stiffening",
+                "kind": "joint law",
+                "scope": _SCOPE,
+                "log_evidence": 86.5,
+            },
         ],
         "suspected_data_errors": [
-            {"where": "specimen b, flexion, cycle 2, L3L4", "what": "sign flipped",
-             "evidence": "slope on the other cycles is -0.98"},
+            {
+                "where": "specimen b, flexion, cycle 2, L3L4",
+                "what": "sign flipped",
+                "evidence": "slope on the other cycles is -0.98",
+            },
         ],
-        "gap": {**_OPEN["gap"], "with_effects": 3.98, "held_out_with_effects": None,
-                "held_out_closed": None},
+        "gap": {
+            **_OPEN["gap"],
+            "with_effects": 3.98,
+            "held_out_with_effects": None,
+            "held_out_closed": None,
+        },
         "rms_residual": {**_OPEN["rms_residual"], "with_effects": 4.1},
     },
-    "UNKNOWN": _COMMON | _OPEN | {
+    "UNKNOWN": _COMMON
+    | _OPEN
+    | {
         "verdict": "UNKNOWN",
-        "unknown": {"where": "L4L5, flexion-extension, in flexion above 5 N m",
-                    "shape": "one side only, grows with the cube of the angle"},
-        "gap": {**_OPEN["gap"], "with_effects": 3.98, "held_out_with_effects": None,
-                "held_out_closed": None},
+        "unknown": {
+            "where": "L4L5, flexion-extension, in flexion above 5 N m",
+            "shape": "one side only, grows with the cube of the angle",
+        },
+        "gap": {
+            **_OPEN["gap"],
+            "with_effects": 3.98,
+            "held_out_with_effects": None,
+            "held_out_closed": None,
+        },
         "rms_residual": {**_OPEN["rms_residual"], "with_effects": 4.1},
     },
-}  # fmt: skip
+}
 """What a search may come to, as ``verdict.json`` holds it."""
 
 
@@ -178,8 +224,17 @@ def _gap(wide: bool, named: bool) -> Rows:
         key = {"specimen": specimen, "test": test, "step": step, "joint": joint}
         values = {"measured": measured, "base": base, "with_effects": modelled}
         values |= {"held_out_base": base, "held_out_with_effects": modelled}
-        rows.append({**key, "coordinate": coordinate, "unit": "deg", "readings": 2, **values,
-                     "noise_sd": SD_DEG, "held_out_fold": f"specimen {specimen}"})  # fmt: skip
+        rows.append(
+            {
+                **key,
+                "coordinate": coordinate,
+                "unit": "deg",
+                "readings": 2,
+                **values,
+                "noise_sd": SD_DEG,
+                "held_out_fold": f"specimen {specimen}",
+            }
+        )
     return rows
 
 
@@ -198,32 +253,69 @@ def _where(wide: bool, named: bool) -> Rows:
         worst &= place.get("coordinate", "extension") == "extension"
         left = wide and not (named and model == "with_effects")
         gap = 9.3 if worst and left else 1.1 if by in ("all", "step") and left else 0.0
-        rows.append({"by": by, **everywhere, **place, "readings": 24, "model": model, "gap": gap,
-                     "gap_low": 0.8 * gap, "gap_high": 1.2 * gap + 0.1,
-                     "rms_residual": (1.0 + gap**2) ** 0.5})  # fmt: skip
+        rows.append(
+            {
+                "by": by,
+                **everywhere,
+                **place,
+                "readings": 24,
+                "model": model,
+                "gap": gap,
+                "gap_low": 0.8 * gap,
+                "gap_high": 1.2 * gap + 0.1,
+                "rms_residual": (1.0 + gap**2) ** 0.5,
+            }
+        )
     return rows
 
 
 def _candidates(wide: bool) -> Rows:
     rows = []
     for name, (kind, absorbed, evidence) in EFFECTS.items():
-        told = {"effect": name, "kind": kind, "variant": '{"coordinate": "extension"}',
-                "spread": "one joint", "shape": "{}", "parameters": 1, "unit": "",
-                "absorbed": absorbed, "detectable_gap": 0.15 + 0.3 * absorbed,
-                "status": "converged", "message": ""}  # fmt: skip
+        told = {
+            "effect": name,
+            "kind": kind,
+            "variant": '{"coordinate": "extension"}',
+            "spread": "one joint",
+            "shape": "{}",
+            "parameters": 1,
+            "unit": "",
+            "absorbed": absorbed,
+            "detectable_gap": 0.15 + 0.3 * absorbed,
+            "status": "converged",
+            "message": "",
+        }
         rows.append({**told, "stage": "design", "scope": "*"})
         for joint, share in (("L4L5", 1.0), ("L3L4", 0.2)):
             found = share * evidence if wide else -2.0 + absorbed
-            fit = {"scope": joint, "log_evidence": 0.9 * found, "delta_chi2": 2.0 * found,
-                   "gap_share": 0.5, "threshold": 6.2, "estimate": 0.2}  # fmt: skip
+            fit = {
+                "scope": joint,
+                "log_evidence": 0.9 * found,
+                "delta_chi2": 2.0 * found,
+                "gap_share": 0.5,
+                "threshold": 6.2,
+                "estimate": 0.2,
+            }
             rows.append({**told, "stage": "screen 1", **fit})
             if joint == "L4L5" and wide and found > 20.0:
                 rows.append({**told, "stage": "refit 1", **fit, "log_evidence": found})
     for name, kind in HIDDEN.items():
-        rows.append({"stage": "design", "effect": name, "kind": kind, "variant": "{}",
-                     "spread": "shared", "scope": "*", "shape": "{}", "parameters": 1, "unit": "",
-                     "absorbed": 0.999, "status": "not_testable",
-                     "message": "absorbed by the base"})  # fmt: skip
+        rows.append(
+            {
+                "stage": "design",
+                "effect": name,
+                "kind": kind,
+                "variant": "{}",
+                "spread": "shared",
+                "scope": "*",
+                "shape": "{}",
+                "parameters": 1,
+                "unit": "",
+                "absorbed": 0.999,
+                "status": "not_testable",
+                "message": "absorbed by the base",
+            }
+        )
     return rows
 
 
@@ -242,8 +334,16 @@ def _held_out(wide: bool, named: bool) -> Rows:
     for number, (kind, name) in enumerate(folds):
         base = 3.9 + 0.2 * number if wide else 1.0 + 0.01 * number
         done = {"status": "converged", "message": ""}
-        rows.append({"fold": f"{kind} {name}", "kind": kind, "readings": 216, "rms_base": base,
-                     "rms_with_effects": 1.03 + 0.01 * number if named else base,
-                     "rms_surrogate": 2.1 + 0.1 * number if wide else None,
-                     "closed": 0.97 if named else None, **done})  # fmt: skip
+        rows.append(
+            {
+                "fold": f"{kind} {name}",
+                "kind": kind,
+                "readings": 216,
+                "rms_base": base,
+                "rms_with_effects": 1.03 + 0.01 * number if named else base,
+                "rms_surrogate": 2.1 + 0.1 * number if wide else None,
+                "closed": 0.97 if named else None,
+                **done,
+            }
+        )
     return rows

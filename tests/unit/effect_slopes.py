@@ -9,7 +9,6 @@ from spinepipe.effects import GeometryEffect
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
-    Chain,
     FreeParameter,
     System,
     by_parameters,
@@ -20,6 +19,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
+from spinepipe.world import Chain
 
 STEP = 1e-3
 """m and rad: fourth-order differences over it are good to 1e-12 of smooth functions of order 1."""

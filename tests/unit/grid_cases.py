@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from spinepipe.tables import RANGE_OF_MOTION, from_rows, write
+from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
+from spinepipe.tables import from_rows, write
 
 STUDY = "probe"
 STIFFNESS = {
@@ -75,12 +76,18 @@ def table_of(
             names = [c.name for c in RANGE_OF_MOTION.columns if c.name.startswith("predicted")]
             rows.append(
                 {
-                    "specimen": "abc"[specimen], "pose": pose, "stiffness": stiffness,
-                    "test": test, "step": 10, "largest_load": True, "joint": joint,
+                    "specimen": "abc"[specimen],
+                    "pose": pose,
+                    "stiffness": stiffness,
+                    "test": test,
+                    "step": 10,
+                    "largest_load": True,
+                    "joint": joint,
                     **dict(zip(names, values, strict=True)),
-                    "status": "unstable" if gone else "converged", "message": "",
+                    "status": "unstable" if gone else "converged",
+                    "message": "",
                 }
-            )  # fmt: skip
+            )
     path = root / "range_of_motion.parquet"
     write(from_rows(RANGE_OF_MOTION, rows), path, {})
     return path, pd.DataFrame(rows)

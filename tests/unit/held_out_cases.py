@@ -5,23 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.discrepancy.base import base_parameters
-from spinepipe.discrepancy.forms import Form, Variant
-from spinepipe.discrepancy.found import Found
-from spinepipe.discrepancy.gaps import whole_gap
-from spinepipe.discrepancy.grounds import Grounds, Start, laid
-from spinepipe.discrepancy.hypothesis import Supposed
-from spinepipe.discrepancy.joint_fit import joint_fit
-from spinepipe.discrepancy.lack_of_fit import LackOfFit
-from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.nuisance import NuisancePriors
-from spinepipe.discrepancy.prediction import Simulated
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.studies.discrepancy.search.gaps import whole_gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant, base_parameters
+from spinepipe.studies.discrepancy.search.inquiry import Found
+from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
+from spinepipe.studies.discrepancy.search.prediction import Simulated
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
 JOINTS = 2

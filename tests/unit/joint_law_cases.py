@@ -20,8 +20,10 @@ NAMES = (
 )
 
 ON_TRANSLATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
-    *(("nonlinear_stiffening", {"coordinate": "superior", "shape": shape})
-      for shape in ("exponential", "tangent", "cubic")),
+    *(
+        ("nonlinear_stiffening", {"coordinate": "superior", "shape": shape})
+        for shape in ("exponential", "tangent", "cubic")
+    ),
     ("neutral_zone", {"coordinate": "anterior"}),
     ("flexion_extension_asymmetry", {"coordinate": "right"}),
     ("bending_rotation_coupling", {"pair": ("anterior", "extension")}),
@@ -29,7 +31,7 @@ ON_TRANSLATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("facet_contact", {"coordinate": "anterior", "side": "negative"}),
     ("level_dependence", {"coordinate": "right"}),
     ("local_laxity", {"coordinate": "superior"}),
-)  # fmt: skip
+)
 
 VARIANTS = tuple((name, dict(v)) for name in NAMES for v in registered()[name].trial.variants)
 

@@ -8,7 +8,8 @@ from example_effects import NOWHERE, scoped, spine
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, System, follow
+from spinepipe.statics import System, follow
+from spinepipe.world import Chain
 
 FLEXING = np.array([0.1, 0.05, 1.0])
 EXTENSION_SPRING = 41.0

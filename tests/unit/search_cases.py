@@ -8,15 +8,15 @@ import spring_chain_cases as chains
 from numpy.typing import NDArray
 from spring_chain_cases import Yield
 
-from spinepipe.discrepancy.forms import trials
-from spinepipe.discrepancy.found import Found, Rules
-from spinepipe.discrepancy.grounds import Grounds, laid
-from spinepipe.discrepancy.noise import estimated_noise
-from spinepipe.discrepancy.nuisance import NuisancePriors
-from spinepipe.discrepancy.outcome import Outcome, outcome
-from spinepipe.discrepancy.readings import SpecimenReadings
-from spinepipe.discrepancy.search import search
-from spinepipe.discrepancy.tasks import at_once
+from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
+from spinepipe.studies.discrepancy.search.hypothesis import trials
+from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.noise import estimated_noise
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
+from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.search import search
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
 Array = NDArray[np.float64]

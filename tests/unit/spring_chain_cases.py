@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.discrepancy.base import base_parameters
-from spinepipe.discrepancy.grounds import Start
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.studies.discrepancy.search.grounds import Start
+from spinepipe.studies.discrepancy.search.hypothesis import base_parameters
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import ROTATIONS
 
 Array = NDArray[np.float64]

@@ -7,7 +7,8 @@ import numpy as np
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.tables import CALIBRATIONS, POSES, SIMULATIONS, Table, to_arrow, write
+from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
+from spinepipe.tables import Table, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"

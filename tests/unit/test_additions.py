@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from testable_cases import case_of
 
-from spinepipe.discrepancy.design.additions import MENU
-from spinepipe.discrepancy.design.load_changes import comes_back
-from spinepipe.discrepancy.design.plans import Plan, Planned, as_made, thinned
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.model import LoadCase
+from spinepipe.studies.discrepancy.design.extra_tests import MENU
+from spinepipe.studies.discrepancy.design.plans import Plan, Planned, as_made, comes_back, thinned
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
 
 def plan_of(*cases: LoadCase, zeroed: bool = True) -> Plan:

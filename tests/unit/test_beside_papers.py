@@ -7,11 +7,12 @@ from identification_cases import identification
 from study_cases import STUDY, Size, project, results
 
 from spinepipe import cohort as cohorts
-from spinepipe.jobs import figures
-from spinepipe.jobs.layout import FIGURES
 from spinepipe.jobs.layouts import JOINED, files_of
 from spinepipe.report import published
-from spinepipe.studies import KINDS, Study
+from spinepipe.studies.joint_pose_sensitivity import draw as figures
+from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
+from spinepipe.studies.read import KINDS
+from spinepipe.studies.study import Study
 
 COHORTS = Path(__file__).resolve().parents[2] / "config" / "cohorts"
 

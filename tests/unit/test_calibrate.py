@@ -16,22 +16,16 @@ from example_effects import (
 )
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
-from spinepipe.calibrate.fit import _stand_up
+from spinepipe.calibrate.fit import stand_up
 from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, SpineModel
-from spinepipe.statics import (
-    Chain,
-    FreeParameter,
-    Status,
-    System,
-    follow,
-    free_parameters,
-    moved,
-    observe,
-)
-from spinepipe.tables import CALIBRATIONS, to_arrow
+from spinepipe.statics import FreeParameter, System, follow, free_parameters, moved, observe
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
+from spinepipe.tables import to_arrow
+from spinepipe.world import Chain
 
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)
@@ -178,8 +172,10 @@ def test_two_unknowns_of_which_only_the_sum_shows_are_not_identifiable() -> None
     """A gain of the reading and a stiffness do the same to small motion of a linear joint."""
     model = spine(1, gravity=False, effects=(scoped(MarkerError(), (0,)),))
     model = model.with_frames((replace(model.frames[0], rotation=np.eye(3)),))
-    free = (*free_parameters(model, 0, ROTATIONS[:1], "per_specimen"),
-            *free_parameters(model, 1, ["gain"], "per_specimen"))  # fmt: skip
+    free = (
+        *free_parameters(model, 0, ROTATIONS[:1], "per_specimen"),
+        *free_parameters(model, 1, ["gain"], "per_specimen"),
+    )
     bend = Wrench(0, NOWHERE, NOWHERE, np.array([0.0, 0.0, 3.0]))
     case = LoadCase("bend", 1, tuple(LoadStep(i, (bend,)) for i in range(4)))
     problem = problem_of(model, free, np.zeros(2), 0.4, case)
@@ -256,7 +252,7 @@ def test_stiffening_leaves_offsets_where_they_are() -> None:
         lower=np.array([-1.0, -1.0, -1.0, -0.02]),
         upper=np.array([6.0, 6.0, 6.0, 0.02]),
     )
-    start, times = _stand_up(Evaluator(soft), np.zeros(4))
+    start, times = stand_up(Evaluator(soft), np.zeros(4))
     assert times > 0
     assert start[3] == 0.0
 
@@ -336,8 +332,9 @@ def test_unread_steps_and_unweighted_readings_change_nothing() -> None:
     measured[1] = np.nan
     measured[2, 0, :3] = 17.0  # nonsense, but its weight is zero
     weights = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
-    found = fit(replace(problem, cases=(replace(problem.cases[0], measured=measured),),
-                        weights=weights))  # fmt: skip
+    found = fit(
+        replace(problem, cases=(replace(problem.cases[0], measured=measured),), weights=weights)
+    )
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=1e-6)
     assert len(found.poses[0]) == len(found.cases[0].case.steps) == 2
     np.testing.assert_array_equal(found.cases[0].measured, measured[[0, 2]])
@@ -408,9 +405,11 @@ def test_uncertainty_of_a_known_jacobian_in_closed_form() -> None:
     problem = replace(problem_of(model, free, np.zeros(1)), weights=np.array([0, 0, 0, 4.0, 1, 1]))
     evaluation = replace(
         Evaluator(problem).at(np.zeros(1)),
-        residual=np.zeros(2), jacobian=np.array([[6.0], [8.0]]), coordinate=np.array([3, 4]),
+        residual=np.zeros(2),
+        jacobian=np.array([[6.0], [8.0]]),
+        coordinate=np.array([3, 4]),
         sharing=np.full(2, -1),
-    )  # fmt: skip
+    )
     noise = np.deg2rad(np.full(6, 0.5))
     found = uncertainty(problem, evaluation, np.zeros(1, dtype=int), 1.0, noise)
     # x = (6 e1 + 8 e2) / 100 with e1 = 2 x 0.5 deg and e2 = 1 x 0.5 deg

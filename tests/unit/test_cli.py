@@ -94,8 +94,11 @@ def test_show_without_landmarks_bodies_motion(
 def test_show_moments_of_several_tests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     header = "specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm"
     tests = {"flexion": "0,0,-7.5", "right_bending": "7.5,0,0", "left_rotation": "0,7.5,0"}
-    rows = [f"*,{test},{step},L2,0,0,0,{moment if step else '0,0,0'}"
-            for test, moment in tests.items() for step in (0, 1)]  # fmt: skip
+    rows = [
+        f"*,{test},{step},L2,0,0,0,{moment if step else '0,0,0'}"
+        for test, moment in tests.items()
+        for step in (0, 1)
+    ]
     loads = text("loads.csv", "\n".join([header, *rows]) + "\n")
     write(tmp_path / "config/cohorts/small", loads, without("motion.csv"))
     code, out, _ = run(capsys, "--root", tmp_path, "show", "small")
@@ -213,9 +216,13 @@ def test_doctor_finds_results_that_cannot_be_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("code", "out", "says"),
-    [(-11, "", r"crashed \(SIGSEGV\)"), (1, "", "engine failed: no pybullet"),
-     (0, "0.5\n", "5.0e-01 from the closed form"), (0, "nan\n", "nan from the closed form")],
-)  # fmt: skip
+    [
+        (-11, "", r"crashed \(SIGSEGV\)"),
+        (1, "", "engine failed: no pybullet"),
+        (0, "0.5\n", "5.0e-01 from the closed form"),
+        (0, "nan\n", "nan from the closed form"),
+    ],
+)
 def test_doctor_finds_an_unsound_engine(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, code: int, out: str, says: str
 ) -> None:

@@ -7,31 +7,37 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.jobs.cohort_stiffness.claims import Claim, above_zero
-from spinepipe.jobs.cohort_stiffness.error_findings import (
+from spinepipe.jobs.tested_rows import corrected_rows
+from spinepipe.statistics import mean_of
+from spinepipe.studies.cohort_stiffness.claims import (
     OWN_READINGS,
+    Claim,
+    above_zero,
     error_findings,
     every_level,
     overprediction_percent,
 )
-from spinepipe.jobs.cohort_stiffness.findings import finding_rows
-from spinepipe.jobs.cohort_stiffness.load_case_findings import (
+from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     adjusted_share,
+    finding_rows,
     load_case_findings,
     loaded_ratios,
     mean_excess,
+    share_between,
     specific,
+    stiffness_spreads,
 )
-from spinepipe.jobs.cohort_stiffness.load_case_tests import nested_fits
-from spinepipe.jobs.cohort_stiffness.mae import mae_rows
-from spinepipe.jobs.cohort_stiffness.ranking import ranked, ranking_rows
-from spinepipe.jobs.cohort_stiffness.spread_findings import share_between, stiffness_spreads
-from spinepipe.jobs.cohort_stiffness.statistics import all_tests
-from spinepipe.jobs.tested_rows import corrected_rows
-from spinepipe.report.stage_errors import of_joint_fits, of_single_cases
-from spinepipe.statistics import mean_of
-from spinepipe.tables import FINDINGS, MAE, RANKING, STATISTICS, from_rows
-from spinepipe.tables.specimen_errors import specimen_rms, without_result
+from spinepipe.studies.cohort_stiffness.ranking import mae_rows, ranked, ranking_rows
+from spinepipe.studies.cohort_stiffness.significance import all_tests, nested_fits
+from spinepipe.studies.cohort_stiffness.stages import (
+    of_joint_fits,
+    of_single_cases,
+    specimen_rms,
+    without_result,
+)
+from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING
+from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
+from spinepipe.tables import from_rows
 from spinepipe.units import ROTATIONS
 
 CLAIM = Claim("name", "It is so.", "a number", "deg")
@@ -212,11 +218,18 @@ def test_spreads_of_the_cohort_count_once_in_its_criteria() -> None:
     )
     fits = pd.concat([fits, fits.assign(fitted_to="x"), fits.assign(fitted_to="y")])
     pooling = pd.DataFrame(
-        {"fitted_to": label, "without": who, "coordinate": c, "between_levels": level,
-         "between_specimens": 0.2, "between_joints": 0.1}
-        for label in ("all", "x") for who in ("nobody", "a")
+        {
+            "fitted_to": label,
+            "without": who,
+            "coordinate": c,
+            "between_levels": level,
+            "between_specimens": 0.2,
+            "between_joints": 0.1,
+        }
+        for label in ("all", "x")
+        for who in ("nobody", "a")
         for c, level in (("extension", 0.1), ("right_bending", None))
-    )  # fmt: skip
+    )
     errors = pd.DataFrame([seen("a", "L5S1", 1.0)])
     table = pd.DataFrame(ranking_rows(errors, fits, pooling))
     aicc = only(table, criterion="aicc", representation="partially_pooled")
@@ -749,10 +762,17 @@ def test_without_cross_validation_nothing_is_ranked_by_it() -> None:
 
 def test_pooled_spreads_are_told_beside() -> None:
     pooling = [
-        {"fitted_to": "all", "without": who, "coordinate": "extension", "between_specimens": value,
-         "between_levels": None, "status": "converged", "message": ""}
+        {
+            "fitted_to": "all",
+            "without": who,
+            "coordinate": "extension",
+            "between_specimens": value,
+            "between_levels": None,
+            "status": "converged",
+            "message": "",
+        }
         for who, value in (("nobody", 0.25), ("a", 0.5))
-    ]  # fmt: skip
+    ]
     rows = list(stiffness_spreads(pd.DataFrame(rated()), pd.DataFrame(pooling), 0.05))
     assert "SD of the logarithm 0.25" in rows[0]["message"]
     assert "pooled" not in rows[1]["message"]

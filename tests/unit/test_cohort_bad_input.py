@@ -206,8 +206,14 @@ def test_every_problem_of_every_file_comes_in_one_error(tmp_path: Path) -> None:
         cohort.read(folder)
     problems = caught.value.problems
     assert [problem.file.partition("/")[2] for problem in problems] == [
-        YAML, SPECIMENS, LANDMARKS, BODIES, MOTION, MOTION, LOADS,
-    ]  # fmt: skip
+        YAML,
+        SPECIMENS,
+        LANDMARKS,
+        BODIES,
+        MOTION,
+        MOTION,
+        LOADS,
+    ]
     text_ = str(caught.value)
     assert text_.startswith("7 problems in the input:")
     assert len(text_.splitlines()) == 8

@@ -18,11 +18,11 @@ from scipy.optimize import brentq
 
 from spinepipe import studies
 from spinepipe.effects import register, registry
-from spinepipe.jobs.cohort_stiffness.base_model import NOT_HELD_OUT, SEEN, given_digest
-from spinepipe.jobs.cohort_stiffness.report import HELD_OUT, _with_base
 from spinepipe.problems import InputError
-from spinepipe.report.page.results import Results
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.page.document import Results
+from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN, given_digest
+from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
@@ -63,10 +63,13 @@ def stiffening(
     noise = noise_deg * np.random.default_rng(8).normal(size=len(chains.motion))
     rises = rises or dict.fromkeys(TRUTH, RISE)
     angles = [
-        turned(MOMENT_OF[row.test][1] * 2.0 * row.step,
-               TRUTH[row.specimen][JOINTS.index(row.joint)][0], rises[row.specimen])
+        turned(
+            MOMENT_OF[row.test][1] * 2.0 * row.step,
+            TRUTH[row.specimen][JOINTS.index(row.joint)][0],
+            rises[row.specimen],
+        )
         for row in chains.motion.itertuples()
-    ]  # fmt: skip
+    ]
     chains.motion["extension_deg"] = np.array(angles) + noise
     root.mkdir(exist_ok=True)
     os.chdir(root)  # where commands are run; the test ends where it began

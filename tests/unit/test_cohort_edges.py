@@ -27,15 +27,17 @@ from chain_cases import (
 
 from spinepipe import studies
 from spinepipe.calibrate import pool as pooled
-from spinepipe.jobs.cohort_stiffness import findings, literature, mae, pool, ranking, statistics
-from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, CohortLayout
-from spinepipe.jobs.cohort_stiffness.load_case_tests import load_case_specific
-from spinepipe.jobs.cohort_stiffness.predict import predicted
-from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.statics import Status
-from spinepipe.studies import CohortStiffness
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness import claims_of_stiffness as findings
+from spinepipe.studies.cohort_stiffness import literature, pool, ranking
+from spinepipe.studies.cohort_stiffness import ranking as mae
+from spinepipe.studies.cohort_stiffness import significance as statistics
+from spinepipe.studies.cohort_stiffness.kind import COHORT_ANALYSES, CohortLayout
+from spinepipe.studies.cohort_stiffness.predict import predicted
+from spinepipe.studies.cohort_stiffness.problem import specimen_tests, start_stiffness
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.significance import load_case_specific
 from spinepipe.tables import TABLES, read, read_frame, to_arrow
 from spinepipe.tables import write as write_table
 from spinepipe.units import COORDINATES
@@ -589,8 +591,10 @@ def test_correlated_readings_at_the_published_cost_have_no_likelihood(tmp_path: 
     project = Chains(TRUTH, noise_deg=0.02, zeroed=True, study=PUBLISHED).write(tmp_path)
     labels = (*TESTS, "all")
     by = {"specimen": "a", "representation": "per_specimen"}
-    fits = pd.concat(project.fit("a", "per_specimen", label)["fits"].assign(fitted_to=label, **by)
-                     for label in labels)  # fmt: skip
+    fits = pd.concat(
+        project.fit("a", "per_specimen", label)["fits"].assign(fitted_to=label, **by)
+        for label in labels
+    )
     pooled = project.pool()
     for rows in (fits, pooled["fits"]):
         assert rows[LIKELIHOOD].isna().all(axis=None)
@@ -649,8 +653,11 @@ def analysed(project: Written) -> Tables:
         columns = {c.name: list(pd.concat(frames)[c.name]) for c in TABLES[name].columns}
         write_table(to_arrow(TABLES[name], columns), project.root / f"{name}.parquet", {})
     for name in ("mae", "ranking", "statistics", "findings"):
-        files = [str(project.root / f"{one}.parquet") for one in COHORT_ANALYSES[name]
-                 if one in layout.tables]  # fmt: skip
+        files = [
+            str(project.root / f"{one}.parquet")
+            for one in COHORT_ANALYSES[name]
+            if one in layout.tables
+        ]
         output = str(project.root / f"{name}.parquet")
         JOBS[name](str(project.root), STUDY, files, output)
         parts[name] = [read_frame(output)]
@@ -659,8 +666,8 @@ def analysed(project: Written) -> Tables:
 
 
 JOBS = {
-    "mae": mae.run,
-    "ranking": ranking.run,
+    "mae": mae.mae,
+    "ranking": ranking.ranking,
     "statistics": statistics.run,
     "findings": findings.run,
 }

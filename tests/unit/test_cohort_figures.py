@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from spinepipe.jobs.cohort_stiffness.figures import DRAW
-from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, COHORT_FIGURES, OF_JOBS
-from spinepipe.report.cohort.case_ratios import ratios
-from spinepipe.report.cohort.error_map import error_map_figure
-from spinepipe.report.cohort.held_out import rotation_errors
-from spinepipe.report.cohort.named import short
-from spinepipe.report.cohort.stages import stages
 from spinepipe.report.style import WIDTH_MM, style
+from spinepipe.report.words import short
+from spinepipe.studies.cohort_stiffness.draw import DRAW
+from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
+from spinepipe.studies.cohort_stiffness.figures.held_out_error import rotation_errors
+from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
+from spinepipe.studies.cohort_stiffness.kind import COHORT_ANALYSES, COHORT_FIGURES, OF_JOBS
 
 CAPTIONS = Path(__file__).resolve().parents[2] / "workflow" / "report"
 LONG = tuple(f"vertebra_number_{n}" for n in range(6))
@@ -135,8 +134,9 @@ def test_what_the_data_do_not_hold_is_hollow_and_what_is_missing_crossed() -> No
     rows.loc[own[2], ["stiffness", "low", "high"]] = np.nan
     figure = draw("stiffness_by_level", size, stiffness=rows)
     marks = [line for axis in figure.axes for line in axis.lines if line.get_marker() in "ox"]
-    assert sum(str(m.get_markerfacecolor()) == "#FFFFFF" and m.get_marker() == "o"
-               for m in marks) == 2  # fmt: skip
+    assert (
+        sum(str(m.get_markerfacecolor()) == "#FFFFFF" and m.get_marker() == "o" for m in marks) == 2
+    )
     assert sum(m.get_marker() == "x" for m in marks) == 1
     assert "not identifiable or at a bound" in words(figure)
     assert "no stiffness" in words(figure)
@@ -201,20 +201,38 @@ def test_lines_of_the_map_hang_on_what_was_fitted() -> None:
 def error_rows(*rows: tuple[str, str, str, int, float | None]) -> pd.DataFrame:
     """Rows of errors: specimen, test, coordinate, readings and error, of fits to all."""
     empty = {"representation": "per_joint", "fitted_to": "all", "source": "own", "joint": "L4L5"}
-    return frame("errors", [
-        {**empty, "specimen": specimen, "stage": "fitted", "test": test, "coordinate": name,
-         "loaded": False, "unit": "deg", "readings": n, "rmse": error, "measured": 1.0,
-         "status": "converged", "message": ""}
-        for specimen, test, name, n, error in rows
-    ])  # fmt: skip
+    return frame(
+        "errors",
+        [
+            {
+                **empty,
+                "specimen": specimen,
+                "stage": "fitted",
+                "test": test,
+                "coordinate": name,
+                "loaded": False,
+                "unit": "deg",
+                "readings": n,
+                "rmse": error,
+                "measured": 1.0,
+                "status": "converged",
+                "message": "",
+            }
+            for specimen, test, name, n, error in rows
+        ],
+    )
 
 
 def test_error_of_a_specimen_by_hand() -> None:
-    found = rotation_errors(error_rows(
-        ("a", "flexion", "extension", 10, 0.3), ("a", "flexion", "right_bending", 30, 0.1),
-        ("a", "flexion", "anterior", 10, 99.0),
-        ("b", "flexion", "extension", 10, 0.2), ("b", "flexion", "right_bending", 10, None),
-    ))  # fmt: skip
+    found = rotation_errors(
+        error_rows(
+            ("a", "flexion", "extension", 10, 0.3),
+            ("a", "flexion", "right_bending", 30, 0.1),
+            ("a", "flexion", "anterior", 10, 99.0),
+            ("b", "flexion", "extension", 10, 0.2),
+            ("b", "flexion", "right_bending", 10, None),
+        )
+    )
     # (10 * 0.09 + 30 * 0.01) / 40 = 0.03; translations do not count; b is not complete
     assert found["specimen"].tolist() == ["a"]
     assert found["error"].iloc[0] == pytest.approx(0.03**0.5)
@@ -270,10 +288,20 @@ def test_joints_that_share_an_unknown_count_once() -> None:
 
 def test_nested_test_is_told_where_there_is_one() -> None:
     size = Size(("a", "b"))
-    row = {"family": "load_case_specific/per_joint", "test": "nested models F", "joint": "*",
-           "response": "stiffness", "factor": "load case", "stratum": "", "n": 100,
-           "statistic_name": "F", "effect_name": "", "family_size": 2, "status": "done",
-           "message": ""}  # fmt: skip
+    row = {
+        "family": "load_case_specific/per_joint",
+        "test": "nested models F",
+        "joint": "*",
+        "response": "stiffness",
+        "factor": "load case",
+        "stratum": "",
+        "n": 100,
+        "statistic_name": "F",
+        "effect_name": "",
+        "family_size": 2,
+        "status": "done",
+        "message": "",
+    }
     rows = [{**row, "specimen": s, "p_holm": p} for s, p in (("a", 0.01), ("b", 0.2))]
     told = words(draw("load_case_stiffness", size, statistics=frame("statistics", rows)))
     assert "Each joint its own: separate stiffness is significantly better in 1 of 2 spec" in told

@@ -13,15 +13,13 @@ from statsmodels.tools import eval_measures
 
 from spinepipe.calibrate import fit as calibrate
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.main_moment import coupled_range, loaded_coordinate, peak_step
+from spinepipe.cohort.load_tests import coupled_range, loaded_coordinate, peak_step
 from spinepipe.effects import Wrench
-from spinepipe.jobs.cohort_stiffness.criteria import criteria
-from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
-from spinepipe.jobs.cohort_stiffness.stiffness_rows import interval
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import LoadCase, LoadStep
-from spinepipe.studies import CohortStiffness
+from spinepipe.studies.cohort_stiffness.fit_rows import criteria, interval
+from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
@@ -136,8 +134,9 @@ def test_an_interval_without_end_is_none() -> None:
 
 def test_published_values_are_those_of_the_paper(tmp_path: Path) -> None:
     rows = Chains(TRUTH).write(tmp_path).literature("a")["stiffness"]
-    uniform, levels = (rows[rows["representation"] == name]
-                       for name in ("literature", "literature_levels"))  # fmt: skip
+    uniform, levels = (
+        rows[rows["representation"] == name] for name in ("literature", "literature_levels")
+    )
     assert_stiffness(uniform, np.tile(UNIFORM, (3, 1)), rtol=0.0)
     assert_stiffness(levels, np.array(list(LEVELS.values())), rtol=0.0)
     assert set(rows["fitted_to"]) == {"nothing"}

@@ -9,13 +9,19 @@ from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
 from study_cases import STUDY, project
 from study_cases import Size as OtherSize
 
-from spinepipe.jobs.cohort_stiffness import figures, report
-from spinepipe.jobs.cohort_stiffness.layout import COHORT_FIGURES
-from spinepipe.report.cohort.findings import findings
-from spinepipe.report.cohort.page import READ, TITLES, cohort_page, left_out
-from spinepipe.report.cohort.tables import shown_tables
-from spinepipe.report.page import Results
-from spinepipe.studies import CrossValidation
+from spinepipe.report.page.document import Results
+from spinepipe.studies.cohort_stiffness import draw as figures
+from spinepipe.studies.cohort_stiffness import report
+from spinepipe.studies.cohort_stiffness.kind import COHORT_FIGURES
+from spinepipe.studies.cohort_stiffness.page import (
+    READ,
+    TITLES,
+    cohort_page,
+    left_out,
+    shown_tables,
+)
+from spinepipe.studies.cohort_stiffness.page_findings import findings
+from spinepipe.studies.cohort_stiffness.settings import CrossValidation
 from spinepipe.tables import TABLES, to_arrow, write
 
 CAPTIONS = Path(__file__).resolve().parents[2] / "workflow" / "report"
@@ -147,8 +153,15 @@ def test_errors_and_spreads_have_their_numbers() -> None:
 
 def claim(name: str, holds: str, **numbers: object) -> dict[str, object]:
     """A row of the table of findings."""
-    return {"finding": name, "statement": f"Claim {name}.", "quantity": "difference",
-            "unit": "deg", "holds": holds, "message": "no fit", **numbers}  # fmt: skip
+    return {
+        "finding": name,
+        "statement": f"Claim {name}.",
+        "quantity": "difference",
+        "unit": "deg",
+        "holds": holds,
+        "message": "no fit",
+        **numbers,
+    }
 
 
 def test_claims_are_counted_and_told_with_their_numbers() -> None:
@@ -204,8 +217,10 @@ def made(tmp_path: Path) -> Path:
     folder.mkdir(parents=True)
     for name, found in tables_of(size).items():
         columns = {column: found[column].tolist() for column in found}
-        clean = {column: [None if pd.isna(v) else v for v in values] for column, values in
-                 columns.items()}  # fmt: skip
+        clean = {
+            column: [None if pd.isna(v) else v for v in values]
+            for column, values in columns.items()
+        }
         write(to_arrow(TABLES[name], clean), str(folder / f"{name}.parquet"), {"seed": "7"})
     return tmp_path
 

@@ -10,15 +10,15 @@ import spring_chain_cases as chains
 from spring_chain_cases import JOINTS, SD, THERE_AND_BACK, Array, Yield, changed, readings
 
 from spinepipe.cohort import read
-from spinepipe.discrepancy.base import base_model, base_parameters
-from spinepipe.discrepancy.grounds import Grounds, Start, laid
-from spinepipe.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
-from spinepipe.discrepancy.mistakes.suspected import SuspectedError
-from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.nuisance import NuisancePriors
-from spinepipe.discrepancy.readings import SpecimenReadings, specimen_readings
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.model import LoadStep
+from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
+from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
+from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
 SDS = np.array([np.nan] * 3 + [SD] * 3)

@@ -13,23 +13,43 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, ncx2, norm
 from spring_chain_cases import SD, readings
 
-from spinepipe.discrepancy.evidence import SIZES, Group
-from spinepipe.discrepancy.forms import Form, Variant, trials
-from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.grounds import Grounds, laid
-from spinepipe.discrepancy.groups import Index, summed
-from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Hypothesis, Member, Supposed, Unknown
-from spinepipe.discrepancy.joint_fit import JointFit
-from spinepipe.discrepancy.laplace import laplace
-from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.nuisance import NuisancePriors
-from spinepipe.discrepancy.projected import Linearised, drawn, linearised, products, taken_out
-from spinepipe.discrepancy.rounds import look
-from spinepipe.discrepancy.screen import Screen, exceeded
-from spinepipe.discrepancy.signatures import EVERY_TEST, Column
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread
 from spinepipe.model import SpineModel
+from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    STRENGTH_SDS,
+    Form,
+    Hypothesis,
+    Member,
+    Supposed,
+    Unknown,
+    Variant,
+    trials,
+)
+from spinepipe.studies.discrepancy.search.inquiry import look
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
+from spinepipe.studies.discrepancy.search.projected import (
+    EVERY_TEST,
+    Column,
+    Linearised,
+    drawn,
+    linearised,
+    products,
+    taken_out,
+)
+from spinepipe.studies.discrepancy.search.refit import laplace
+from spinepipe.studies.discrepancy.search.screen import (
+    SIZES,
+    Group,
+    Index,
+    Screen,
+    exceeded,
+    summed,
+)
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
 Array = NDArray[np.float64]
@@ -277,8 +297,12 @@ def shown(screen: Screen) -> dict[str, float]:
 
 
 EFFECTS = (
-    "neutral_zone", "flexion_extension_asymmetry", "level_dependence", "load_offset", "marker_bias"
-)  # fmt: skip
+    "neutral_zone",
+    "flexion_extension_asymmetry",
+    "level_dependence",
+    "load_offset",
+    "marker_bias",
+)
 
 
 def stiffer_one_way(joint: int, moments: Array, k: float) -> Array:

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
-from spinepipe.discrepancy.noise import Noise, estimated_noise, without_outliers
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.whitening import Whitening, whitening, with_nuisances
 from spinepipe.model import LoadCase
+from spinepipe.studies.discrepancy.search.noise import Noise, estimated_noise, without_outliers
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
 
 Array = NDArray[np.float64]
 

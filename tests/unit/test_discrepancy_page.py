@@ -14,22 +14,20 @@ from discrepancy_cases import EFFECTS, HIDDEN, STUDY, VERDICTS, frames, project,
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.discrepancy import figures as figures_job
-from spinepipe.jobs.discrepancy import report as report_job
-from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES, TABLES
 from spinepipe.report.discrepancy import DRAW
-from spinepipe.report.discrepancy.effect_evidence import evidence_by_round, looks
-from spinepipe.report.discrepancy.findings import findings, warnings
-from spinepipe.report.discrepancy.gap_by_step import worst_places
-from spinepipe.report.discrepancy.headline import headline, how_sure
-from spinepipe.report.discrepancy.page import TITLES, discrepancy_page, left_out
-from spinepipe.report.discrepancy.read_verdict import verdict_of
-from spinepipe.report.discrepancy.tables import shown_tables
-from spinepipe.report.discrepancy.verdict import Answer, Estimate
-from spinepipe.report.discrepancy.words import estimate_of, plain, readable, value_of
-from spinepipe.report.page.results import Results
+from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
-from spinepipe.studies import Discrepancy, check
+from spinepipe.studies.discrepancy import draw as figures_job
+from spinepipe.studies.discrepancy import report as report_job
+from spinepipe.studies.discrepancy.figures.effects import evidence_by_round, looks
+from spinepipe.studies.discrepancy.figures.gap_map import worst_places
+from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
+from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, TABLES
+from spinepipe.studies.discrepancy.page import TITLES, discrepancy_page, left_out, shown_tables
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import Answer, Estimate, verdict_of
+from spinepipe.studies.discrepancy.words import estimate_of, plain, readable, value_of
+from spinepipe.studies.read import check
 
 ROOT = Path(__file__).resolve().parents[2]
 CAPTIONS = {name: (ROOT / "workflow" / "report" / f"{name}.rst").read_text() for name in DRAW}
@@ -280,8 +278,12 @@ def test_the_nearest_effect_of_something_unknown_is_told_but_not_named() -> None
 def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
     _, cohort = study_of(tmp_path)
     why = "the base model cannot be fitted: no start has a pose"
-    data = {"cohort": "c", "verdict": "UNKNOWN", "why": why,
-            "unknown": {"where": "no start has a pose", "shape": "not known"}}  # fmt: skip
+    data = {
+        "cohort": "c",
+        "verdict": "UNKNOWN",
+        "why": why,
+        "unknown": {"where": "no start has a pose", "shape": "not known"},
+    }
     verdict = verdict_of(data)
     assert headline(verdict).startswith("Nothing can be said of what is missing")
     assert why in how_sure(verdict)
@@ -332,10 +334,14 @@ def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
     figures_job.run(str(tmp_path), STUDY, name, tables, verdict, **made)
     assert Path(made["png"]).read_bytes().startswith(b"\x89PNG")
     report_job.run(
-        str(tmp_path), STUDY, [str(folder / f"{table}.parquet") for table in TABLES],
-        [made["svg"]], [str(ROOT / "workflow" / "report" / f"{name}.rst")], verdict,
+        str(tmp_path),
+        STUDY,
+        [str(folder / f"{table}.parquet") for table in TABLES],
+        [made["svg"]],
+        [str(ROOT / "workflow" / "report" / f"{name}.rst")],
+        verdict,
         str(folder / "report.html"),
-    )  # fmt: skip
+    )
     assert TITLES[name] in (folder / "report.html").read_text()
     assert json.loads((folder / "verdict.json").read_text())["verdict"] == "NAMED"
 

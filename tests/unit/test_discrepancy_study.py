@@ -14,8 +14,8 @@ from spinepipe.jobs.layouts import files_of
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, Problem
-from spinepipe.studies import Discrepancy
-from spinepipe.studies.check_discrepancy import effects_to_try
+from spinepipe.studies.discrepancy.checks import effects_to_try
+from spinepipe.studies.discrepancy.settings import Discrepancy
 
 A = np.array([[50.0, 60.0, 200.0]] * 3)
 FILE = f"config/studies/{STUDY}.yaml"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from spinepipe.problems import InputError
-from spinepipe.report.reference import END, generators, names_in, outdated, pages, refreshed
+from spinepipe.reference.pages import END, generators, names_in, outdated, pages, refreshed
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -37,9 +37,7 @@ from spinepipe.effects import (
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import (
-    Chain,
     FreeParameter,
-    Status,
     System,
     by_parameters,
     declared,
@@ -50,6 +48,8 @@ from spinepipe.statics import (
     observed_by_parameters,
 )
 from spinepipe.statics.holding import States
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 PROTOCOLS = {
     Kind.JOINT_LAW: JointLaw,
@@ -84,8 +84,10 @@ TOGETHER = (
     scoped(MarkerError(), (0, 1, 2), (0.95, -0.01)),
 )
 
-CASES = [*(pytest.param(effects, id=name) for name, effects in ALONE.items()),
-         pytest.param(TOGETHER, id="all together")]  # fmt: skip
+CASES = [
+    *(pytest.param(effects, id=name) for name, effects in ALONE.items()),
+    pytest.param(TOGETHER, id="all together"),
+]
 
 
 def system_of(effects: tuple[ScopedEffect, ...]) -> System:
@@ -218,11 +220,18 @@ def test_effects_out_of_a_tests_scope_do_nothing() -> None:
         assert not by_x.any()
 
 
-@pytest.mark.parametrize("effects", [
-    pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),
-    pytest.param((scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),), id="geometry"),
-    pytest.param((scoped(MarkerError(per_joint=False), (0, 1, 2), (1.1, 0.02)),), id="measurement"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "effects",
+    [
+        pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),
+        pytest.param(
+            (scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),), id="geometry"
+        ),
+        pytest.param(
+            (scoped(MarkerError(per_joint=False), (0, 1, 2), (1.1, 0.02)),), id="measurement"
+        ),
+    ],
+)
 def test_one_row_of_parameters_for_all_joints(effects) -> None:
     test_parameter_sensitivities_are_slopes_of_solved_motion(effects)
 
@@ -242,8 +251,9 @@ MOVED = {
 @pytest.mark.parametrize("name", MOVED)
 def test_calibration_finds_an_effects_parameters_back(name: str) -> None:
     model = spine(3, effects=ALONE[name])
-    free = free_parameters(model, 1, [p.name for p in model.effects[1].effect.parameters],
-                           "per_specimen")  # fmt: skip
+    free = free_parameters(
+        model, 1, [p.name for p in model.effects[1].effect.parameters], "per_specimen"
+    )
     free = (*free, *free_parameters(model, 0, ["extension_nm_per_rad"], "per_specimen"))
     truth = MOVED[name] * np.array([1.0, -0.8][: len(free) - 1])
     truth = np.append(truth, 0.3)

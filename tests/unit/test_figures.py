@@ -8,12 +8,12 @@ import pytest
 from PIL import Image
 from study_cases import STUDY, Size, project, results
 
-from spinepipe.jobs import figures
-from spinepipe.jobs.layout import FIGURES
-from spinepipe.report.rows import MOST_ROWS, rows_of
-from spinepipe.report.spread import quartiles
+from spinepipe.report.marks import quartiles
+from spinepipe.report.panels import MOST_ROWS, rows_of
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
 from spinepipe.report.words import fixed, number, percent, tick
+from spinepipe.studies.joint_pose_sensitivity import draw as figures
+from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
 from spinepipe.units import COORDINATES
 
 FIRST = ("stiffness", "errors", "joint_pose")
@@ -117,9 +117,16 @@ def test_quartiles_of_a_known_sample() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(20640.0, "20\u2009600"), (0.01344, "0.0134"), (-1.4, "\u22121.40"), (2.46e7, "2.46e7"),
-     (0.0, "0"), (999.6, "1\u2009000"), (float("nan"), "none")],
-)  # fmt: skip
+    [
+        (20640.0, "20\u2009600"),
+        (0.01344, "0.0134"),
+        (-1.4, "\u22121.40"),
+        (2.46e7, "2.46e7"),
+        (0.0, "0"),
+        (999.6, "1\u2009000"),
+        (float("nan"), "none"),
+    ],
+)
 def test_numbers_as_printed(value: float, text: str) -> None:
     assert number(value) == text
 

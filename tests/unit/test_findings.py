@@ -10,11 +10,10 @@ import pytest
 from study_cases import STUDY, Size, project
 
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.page import Results
-from spinepipe.report.page.findings import findings
-from spinepipe.report.page.origin import left_out
-from spinepipe.report.page.tables import shown_tables
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.report.page.document import Results, left_out
+from spinepipe.studies.joint_pose_sensitivity.findings import findings
+from spinepipe.studies.joint_pose_sensitivity.page import shown_tables
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 NAN = float("nan")
 
@@ -80,10 +79,16 @@ def test_methods_that_were_refused_are_not_unsuccessful(study: JointPoseSensitiv
 def calibrations(identifiable: list[bool], freedom: list[int]) -> list[dict[str, Any]]:
     """Solved fits, one per pose."""
     return [
-        {"specimen": "a", "pose": pose, "joint": "*", "status": "converged",
-         "extension_identifiable": flag, "degrees_of_freedom": n}
+        {
+            "specimen": "a",
+            "pose": pose,
+            "joint": "*",
+            "status": "converged",
+            "extension_identifiable": flag,
+            "degrees_of_freedom": n,
+        }
         for pose, (flag, n) in enumerate(zip(identifiable, freedom, strict=True))
-    ]  # fmt: skip
+    ]
 
 
 def test_stiffness_that_data_do_not_hold_has_a_warning(study: JointPoseSensitivity) -> None:
@@ -194,8 +199,12 @@ def test_shares_with_common_ground_are_not_ranked(study: JointPoseSensitivity) -
 
 def test_parts_that_were_left_out_are_named(study: JointPoseSensitivity) -> None:
     settings = study.model_dump()
-    parts = {"start_bootstrap": "sets", "damping_bootstrap": "sets", "methods": "poses",
-             "landmark_precision": "poses"}  # fmt: skip
+    parts = {
+        "start_bootstrap": "sets",
+        "damping_bootstrap": "sets",
+        "methods": "poses",
+        "landmark_precision": "poses",
+    }
     for part, name in parts.items():
         settings[part][name] = 3
     assert left_out(JointPoseSensitivity.model_validate(settings)) == ()
@@ -211,10 +220,18 @@ def test_trees_that_could_not_be_grown_have_a_row_that_says_why(
 ) -> None:
     cell = {"specimen": "a", "joint": "J", "coordinate": "extension", "n": 18}
     rows = [
-        {**cell, "predictor": name, "factor": "pose", "importance": np.nan, "leaves": np.nan,
-         "r2": np.nan, "status": "too_few", "message": "18 rows; at least 20"}
+        {
+            **cell,
+            "predictor": name,
+            "factor": "pose",
+            "importance": np.nan,
+            "leaves": np.nan,
+            "r2": np.nan,
+            "status": "too_few",
+            "message": "18 rows; at least 20",
+        }
         for name in ("p1", "p2")
-    ]  # fmt: skip
+    ]
     (table,) = shown_tables(study, Results({"importance": pd.DataFrame(rows)}, {}, {}, {}))
     (row,) = table.rows
     assert [head.name for head in table.heads] == ["joint", "coordinate", "n", "message"]

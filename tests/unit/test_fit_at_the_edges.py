@@ -7,15 +7,9 @@ from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
-from spinepipe.statics import (
-    Chain,
-    Program,
-    Status,
-    System,
-    follow,
-    free_parameters,
-    settle,
-)
+from spinepipe.statics import Program, System, follow, free_parameters, settle
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 STIFFNESS = np.array([1e5, 1e6, 1e5, 20.0, 20.0, 20.0])
 ANGLES = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])

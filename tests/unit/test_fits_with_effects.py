@@ -21,15 +21,9 @@ from path_effect_cases import branches, creeping, friction, turning
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import (
-    Chain,
-    FreeParameter,
-    Status,
-    System,
-    follow,
-    free_parameters,
-    moved,
-)
+from spinepipe.statics import FreeParameter, System, follow, free_parameters, moved
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 EVERYWHERE = (0, 1, 2)
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
@@ -85,8 +79,11 @@ def problem_of(effects: tuple[ScopedEffect, ...], zeroed: bool, correlated: bool
 
 
 @pytest.mark.parametrize("on", [True, False], ids=["acting", "off"])
-@pytest.mark.parametrize(("zeroed", "correlated"), [(False, False), (True, False), (True, True)],
-                         ids=["as read", "zeroed", "whitened"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("zeroed", "correlated"),
+    [(False, False), (True, False), (True, True)],
+    ids=["as read", "zeroed", "whitened"],
+)
 def test_the_jacobian_is_the_slope_of_the_residuals(
     on: bool, zeroed: bool, correlated: bool
 ) -> None:

@@ -8,17 +8,23 @@ import pytest
 import spring_chain_cases as chains
 from search_cases import JOINTS, Array
 
-from spinepipe.discrepancy.base import base_parameters
-from spinepipe.discrepancy.forms import Form, Variant
-from spinepipe.discrepancy.hypothesis import Hypothesis, Member, Supposed, Unknown, hypothesis
-from spinepipe.discrepancy.joint_fit import JointFit
-from spinepipe.discrepancy.model_files import model_file
-from spinepipe.discrepancy.prediction import Simulated
-from spinepipe.discrepancy.values import FittedValue, fitted_values
 from spinepipe.effects import Spread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
 from spinepipe.statics import moved
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    Form,
+    Hypothesis,
+    Member,
+    Supposed,
+    Unknown,
+    Variant,
+    base_parameters,
+    hypothesis,
+)
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.search.model_files import FittedValue, fitted_values, model_file
+from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.units import ROTATIONS
 
 NAMES = ("a", "b")
@@ -134,20 +140,61 @@ def value_of(
 DEG = 180.0 / np.pi
 Z = 1.959964
 VALUES = {
-    "rad": (Variant("load_misalignment", ()), 1, 0.01, 0.02, 0.005,
-            (0.03 * DEG, (0.03 - 0.005 * Z) * DEG, (0.03 + 0.005 * Z) * DEG), "deg"),
-    "m": (Variant("facet_contact", (("coordinate", "anterior"),)), 1, 5e-4, 1e-3, 1e-4,
-          (1.5, 1.5 - 0.1 * Z, 1.5 + 0.1 * Z), "mm"),
-    "m/rad": (Variant("joint_centre_migration", ()), 0, 0.0, 0.05, 0.01,
-              (50.0 / DEG, (50.0 - 10.0 * Z) / DEG, (50.0 + 10.0 * Z) / DEG), "mm/deg"),
-    "log": (Variant("level_dependence", ()), 0, 2.0, np.log(1.5), 0.1,
-            (3.0, 3.0 * np.exp(-0.1 * Z), 3.0 * np.exp(0.1 * Z)), "1"),
-    "log rad": (Variant("neutral_zone", ()), 1, 0.03, -np.log(2.0), 0.2,
-                (0.015 * DEG, 0.015 * DEG * np.exp(-0.2 * Z), 0.015 * DEG * np.exp(0.2 * Z)),
-                "deg"),
-    "N m": (Variant("load_offset", ()), 0, 0.0, -0.3, 0.1, (-0.3, -0.3 - 0.1 * Z, -0.3 + 0.1 * Z),
-            "N m"),
-}  # fmt: skip
+    "rad": (
+        Variant("load_misalignment", ()),
+        1,
+        0.01,
+        0.02,
+        0.005,
+        (0.03 * DEG, (0.03 - 0.005 * Z) * DEG, (0.03 + 0.005 * Z) * DEG),
+        "deg",
+    ),
+    "m": (
+        Variant("facet_contact", (("coordinate", "anterior"),)),
+        1,
+        5e-4,
+        1e-3,
+        1e-4,
+        (1.5, 1.5 - 0.1 * Z, 1.5 + 0.1 * Z),
+        "mm",
+    ),
+    "m/rad": (
+        Variant("joint_centre_migration", ()),
+        0,
+        0.0,
+        0.05,
+        0.01,
+        (50.0 / DEG, (50.0 - 10.0 * Z) / DEG, (50.0 + 10.0 * Z) / DEG),
+        "mm/deg",
+    ),
+    "log": (
+        Variant("level_dependence", ()),
+        0,
+        2.0,
+        np.log(1.5),
+        0.1,
+        (3.0, 3.0 * np.exp(-0.1 * Z), 3.0 * np.exp(0.1 * Z)),
+        "1",
+    ),
+    "log rad": (
+        Variant("neutral_zone", ()),
+        1,
+        0.03,
+        -np.log(2.0),
+        0.2,
+        (0.015 * DEG, 0.015 * DEG * np.exp(-0.2 * Z), 0.015 * DEG * np.exp(0.2 * Z)),
+        "deg",
+    ),
+    "N m": (
+        Variant("load_offset", ()),
+        0,
+        0.0,
+        -0.3,
+        0.1,
+        (-0.3, -0.3 - 0.1 * Z, -0.3 + 0.1 * Z),
+        "N m",
+    ),
+}
 """Effect, column, start, move and SE; value, low and high, worked by hand; their unit."""
 
 

@@ -8,26 +8,24 @@ import pytest
 from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 from study_cases import STUDY, Size, project, results
 
-from spinepipe.calibrate import MeasuredCase, Problem, forward_cost
-from spinepipe.calibrate.forward_run import forward_run
-from spinepipe.calibrate.forward_runs import ForwardFit, fit_by_forward_runs
-from spinepipe.calibrate.gradients import differenced_gradient, exact_gradient, relative_error
+from spinepipe.calibrate import MeasuredCase, Problem
+from spinepipe.calibrate import forward_runs as forward_cost
+from spinepipe.calibrate.forward_runs import (
+    ForwardFit,
+    differenced_gradient,
+    exact_gradient,
+    fit_by_forward_runs,
+    forward_run,
+    relative_error,
+)
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
-from spinepipe.jobs import fit_by_method
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
-from spinepipe.statics import (
-    Chain,
-    Course,
-    Program,
-    Status,
-    System,
-    follow,
-    free_parameters,
-    moved,
-    settle,
-)
+from spinepipe.statics import Course, Program, System, follow, free_parameters, moved, settle
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity import fit_by_method
 from spinepipe.tables import read_frame
+from spinepipe.world import Chain
 
 TRUTH = np.array([np.log(1.6), np.log(0.7)])
 SANE = 1e-3

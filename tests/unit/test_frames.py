@@ -82,8 +82,9 @@ def test_reexpress_is_the_same_motion_of_points() -> None:
     one, other, points = random_pose(rng), random_pose(rng), rng.normal(0, 0.1, (4, 3))
     q = np.concatenate([rng.normal(0, 0.005, 3), rng.normal(0, 0.2, 3)])
     q_other = reexpress(q, one, other)
-    moved = [(f @ transform_of(c) @ f.inverse()).apply(points)
-             for f, c in ((one, q), (other, q_other))]  # fmt: skip
+    moved = [
+        (f @ transform_of(c) @ f.inverse()).apply(points) for f, c in ((one, q), (other, q_other))
+    ]
     np.testing.assert_allclose(moved[1], moved[0], rtol=0, atol=ROUND_OFF)
     np.testing.assert_allclose(reexpress(q_other, other, one), q, rtol=0, atol=1e-13)
     np.testing.assert_allclose(reexpress(q, one, one), q, rtol=0, atol=1e-13)

@@ -12,14 +12,13 @@ from cohort_cases import Change, add, both, cell, joints, line, swap, text, with
 from scipy import stats
 
 from spinepipe import studies
-from spinepipe.cohort.varied import change as varied
 from spinepipe.problems import InputError, Problem
 from spinepipe.sensitivity.global_indices import INDICES, Known
 from spinepipe.sensitivity.global_indices.design import DUMMY
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.studies import global_sensitivity as study_file
-from spinepipe.studies.drawn_from import spreads_of
-from spinepipe.tables.global_sensitivity import INDEX_MEANINGS, INDEX_STATUS
+from spinepipe.studies.global_sensitivity import change as varied
+from spinepipe.studies.global_sensitivity import settings as study_file
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.tables import INDEX_MEANINGS, INDEX_STATUS
 
 STUDY = """\
 study: probe

@@ -17,13 +17,20 @@ from held_out_cases import (
     serial,
 )
 
-from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.proof.held_out import Asked, held_out, together
-from spinepipe.discrepancy.proof.held_out_rows import NO_FIT, NOT_DETERMINED, SCORED, FoldRow
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.proof.held_out import (
+    NO_FIT,
+    NOT_DETERMINED,
+    SCORED,
+    Asked,
+    FoldRow,
+    held_out,
+    together,
+)
+from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.store import at_once
 
 STEPS = len(MOMENTS_NM)
 EXTENSION, BENDING = 3, 4

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 from held_out_cases import cases, noise, noisy, serial
 
-from spinepipe.discrepancy.proof.chosen import Chosen
-from spinepipe.discrepancy.proof.fold_linear import LinearFolds
-from spinepipe.discrepancy.proof.folds import Part, folds_by_specimen, folds_by_test, step_fold
-from spinepipe.discrepancy.proof.tangent import LinearModel, Tangent
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.proof.fold_linear import LinearFolds, LinearModel, Tangent
+from spinepipe.studies.discrepancy.proof.folds import (
+    Chosen,
+    Part,
+    folds_by_specimen,
+    folds_by_test,
+    step_fold,
+)
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
 TESTS = ("flexion", "bending")
 SHARED, OWN, NUISANCES = 2, 2, 3

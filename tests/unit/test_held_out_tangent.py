@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from held_out_cases import JOINTS, MOMENTS_NM, SD, found, grounds, read
 
-from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.discrepancy.prediction import Simulated, Solved
-from spinepipe.discrepancy.proof.surrogate import surrogate
-from spinepipe.discrepancy.proof.tangent import tangent
 from spinepipe.statics import moved
+from spinepipe.studies.discrepancy.proof.fold_linear import surrogate, tangent
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.studies.discrepancy.search.prediction import Simulated, Solved
 
 STEPS = len(MOMENTS_NM)
 

@@ -10,18 +10,19 @@ from matplotlib.figure import Figure
 from PIL import Image
 from study_cases import STUDY, Size, project, results
 
-from spinepipe.jobs import figures
-from spinepipe.jobs.cohort_stiffness.layout import COHORT_FIGURES
-from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES
-from spinepipe.jobs.global_sensitivity.layout import SENSITIVITY_FIGURES
-from spinepipe.jobs.layout import FIGURES
-from spinepipe.jobs.range_of_motion.layout import ROM_FIGURES
-from spinepipe.report.bootstrap_paper import draw_errors
-from spinepipe.report.bootstrap_rows import bootstrap_rows
-from spinepipe.report.pose_against_stiffness import importance_by_factor
-from spinepipe.report.sections import sections
+from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM
 from spinepipe.report.words import number
+from spinepipe.studies.cohort_stiffness.kind import COHORT_FIGURES
+from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES
+from spinepipe.studies.global_sensitivity.kind import SENSITIVITY_FIGURES
+from spinepipe.studies.joint_pose_sensitivity import draw as figures
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_errors
+from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
+    importance_by_factor,
+)
+from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
+from spinepipe.studies.range_of_motion.kind import ROM_FIGURES
 from spinepipe.units import COORDINATES
 
 NEW = (
@@ -129,12 +130,18 @@ def test_bootstrap_tells_median_range_and_n_of_each_row(tmp_path: Path) -> None:
 def test_pooled_bootstrap_is_relative_to_each_own_median() -> None:
     """Two specimens of 2 and 200 N/m: pooled they would seem to spread, though neither does."""
     rows = [
-        {"specimen": f"s{n:02d}", "bootstrap": "start", "loading": "dynamic", "set": k,
-         "joint": "J", "superior_n_per_m": (2.0 if n % 2 else 200.0) * (1.0 + 0.1 * k),
-         "superior_error_mm": n + 0.5 * k}
+        {
+            "specimen": f"s{n:02d}",
+            "bootstrap": "start",
+            "loading": "dynamic",
+            "set": k,
+            "joint": "J",
+            "superior_n_per_m": (2.0 if n % 2 else 200.0) * (1.0 + 0.1 * k),
+            "superior_error_mm": n + 0.5 * k,
+        }
         for n in range(50)
         for k in (-1, 0, 1)
-    ]  # fmt: skip
+    ]
     columns = ["superior_n_per_m", "superior_error_mm"]
     names = [f"s{n:02d}" for n in range(50)]
     pooled, relative = bootstrap_rows(pd.DataFrame(rows), columns, names, ["J"])

@@ -12,24 +12,30 @@ from scipy import stats
 from study_cases import START, STUDY, Size, project, results
 
 from spinepipe.designs import sample_log_uniform
-from spinepipe.jobs import (
-    agreement,
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity import (
     bootstrap,
-    counts,
     landmark_errors,
     landmark_precision,
     rank,
-    statistics,
     success,
     summary,
     two_factor,
 )
-from spinepipe.jobs.errors import absolute_error, measured_coordinates, measured_size, readings
-from spinepipe.jobs.grid import complete_grid
-from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.jobs.pose_factors import pose_factors, pose_parameters
-from spinepipe.sensitivity.precision import required_precision
-from spinepipe.tables import BOOTSTRAP, PRECISION_ERRORS, TABLES, Table, read_frame, to_arrow, write
+from spinepipe.studies.joint_pose_sensitivity import errors as agreement
+from spinepipe.studies.joint_pose_sensitivity import significance as statistics
+from spinepipe.studies.joint_pose_sensitivity import success as counts
+from spinepipe.studies.joint_pose_sensitivity.errors import (
+    absolute_error,
+    complete_grid,
+    measured_coordinates,
+    measured_size,
+    readings,
+)
+from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
+from spinepipe.tables import TABLES, Table, read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
 Change = Callable[[pd.DataFrame], pd.DataFrame]
@@ -130,8 +136,16 @@ def test_the_grid_leaves_out_empty_sets_and_poses_that_lack_a_run() -> None:
 
 
 def two_joint_poses() -> pd.DataFrame:
-    columns = ("pose", "joint", "x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg",
-               "left_rotation_deg")  # fmt: skip
+    columns = (
+        "pose",
+        "joint",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "extension_deg",
+        "right_bending_deg",
+        "left_rotation_deg",
+    )
     rows = [
         (2, "Q", 3.0, 0.0, 0.0, 1.0, 2.0, 0.0),
         (2, "P", 0.0, 4.0, 0.0, 3.0, -2.0, 1.0),
@@ -239,7 +253,7 @@ class Run:
             rows = change(read_frame(self.folder / f"{name}.parquet")).astype(object)
             rows = rows.where(rows.notna(), None)
             write_rows(self.folder / f"{name}.parquet", TABLES[name], rows.to_dict("records"))
-        success.run(self.root, STUDY, *self._files("calibrations", "success"))
+        success.success(self.root, STUDY, *self._files("calibrations", "success"))
         rank.run(self.root, STUDY, *self._files("calibrations", "success"), self.best)
 
     @property
@@ -256,7 +270,7 @@ class Run:
         match name:
             case "counts":
                 extra = [f for f in self._files("bootstrap") if Path(f).exists()]
-                counts.run(self.root, STUDY, [*base, *extra], output)
+                counts.counts(self.root, STUDY, [*base, *extra], output)
             case "summary":
                 extra = [f for f in self._files("bootstrap") if Path(f).exists()]
                 summary.run(self.root, STUDY, [*base, *extra], self.best, output)
@@ -368,11 +382,12 @@ def test_one_joint_of_a_fit_that_is_an_outlier_takes_the_fit(tmp_path: Path) -> 
         ),
         pytest.param(Size(), {"calibrations": without_fit(lambda f: f["pose"] > 0)}, id="one fit"),
         pytest.param(
-            Size(), {"study": "success: {outlier_times_start: 1.0001, failed_when: any}\n"},
+            Size(),
+            {"study": "success: {outlier_times_start: 1.0001, failed_when: any}\n"},
             id="few in the reduced dataset",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_fails_is_data(tmp_path: Path, size: Size, options: dict) -> None:
     """Every table keeps its schema, and what has no number says why."""
     run = Run(tmp_path, size, **options)

@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 from chain_cases import DEGREES, JOINTS, MILLIMETRES, STUDY, Chains
 
-from spinepipe.jobs.discrepancy import search
-from spinepipe.jobs.discrepancy.layout import OTHERS, TABLES
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
+from spinepipe.studies.discrepancy import job as search
+from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.units import STIFFNESS_COLUMNS
 
 pytestmark = pytest.mark.slow

@@ -105,9 +105,14 @@ def test_a_level_of_another_stiffness_and_a_lax_one() -> None:
     assert of_a_spring(law_of(("local_laxity", {})), 0.1, 0.3) == pytest.approx(3.5)
 
 
-@pytest.mark.parametrize(("name", "value", "share"), [
-    ("level_dependence", 1.3, 0.3), ("local_laxity", 0.3, -0.3), ("preload_stiffening", 1e-3, 0.4),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value", "share"),
+    [
+        ("level_dependence", 1.3, 0.3),
+        ("local_laxity", 0.3, -0.3),
+        ("preload_stiffening", 1e-3, 0.4),
+    ],
+)
 def test_all_rotations_at_once(name: str, value: float, share: float) -> None:
     carried = np.array([[7.0, -400.0, 9.0, 5.0, -3.0, 2.0]])
     law = law_of((name, {"coordinate": "rotations"}))
@@ -173,20 +178,35 @@ def test_declared_numbers_make_sense(variant) -> None:
             assert not parameter.logarithmic or parameter.off == 1.0
 
 
-@pytest.mark.parametrize(("name", "options", "message"), [
-    ("nonlinear_stiffening", {"shape": "square"}, "shape 'square' is not one of exponential, tan"),
-    ("nonlinear_stiffening", {"coordinate": "flexion"}, "coordinate 'flexion' is not one of ante"),
-    ("neutral_zone", {"coordinate": "rotations"}, "'rotations' is not one of"),
-    ("flexion_extension_asymmetry", {"coordinate": ""}, "'' is not one of"),
-    ("bending_rotation_coupling", {"pair": ["extension"]}, "is not two coordinates"),
-    ("bending_rotation_coupling", {"pair": ["right", "right"]}, "is not two coordinates"),
-    ("bending_rotation_coupling", {"pair": ["right", "left"]}, "pair 'left' is not one of"),
-    ("facet_contact", {"side": "left"}, "side 'left' is not one of positive, negative"),
-    ("facet_contact", {"coordinate": "x"}, "coordinate 'x' is not one of"),
-    ("level_dependence", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
-    ("local_laxity", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
-    ("preload_stiffening", {"coordinate": "superior"}, "is not one of extension, .*, rotations"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        (
+            "nonlinear_stiffening",
+            {"shape": "square"},
+            "shape 'square' is not one of exponential, tan",
+        ),
+        (
+            "nonlinear_stiffening",
+            {"coordinate": "flexion"},
+            "coordinate 'flexion' is not one of ante",
+        ),
+        ("neutral_zone", {"coordinate": "rotations"}, "'rotations' is not one of"),
+        ("flexion_extension_asymmetry", {"coordinate": ""}, "'' is not one of"),
+        ("bending_rotation_coupling", {"pair": ["extension"]}, "is not two coordinates"),
+        ("bending_rotation_coupling", {"pair": ["right", "right"]}, "is not two coordinates"),
+        ("bending_rotation_coupling", {"pair": ["right", "left"]}, "pair 'left' is not one of"),
+        ("facet_contact", {"side": "left"}, "side 'left' is not one of positive, negative"),
+        ("facet_contact", {"coordinate": "x"}, "coordinate 'x' is not one of"),
+        ("level_dependence", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
+        ("local_laxity", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
+        (
+            "preload_stiffening",
+            {"coordinate": "superior"},
+            "is not one of extension, .*, rotations",
+        ),
+    ],
+)
 def test_an_impossible_option_is_refused(name: str, options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=f"{name}: .*{message}"):
         create(name, options)

@@ -150,10 +150,15 @@ def test_off_is_exactly_nothing_but_says_what_it_would_do(variant) -> None:
     assert touched.any() if variant[0] == "facet_contact" else touched.all()
 
 
-@pytest.mark.parametrize("variant", [
-    v for v in (*VARIANTS, *ON_TRANSLATIONS)
-    if v[0] not in ("facet_contact", "preload_stiffening")
-], ids=title)  # fmt: skip
+@pytest.mark.parametrize(
+    "variant",
+    [
+        v
+        for v in (*VARIANTS, *ON_TRANSLATIONS)
+        if v[0] not in ("facet_contact", "preload_stiffening")
+    ],
+    ids=title,
+)
 def test_the_mirrored_joint_has_the_mirrored_law(variant) -> None:
     law = law_of(variant)
     q, carried = anywhere(30)

@@ -10,7 +10,6 @@ from joint_law_cases import DEFAULT, EVERY, SEARCHED, defaults, law_of, off
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
 from spinepipe.statics import (
-    Chain,
     FreeParameter,
     System,
     by_parameters,
@@ -19,6 +18,7 @@ from spinepipe.statics import (
     free_parameters,
     moved,
 )
+from spinepipe.world import Chain
 
 NONE = np.zeros(0)
 

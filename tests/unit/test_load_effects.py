@@ -19,8 +19,9 @@ from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, SpineModel
-from spinepipe.statics import Chain, System
+from spinepipe.statics import System
 from spinepipe.statics.motion import ChainMotion
+from spinepipe.world import Chain
 
 JOINTS = (0, 1, 2)
 TOP = 2

@@ -6,7 +6,7 @@ import pytest
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
-from spinepipe.sensitivity.nested_shares import components, nested_shares
+from spinepipe.sensitivity.shares import components, nested_shares
 from spinepipe.statistics import Ended
 
 PARTS = ("specimen", "draw", "treatment", "rest")

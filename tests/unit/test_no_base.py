@@ -11,10 +11,12 @@ import pytest
 from chain_cases import JOINTS, STUDY
 from discrepancy_cases import project
 
-from spinepipe.jobs.discrepancy import figures, report, search
-from spinepipe.jobs.discrepancy.layout import DISCREPANCY_FIGURES, OTHERS, TABLES
 from spinepipe.model.file import effects_for, read_model
-from spinepipe.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy import draw as figures
+from spinepipe.studies.discrepancy import job as search
+from spinepipe.studies.discrepancy import report
+from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, OTHERS, TABLES
+from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 
 ROOT = Path(__file__).resolve().parents[2]
 SCHEMAS = {table.name: table for table in (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)}

@@ -8,16 +8,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from spinepipe.discrepancy.forms import Form, Variant
-from spinepipe.discrepancy.found import Found, Rival, Standing
-from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.hypothesis import Supposed
-from spinepipe.discrepancy.lack_of_fit import LackOfFit
-from spinepipe.discrepancy.mistakes.suspected import SuspectedError
-from spinepipe.discrepancy.outcome import Outcome, Verdict, outcome
-from spinepipe.discrepancy.proof.held_out_rows import SCORED, FoldRow, HeldOut, Margin
 from spinepipe.effects import Spread
+from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
+from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
+from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
+from spinepipe.studies.discrepancy.search.outcome import Outcome, Verdict, outcome
 
 MARGIN = 3.0
 SHAPE = "load over the joint's own extension, shared"
@@ -91,9 +90,14 @@ def test_of_many_errors_three_are_told() -> None:
 
 @pytest.mark.parametrize(
     ("lack", "threshold", "verdict"),
-    [(-2.0, 2.0, "NULL"), (4.9, 2.0, "NULL"), (5.1, 2.0, "UNKNOWN"),
-     (7.9, 8.0, "NULL"), (8.1, 8.0, "UNKNOWN")],
-)  # fmt: skip
+    [
+        (-2.0, 2.0, "NULL"),
+        (4.9, 2.0, "NULL"),
+        (5.1, 2.0, "UNKNOWN"),
+        (7.9, 8.0, "NULL"),
+        (8.1, 8.0, "UNKNOWN"),
+    ],
+)
 def test_with_nothing_named_the_generic_basis_tells_nothing_from_something_unknown(
     lack: float, threshold: float, verdict: str
 ) -> None:
@@ -150,9 +154,14 @@ def test_most_of_a_gap_must_close_if_more_than_a_small_one_stays(
 
 @pytest.mark.parametrize(
     ("given", "verdict"),
-    [(None, "NAMED"), (proof(None), "NAMED"), (proof(12.0), "NAMED"), (proof(-0.1), "UNKNOWN"),
-     (proof(0.0), "NAMED")],
-)  # fmt: skip
+    [
+        (None, "NAMED"),
+        (proof(None), "NAMED"),
+        (proof(12.0), "NAMED"),
+        (proof(-0.1), "UNKNOWN"),
+        (proof(0.0), "NAMED"),
+    ],
+)
 def test_names_must_predict_what_was_held_out(given: HeldOut | None, verdict: str) -> None:
     """Where nothing that was scored hangs on the effects, it speaks neither for nor against."""
     found, why = says(ended(stands(), stands("load_offset")), proof=given)

@@ -100,8 +100,9 @@ def ours_on_path(effect: Any, values: np.ndarray, seconds: float) -> np.ndarray:
 
 
 def test_a_migrating_centre_is_in_the_same_place() -> None:
-    hidden = Hidden("joint_centre_migration", "extension", strength=0.1,
-                    shape={"direction": [0.6, -0.8, 0.0]})  # fmt: skip
+    hidden = Hidden(
+        "joint_centre_migration", "extension", strength=0.1, shape={"direction": [0.6, -0.8, 0.0]}
+    )
     effect, values = mapped(hidden, {})
     seen, _ = world(hidden).places[-1](POSES)
     assert effect.place(POSES, values).q == pytest.approx(seen, abs=1e-12)
@@ -152,8 +153,14 @@ def test_values_of_other_places_shapes_and_coordinates_are_not_compared() -> Non
         value("stiffness_ratio", 0.9, 0.8, 1.0, [JOINTS[3]]),
         value("width", 2.5, 2.1, 2.9, [JOINTS[2]], "deg"),
     ]
-    one = {"name": "neutral_zone", "options": {"coordinate": "extension"}, "spread": "by joint",
-           "joint": None, "specimen": None, "values": values}  # fmt: skip
+    one = {
+        "name": "neutral_zone",
+        "options": {"coordinate": "extension"},
+        "spread": "by joint",
+        "joint": None,
+        "specimen": None,
+        "values": values,
+    }
     found = compared({"recipe": {"hidden": [hidden]}, "standing": [one]})
     assert [(o.name, o.close, o.inside) for o in found] == [
         ("stiffness_ratio", True, True),
@@ -166,12 +173,24 @@ def test_values_of_other_places_shapes_and_coordinates_are_not_compared() -> Non
 
 def test_levels_are_compared_against_their_mean() -> None:
     pattern = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
-    hidden = {"name": "level_dependence", "coordinate": "extension", "joint": None,
-              "specimen": None, "strength": 0.5, "shape": {"pattern": pattern}}  # fmt: skip
+    hidden = {
+        "name": "level_dependence",
+        "coordinate": "extension",
+        "joint": None,
+        "specimen": None,
+        "strength": 0.5,
+        "shape": {"pattern": pattern},
+    }
     ratios = [3.0 * np.exp(0.5 * step) for step in pattern]
     values = [value("ratio", r, r - 1, r + 1, [j]) for j, r in zip(JOINTS, ratios, strict=True)]
-    one = {"name": "level_dependence", "options": {"coordinate": "extension"}, "joint": None,
-           "specimen": None, "spread": "by joint", "values": values}  # fmt: skip
+    one = {
+        "name": "level_dependence",
+        "options": {"coordinate": "extension"},
+        "joint": None,
+        "specimen": None,
+        "spread": "by joint",
+        "values": values,
+    }
     found = compared({"recipe": {"hidden": [hidden]}, "standing": [one]})
     assert [o.error for o in found] == pytest.approx([0.0] * 6, abs=1e-12)
     assert {o.inside for o in found} == {None}
@@ -180,8 +199,15 @@ def test_levels_are_compared_against_their_mean() -> None:
 def value(
     name: str, at: float, low: float, high: float, place: list[str], unit: str = "1"
 ) -> dict[str, Any]:
-    return {"name": name, "place": place, "value": at, "low": low, "high": high, "unit": unit,
-            "at_bound": False}  # fmt: skip
+    return {
+        "name": name,
+        "place": place,
+        "value": at,
+        "low": low,
+        "high": high,
+        "unit": unit,
+        "at_bound": False,
+    }
 
 
 POSES = np.column_stack([np.linspace(-1, 1, N)[:, None] * [2e-3, -1e-3, 1e-3, 0.1, -0.06, 0.04]])

@@ -8,8 +8,11 @@ from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 
 from spinepipe.effects import Wrench, create
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
-from spinepipe.statics import Chain, Slots, Status, System, damped, follow
-from spinepipe.statics.damped import approach
+from spinepipe.statics import Slots, System, follow
+from spinepipe.statics import equilibrium as damped
+from spinepipe.statics.equilibrium import approach
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 
 def test_guesses_change_the_way_but_not_the_pose() -> None:
@@ -39,8 +42,10 @@ def tipping(n_steps: int = 4, effects: tuple[ScopedEffect, ...] = ()) -> System:
     model = spine(2, effects=effects)
     top = model.bodies[1].com
     sizes = [30.0, 5e4, 30.0, 0.0][:n_steps]
-    steps = [LoadStep(i, (Wrench(1, top, np.array([0.0, -size, 0.0]), NOWHERE),))
-             for i, size in enumerate(sizes)]  # fmt: skip
+    steps = [
+        LoadStep(i, (Wrench(1, top, np.array([0.0, -size, 0.0]), NOWHERE),))
+        for i, size in enumerate(sizes)
+    ]
     return System(Chain(model), model, LoadCase("press", 1, tuple(steps)))
 
 

@@ -30,7 +30,6 @@ from scipy.integrate import simpson
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.statics import (
-    Chain,
     FreeParameter,
     System,
     by_parameters,
@@ -39,6 +38,7 @@ from spinepipe.statics import (
     free_parameters,
     moved,
 )
+from spinepipe.world import Chain
 
 EVERYWHERE = (0, 1, 2)
 MIXED = (
@@ -56,10 +56,12 @@ PATHS = {
     "hysteresis": (friction(3),),
     "creep": (creeping(3),),
     "creep of ramps": (creeping(3, load="ramped"),),
-    "creep of what hysteresis carries": (friction(3, coordinate="right_bending"),
-                                         creeping(3, coordinate="right_bending")),
+    "creep of what hysteresis carries": (
+        friction(3, coordinate="right_bending"),
+        creeping(3, coordinate="right_bending"),
+    ),
     "mixed": MIXED,
-}  # fmt: skip
+}
 OFF = {
     "hysteresis": (friction(3, 0.0),),
     "creep": (creeping(3, 0.0),),
@@ -191,8 +193,9 @@ def test_six_joints_go_through_loading_unloading_and_loading_again(gravity: bool
     assert (unloading - reloading > 0.8 * 2 * 0.5 / 41.0).all()
 
 
-@pytest.mark.parametrize(("moment", "yield_deg", "steps"), [(0.5, 0.05, 3), (2.0, 0.1, 1),
-                                                            (5.0, 1.0, 3)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("moment", "yield_deg", "steps"), [(0.5, 0.05, 3), (2.0, 0.1, 1), (5.0, 1.0, 3)]
+)
 def test_corners_much_sharper_than_a_step_are_passed(moment, yield_deg, steps) -> None:
     coordinates = ("extension", "right_bending", "left_rotation")
     effects = tuple(friction(6, moment, yield_deg, c) for c in coordinates)

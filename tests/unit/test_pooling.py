@@ -13,22 +13,22 @@ from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student_t
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from spinepipe.calibrate import (
-    Evaluator,
-    MeasuredCase,
-    Pooled,
-    Problem,
-    fit,
-    pool,
-    pooling,
-    spreads,
+from spinepipe.calibrate import Evaluator, MeasuredCase, Pooled, Problem, fit, pool, pooling
+from spinepipe.calibrate import hierarchy as spreads
+from spinepipe.calibrate.hierarchy import (
+    Hierarchy,
+    LinearReadings,
+    Spreads,
+    condensed,
+    estimated,
+    tellable,
 )
-from spinepipe.calibrate.hierarchy import Hierarchy, LinearReadings, Spreads, condensed
-from spinepipe.calibrate.spreads import estimated, tellable
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics import Chain, Status, System, follow, free_parameters, moved
+from spinepipe.statics import System, follow, free_parameters, moved
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)
@@ -79,8 +79,9 @@ def density(designs: list[Array], targets: list[Array], dof: Array, spreads: Spr
 def known_exactly(table: Array) -> LinearReadings:
     """Readings of (S, J) unknowns that leave next to nothing open; NaN is not read at all."""
     rows = [np.eye(table.shape[1])[np.isfinite(row)] * 1e5 for row in table]
-    return condensed(rows, [r @ np.nan_to_num(t) for r, t in zip(rows, table, strict=True)],
-                     table.shape[1])  # fmt: skip
+    return condensed(
+        rows, [r @ np.nan_to_num(t) for r, t in zip(rows, table, strict=True)], table.shape[1]
+    )
 
 
 def drawn(rng: np.random.Generator, s: int, j: int, spreads: Spreads, mean: float) -> Array:
@@ -118,10 +119,14 @@ def test_slopes_are_those_of_the_likelihood() -> None:
 
     def along(name: str, direction: Array) -> float:
         ends = [
-            density(designs, targets, TWO_DOF,
-                    replace(SPREADS, **{name: getattr(SPREADS, name) * np.exp(step * direction)}))
+            density(
+                designs,
+                targets,
+                TWO_DOF,
+                replace(SPREADS, **{name: getattr(SPREADS, name) * np.exp(step * direction)}),
+            )
             for step in (-1e-4, 1e-4)
-        ]  # fmt: skip
+        ]
         return (ends[1] - ends[0]) / 2e-4
 
     for name in ("level", "specimen", "rest"):
@@ -161,9 +166,11 @@ def test_an_unbalanced_table_against_statsmodels() -> None:
     specimen, level = np.nonzero(np.isfinite(table))
     cells = pd.DataFrame({"specimen": specimen, "level": level, "x": table[specimen, level]})
     theirs = MixedLM.from_formula(
-        "x ~ 1", cells, groups=np.ones(len(cells)),
+        "x ~ 1",
+        cells,
+        groups=np.ones(len(cells)),
         vc_formula={"level": "0 + C(level)", "specimen": "0 + C(specimen)"},
-    ).fit(reml=True, method="lbfgs")  # fmt: skip
+    ).fit(reml=True, method="lbfgs")
     spreads = one_dof(*np.sqrt([*theirs.vcomp, theirs.scale]))
     hierarchy = Hierarchy(known_exactly(table), np.zeros(6, dtype=int), spreads)
     slopes, found = hierarchy.slopes(), hierarchy.posterior()
@@ -269,8 +276,9 @@ def measured_problem(truth: Array, seed: int, sd: Array = READING_SD, steps: int
     solved = follow(System(Chain(true_model), true_model, case))
     poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
     read = poses + sd * np.random.default_rng(seed).normal(size=poses.shape)
-    return Problem(model, (MeasuredCase(case, read),), free, ANGLES, -np.full(6, 3.0),
-                   np.full(6, 3.0))  # fmt: skip
+    return Problem(
+        model, (MeasuredCase(case, read),), free, ANGLES, -np.full(6, 3.0), np.full(6, 3.0)
+    )
 
 
 def cohort(sd: Array = READING_SD, steps: int = 3) -> list[Problem]:
@@ -458,8 +466,11 @@ def test_a_specimen_unlike_all_others_is_at_its_bounds() -> None:
     problems[1] = replace(problems[1], cases=(replace(case, measured=flipped),))
     found = pool(problems, noise=READING_SD)
     assert found.status is Status.CONVERGED_AT_BOUND
-    upper = [p.label for p, at in zip(problems[1].free, found.specimens[1].at_bound, strict=True)
-             if at == 1]  # fmt: skip
+    upper = [
+        p.label
+        for p, at in zip(problems[1].free, found.specimens[1].at_bound, strict=True)
+        if at == 1
+    ]
     assert upper == [f"{name}@L1L2" for name in ROTATIONS]
     assert [found.specimens[n].status for n in (0, 2)] == [Status.CONVERGED] * 2
 

@@ -10,22 +10,19 @@ from grid_cases import JOINTS, STIFFNESS, STUDY, made_up, project, table_of
 from scipy.spatial.transform import Rotation
 
 from spinepipe import studies
-from spinepipe.cohort.virtual_tests import VIRTUAL_TESTS, virtual_load_cases
+from spinepipe.cohort.load_tests import VIRTUAL_TESTS, virtual_load_cases
 from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.jobs.range_of_motion import (
-    draw_stiffness,
-    load_steps,
-    sample_frames,
-    simulate,
-    summary,
-    variance,
-)
-from spinepipe.jobs.range_of_motion.grid import read_grid
 from spinepipe.problems import InputError
-from spinepipe.studies import RangeOfMotion
-from spinepipe.studies.range_of_motion import VirtualTest
-from spinepipe.tables import RANGE_OF_MOTION, from_rows, read_frame, write
+from spinepipe.studies.range_of_motion import analyse as summary
+from spinepipe.studies.range_of_motion import analyse as variance
+from spinepipe.studies.range_of_motion import draw as draw_stiffness
+from spinepipe.studies.range_of_motion import draw as sample_frames
+from spinepipe.studies.range_of_motion import load_steps, simulate
+from spinepipe.studies.range_of_motion.analyse import read_grid
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion, VirtualTest
+from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
+from spinepipe.tables import from_rows, read_frame, write
 
 FILE = f"config/studies/{STUDY}.yaml"
 SIX = "[flexion, extension, right_bending, left_bending, left_rotation, right_rotation]"
@@ -95,7 +92,7 @@ def test_factors_fill_the_spread_evenly_on_a_logarithmic_scale() -> None:
 
 def test_specimens_have_draws_of_their_own_that_others_do_not_change(tmp_path: Path) -> None:
     def frames(root: Path) -> pd.DataFrame:
-        sample_frames.run(str(root), STUDY, str(root / "frames.parquet"))
+        sample_frames.sample_frames(str(root), STUDY, str(root / "frames.parquet"))
         return read_frame(root / "frames.parquet").set_index(["specimen", "pose", "joint"])
 
     two = frames(project(tmp_path / "two", "poses: 5\n", specimens=("a", "b")))
@@ -110,7 +107,7 @@ def test_levels_and_factors_make_the_stiffness_sets(tmp_path: Path) -> None:
     level = "extension_nm_per_rad: 7, right_bending_nm_per_rad: 8, left_rotation_nm_per_rad: 9"
     root = project(tmp_path, f"stiffness_sets: 6\nlevel_stiffness:\n  L2L3: {{{level}}}\n")
     path = root / "sets.parquet"
-    draw_stiffness.run(str(root), STUDY, str(path))
+    draw_stiffness.draw_stiffness(str(root), STUDY, str(path))
     sets = read_frame(path).set_index(["stiffness", "joint"])
     own = dict(STIFFNESS)
     assert sets.loc[0, "L1L2"].to_dict() == pytest.approx(own)
@@ -128,8 +125,8 @@ def moved(root: Path, pose: int = 0, stiffness: int = 0, specimen: str = "a") ->
     """Rows of one job."""
     frames, sets, output = (str(root / f"{name}.parquet") for name in ("frames", "sets", "out"))
     load_steps.asked_tests.cache_clear()  # a test changes its study in no time
-    sample_frames.run(str(root), STUDY, frames)
-    draw_stiffness.run(str(root), STUDY, sets)
+    sample_frames.sample_frames(str(root), STUDY, frames)
+    draw_stiffness.draw_stiffness(str(root), STUDY, sets)
     simulate.run(
         str(root), STUDY, frames, sets, specimen, f"{pose:04d}", f"{stiffness:02d}", output
     )
@@ -281,7 +278,7 @@ def test_summary_has_the_quantiles_of_pandas(tmp_path: Path) -> None:
     size = (3, 6, 4)
     root = made_up(tmp_path, size)
     path, rows = table_of(root, size, lost=((1, 2, 0), (1, 3, 3)))
-    summary.run(str(root), STUDY, str(path), str(root / "out.parquet"))
+    summary.summary(str(root), STUDY, str(path), str(root / "out.parquet"))
     found = read_frame(root / "out.parquet").set_index(["specimen", "test", "joint", "coordinate"])
     assert len(found) == 4 * 2 * 3 * 6
     column = rows["predicted_extension_deg"]
@@ -302,7 +299,7 @@ def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Pa
     size = (3, 7, 5)
     root = made_up(tmp_path, size)
     path, _ = table_of(root, size, lost=((1, 2, 3), (0, 0, 0)))
-    variance.run(str(root), STUDY, str(path), str(root / "out.parquet"))
+    variance.variance(str(root), STUDY, str(path), str(root / "out.parquet"))
     found = read_frame(root / "out.parquet").set_index(["specimen", "test"])
     assert set(found["status"]) == {"done"}
     assert set(found.loc["a", "n_poses"]) == {6}  # pose 0 is no draw
@@ -318,7 +315,7 @@ def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Pa
 def test_variance_of_a_study_without_draws_has_a_status(tmp_path: Path) -> None:
     root = made_up(tmp_path, (1, 1, 1))
     path, _ = table_of(root, (1, 1, 1))
-    variance.run(str(root), STUDY, str(path), str(root / "out.parquet"))
+    variance.variance(str(root), STUDY, str(path), str(root / "out.parquet"))
     found = read_frame(root / "out.parquet")
     assert set(found["status"]) == {"too_few"}
     assert found["pose_share"].isna().all()
@@ -359,10 +356,13 @@ def test_all_that_does_not_fit_is_told_at_once(tmp_path: Path) -> None:
         ("stiffness_sets: 0\n", "stiffness_sets", "greater than or equal to 1"),
         ("stiffness_spread: 1\n", "stiffness_spread", "greater than 1"),
         ("rows: all\n", "rows", "'peak' or 'all_steps'"),
-        ("level_stiffness:\n  L2L3: {extension_nm_per_rad: 7}\n",
-         "level_stiffness.L2L3.right_bending_nm_per_rad", "missing"),
+        (
+            "level_stiffness:\n  L2L3: {extension_nm_per_rad: 7}\n",
+            "level_stiffness.L2L3.right_bending_nm_per_rad",
+            "missing",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_fault_of_the_study_file_is_located(
     study: str, key: str, says: str, tmp_path: Path
 ) -> None:

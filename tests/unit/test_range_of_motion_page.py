@@ -13,16 +13,14 @@ from grid_cases import JOINTS, STUDY, made_up, table_of
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.range_of_motion import sample_frames
-from spinepipe.jobs.range_of_motion.grid import read_grid
-from spinepipe.jobs.range_of_motion.summary import summary_rows
-from spinepipe.jobs.range_of_motion.variance import variance_rows
-from spinepipe.report.page.results import Results
-from spinepipe.report.range_of_motion import levels_figure, variance_figure
-from spinepipe.report.range_of_motion.findings import findings
-from spinepipe.report.range_of_motion.page import range_of_motion_page
+from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
-from spinepipe.studies import RangeOfMotion, check
+from spinepipe.studies.range_of_motion import draw as sample_frames
+from spinepipe.studies.range_of_motion.analyse import read_grid, summary_rows, variance_rows
+from spinepipe.studies.range_of_motion.figures import levels_figure, variance_figure
+from spinepipe.studies.range_of_motion.page import findings, range_of_motion_page
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
 Size = tuple[int, int, int]
@@ -110,27 +108,40 @@ def variance_of(stiffness: Sequence[float]) -> pd.DataFrame:
     shares = np.array(stiffness)
     return pd.DataFrame(
         {
-            "specimen": "*", "test": "left_bending", "status": "done",
-            "joint": JOINTS[: len(shares)], "specimen_share": (1.0 - shares) / 3.0,
-            "pose_share": (1.0 - shares) / 3.0, "stiffness_share": shares,
+            "specimen": "*",
+            "test": "left_bending",
+            "status": "done",
+            "joint": JOINTS[: len(shares)],
+            "specimen_share": (1.0 - shares) / 3.0,
+            "pose_share": (1.0 - shares) / 3.0,
+            "stiffness_share": shares,
             "rest_share": (1.0 - shares) / 3.0,
         }
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(
     ("stiffness", "says"),
     [
-        ((0.61, 0.72, 0.55), "most of the variance is due to the stiffness (median 61 %, 55 % to "
-         "72 % over the joints)."),
-        ((0.45, 0.40, 0.48), "the largest share of the variance is due to the stiffness (median "
-         "45 %, 40 % to 48 % over the joints)."),
-        ((0.61, 0.72, 0.45), "the largest share of the variance is due to the stiffness (median "
-         "61 %, 45 % to 72 % over the joints)."),
+        (
+            (0.61, 0.72, 0.55),
+            "most of the variance is due to the stiffness (median 61 %, 55 % to "
+            "72 % over the joints).",
+        ),
+        (
+            (0.45, 0.40, 0.48),
+            "the largest share of the variance is due to the stiffness (median "
+            "45 %, 40 % to 48 % over the joints).",
+        ),
+        (
+            (0.61, 0.72, 0.45),
+            "the largest share of the variance is due to the stiffness (median "
+            "61 %, 45 % to 72 % over the joints).",
+        ),
         ((0.40,), "the largest share of the variance is due to the stiffness (40 %)."),
         ((0.60, 0.60), "most of the variance is due to the stiffness (60 % at every joint)."),
     ],
-)  # fmt: skip
+)
 def test_most_is_more_than_half_at_every_joint(
     stiffness: Sequence[float], says: str, tmp_path: Path
 ) -> None:
@@ -154,7 +165,7 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
     """Not with those of loads.csv, where the tests are virtual; no landmarks, so no vertebrae."""
     study, cohort, found = results(tmp_path, (2, 3, 4))
     (tmp_path / "config/cohorts/stack/loads.csv").write_text(LOADS)
-    sample_frames.run(str(tmp_path), STUDY, str(tmp_path / "frames.parquet"))
+    sample_frames.sample_frames(str(tmp_path), STUDY, str(tmp_path / "frames.parquet"))
     tables = {**found.tables, "frames": read_frame(tmp_path / "frames.parquet")}
     study = study if virtual else study.model_copy(update={"virtual_tests": None})
     cohort = check(tmp_path, STUDY)[1]

@@ -16,15 +16,13 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
-from spinepipe.jobs import report
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.page import Results, study_page
-from spinepipe.report.page.findings import findings
-from spinepipe.report.page.scene import MOST_POSES, as_script, scenes
-from spinepipe.report.page.significance import folded, in_full
-from spinepipe.report.page.solids import CORNERS, LONE_DISC_MM, solids
-from spinepipe.report.page.sortable import sortable
-from spinepipe.report.specimen_view import view_of
+from spinepipe.report.page.document import Results, sortable
+from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
+from spinepipe.report.specimen import view_of
+from spinepipe.studies.joint_pose_sensitivity import report
+from spinepipe.studies.joint_pose_sensitivity.findings import findings
+from spinepipe.studies.joint_pose_sensitivity.page import folded, in_full, study_page
 from spinepipe.tables import read_frame
 from spinepipe.tables.schema import Column
 
@@ -81,8 +79,9 @@ def made(root: Path, size: Size) -> tuple[str, list[Path]]:
     svgs, captions = (
         [str(folder / f"{name}.{kind}") for name in pictures] for kind in ("svg", "rst")
     )
-    report.run(str(root), STUDY, [str(file) for file in files], svgs, captions,
-               str(folder / "report.html"))  # fmt: skip
+    report.run(
+        str(root), STUDY, [str(file) for file in files], svgs, captions, str(folder / "report.html")
+    )
     return (folder / "report.html").read_text(encoding="utf-8"), files
 
 
@@ -195,10 +194,18 @@ def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path:
 def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     verdicts = ["inside"] * 3 + ["outside"] * 2 + ["contradicted", "not_computed"]
     rows = [
-        {"id": f"q{n}", "where": "Table 1", "quantity": f"quantity {n}", "unit": "mm",
-         "paper": 1.0, "ours": float(n), "verdict": verdict, "reason": "as <it> is"}
+        {
+            "id": f"q{n}",
+            "where": "Table 1",
+            "quantity": f"quantity {n}",
+            "unit": "mm",
+            "paper": 1.0,
+            "ours": float(n),
+            "verdict": verdict,
+            "reason": "as <it> is",
+        }
         for n, verdict in enumerate(verdicts)
-    ]  # fmt: skip
+    ]
     size = SIZES["one specimen"]
     folder = results(project(tmp_path, size), size)
     against = read_frame(write_table(folder, "against_gould_2024a", rows))
@@ -308,8 +315,10 @@ def test_only_some_specimens_are_drawn_and_the_page_says_so() -> None:
 def test_solids_of_vertebrae_with_two_endplates_one_or_none() -> None:
     centre = {"inferior_endplate_centre": np.zeros(3)}
     both = {**centre, "superior_endplate_centre": np.array([0.0, 0.03, 0.0])}
-    both |= {f"{side}_pedicle_base": np.array([0.0, 0.02, z]) for side, z in
-             (("left", -0.01), ("right", 0.01))}  # fmt: skip
+    both |= {
+        f"{side}_pedicle_base": np.array([0.0, 0.02, z])
+        for side, z in (("left", -0.01), ("right", 0.01))
+    }
     frames = dict.fromkeys(("A", "B", "C"), Pose(np.eye(3), np.zeros(3)))
     found = solids({"A": both, "B": centre, "C": {}}, frames, 1000.0)
     assert set(found) == {"A", "B"}
@@ -323,8 +332,16 @@ def test_solids_of_vertebrae_with_two_endplates_one_or_none() -> None:
 
 
 def test_repeated_tests_are_folded_and_counted() -> None:
-    one = {"specimen": "a", "family": "F", "test": "T", "joint": "*", "response": "r",
-           "factor": "f", "effect_name": "rho", "family_size": 4}  # fmt: skip
+    one = {
+        "specimen": "a",
+        "family": "F",
+        "test": "T",
+        "joint": "*",
+        "response": "r",
+        "factor": "f",
+        "effect_name": "rho",
+        "family_size": 4,
+    }
     numbers = [(0.9, 0.001, 0.004, 0.004), (-0.5, 0.02, 0.08, 0.04), (0.8, 0.002, 0.008, 0.006)]
     rows = [
         {**one, "stratum": str(k), "effect": e, "p": p, "p_bonferroni": b, "p_holm": h}

@@ -8,8 +8,8 @@ import pytest
 import search_cases as cases
 from search_cases import Array, Searched, exponential, one_sided, searched
 
-from spinepipe.discrepancy.outcome import Verdict
-from spinepipe.discrepancy.values import fitted_values
+from spinepipe.studies.discrepancy.search.model_files import fitted_values
+from spinepipe.studies.discrepancy.search.outcome import Verdict
 
 pytestmark = pytest.mark.slow
 

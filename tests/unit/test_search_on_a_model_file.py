@@ -7,9 +7,9 @@ import pytest
 from chain_cases import JOINTS, STUDY
 from discrepancy_cases import SPECIMENS, project
 
-from spinepipe.jobs.discrepancy import search
-from spinepipe.jobs.discrepancy.layout import OTHERS, TABLES
 from spinepipe.model.file import effects_for, read_model
+from spinepipe.studies.discrepancy import job as search
+from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 
 MODEL = """\
 model: given

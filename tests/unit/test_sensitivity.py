@@ -23,7 +23,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import (
-    Chain,
     System,
     by_joint_pose,
     by_load,
@@ -32,6 +31,7 @@ from spinepipe.statics import (
     free_parameters,
     moved,
 )
+from spinepipe.world import Chain
 
 LAWS = (
     scoped(CubicStiffening(), (0, 2)),

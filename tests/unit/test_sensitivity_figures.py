@@ -13,20 +13,30 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort, read
-from spinepipe.report.global_sensitivity import DRAW, sensitivity_page
-from spinepipe.report.global_sensitivity.drivers import driver, most
-from spinepipe.report.global_sensitivity.findings import findings, opening
-from spinepipe.report.global_sensitivity.loaded import loaded
-from spinepipe.report.global_sensitivity.measures import measures_of
-from spinepipe.report.global_sensitivity.page import TITLES
-from spinepipe.report.global_sensitivity.panels import leading, outputs, pooled, shown
-from spinepipe.report.global_sensitivity.responses import running
-from spinepipe.report.global_sensitivity.sureness import LEFT_OUT, settled
-from spinepipe.report.global_sensitivity.tables import shown_tables
-from spinepipe.report.page.results import Results
+from spinepipe.report.global_sensitivity import DRAW
+from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES, Table, from_rows
+from spinepipe.studies.global_sensitivity.figures.panels import (
+    leading,
+    loaded,
+    measures_of,
+    outputs,
+    pooled,
+    shown,
+)
+from spinepipe.studies.global_sensitivity.figures.scatter import running
+from spinepipe.studies.global_sensitivity.findings import (
+    LEFT_OUT,
+    driver,
+    findings,
+    most,
+    opening,
+    settled,
+)
+from spinepipe.studies.global_sensitivity.page import TITLES, sensitivity_page, shown_tables
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
+from spinepipe.tables import Table, from_rows
 
 Rows = list[dict[str, Any]]
 
@@ -66,11 +76,17 @@ def truth(index: str, factor: str) -> float:
 
 def places(specimens: Sequence[str], kinds: Sequence[str]) -> Rows:
     return [
-        {"specimen": specimen, "output": output, "test": test, "step": 3, "joint": joint,
-         "coordinate": coordinate}
+        {
+            "specimen": specimen,
+            "output": output,
+            "test": test,
+            "step": 3,
+            "joint": joint,
+            "coordinate": coordinate,
+        }
         for specimen, output, test, joint in product(specimens, kinds, TESTS, JOINTS)
         for coordinate in ("extension", "left_rotation")
-    ]  # fmt: skip
+    ]
 
 
 def indices(
@@ -86,22 +102,37 @@ def indices(
         size, floor = truth(index, factor), FLOOR.get(index, 0.0)
         low = max(size - HALF, 0.0) if size else 0.0
         ends = {} if method == "fast" else {"ci_low": low, "ci_high": size + HALF * (size > 0.0)}
-        rows.append({**place, **ends, "index": index, "factor": factor, "other": "",
-                     "estimate": size, "noise_floor": floor if "dummy" in factors else None,
-                     "above_floor": low > floor if "dummy" in factors else None,
-                     "runs": 3072 - 12 * failed, "failed": failed, "status": "done",
-                     "message": ""})  # fmt: skip
+        rows.append(
+            {
+                **place,
+                **ends,
+                "index": index,
+                "factor": factor,
+                "other": "",
+                "estimate": size,
+                "noise_floor": floor if "dummy" in factors else None,
+                "above_floor": low > floor if "dummy" in factors else None,
+                "runs": 3072 - 12 * failed,
+                "failed": failed,
+                "status": "done",
+                "message": "",
+            }
+        )
     return table(INDICES, rows)
 
 
 def convergence(found: pd.DataFrame, off: float = 0.2) -> pd.DataFrame:
     """Estimates that are off by so much at a quarter of the runs, by a quarter of it at half."""
     grown = [
-        {**row, "samples": runs // 12, "runs": runs,
-         "estimate": row["estimate"] + wrong * off * (row["factor"] == "load_size")}
+        {
+            **row,
+            "samples": runs // 12,
+            "runs": runs,
+            "estimate": row["estimate"] + wrong * off * (row["factor"] == "load_size"),
+        }
         for runs, wrong in ((768, 1.0), (1536, 0.25), (3072, 0.0))
         for row in found.to_dict("records")
-    ]  # fmt: skip
+    ]
     return table(CONVERGENCE, [{str(k): v for k, v in row.items()} for row in grown])
 
 
@@ -126,12 +157,25 @@ def runs(n: int = 600, lost: int = 5, **groups: str) -> tuple[pd.DataFrame, pd.D
     answers: Rows = []
     for k, test, joint in product(range(n), TESTS, JOINTS):
         gone, size = k < lost, (1.0 + (joint == "L4L5")) * np.asarray(output)[k]
-        sizes = {} if gone else {
-            column.name: size for column in RESPONSES.columns if column.unit in ("deg", "N m")
-        }  # fmt: skip
-        answers.append({"specimen": "a", "sample": k, "test": test, "step": 3, "joint": joint,
-                        **sizes, "status": "unstable" if gone else "converged",
-                        "message": ""})  # fmt: skip
+        sizes = (
+            {}
+            if gone
+            else {
+                column.name: size for column in RESPONSES.columns if column.unit in ("deg", "N m")
+            }
+        )
+        answers.append(
+            {
+                "specimen": "a",
+                "sample": k,
+                "test": test,
+                "step": 3,
+                "joint": joint,
+                **sizes,
+                "status": "unstable" if gone else "converged",
+                "message": "",
+            }
+        )
     return table(RESPONSES, answers), table(DESIGN, design)
 
 
@@ -277,9 +321,14 @@ def test_factors_without_effect_leave_room_for_the_others(cohort: Cohort) -> Non
 
 def test_pooled_ends_are_means_of_ends() -> None:
     rows = pd.DataFrame(
-        {"index": "ST", "factor": ["x", "x", "y"], "estimate": [0.2, 0.4, 0.1],
-         "ci_low": [0.1, 0.2, 0.0], "ci_high": [0.3, 0.8, 0.2]}
-    )  # fmt: skip
+        {
+            "index": "ST",
+            "factor": ["x", "x", "y"],
+            "estimate": [0.2, 0.4, 0.1],
+            "ci_low": [0.1, 0.2, 0.0],
+            "ci_high": [0.3, 0.8, 0.2],
+        }
+    )
     one = pooled(rows).iloc[0]
     found = [one[name] for name in ("estimate", "low", "high", "lowest", "highest", "places")]
     assert found == pytest.approx([0.3, 0.15, 0.55, 0.2, 0.4, 2])
@@ -328,8 +377,10 @@ def test_runs_over_the_leading_factors(cohort: Cohort) -> None:
     figure = drawn("top_factors", cohort, responses, design, indices())
     first = figure.axes[:3]
     assert [axis.get_xlabel() for axis in first] == [
-        "load size (times)", "load point x (mm)", "mass (times)"
-    ]  # fmt: skip
+        "load size (times)",
+        "load point x (mm)",
+        "mass (times)",
+    ]
     assert first[0].get_ylabel() == "Flexion, L4L5\nmotion in flexion–extension (°)"
     share = 16.0 / WHOLE
     expected = f"ST {share:.2f} ({share - HALF:.2f} to {share + HALF:.2f})"
@@ -463,8 +514,15 @@ def test_outputs_without_an_index_are_told(cohort: Cohort) -> None:
 def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
     found = indices()
     pair = found[found["index"] == "S1"].query("factor == 'load_size'")
-    pair = pair.assign(index="S2", other="mass", estimate=0.2, ci_low=0.15, ci_high=0.25,
-                       noise_floor=0.1, above_floor=True)  # fmt: skip
+    pair = pair.assign(
+        index="S2",
+        other="mass",
+        estimate=0.2,
+        ci_low=0.15,
+        ci_high=0.25,
+        noise_floor=0.1,
+        above_floor=True,
+    )
     both = Results({"indices": pd.concat([found, pair])}, {}, {}, {})
     words = " ".join(findings(study(), cohort, both))
     assert "(S2): load size with mass 0.20 [0.15 to 0.25]." in words

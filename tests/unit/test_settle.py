@@ -8,8 +8,10 @@ from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 
 from spinepipe.effects import Wrench
 from spinepipe.model import LoadCase, LoadStep, SpineModel
-from spinepipe.statics import Chain, Program, Status, System, follow, settle
-from spinepipe.statics.rosenbrock import ALPHA, COUPLING, ERROR_WEIGHTS, GAMMA, WEIGHTS
+from spinepipe.statics import Program, System, follow, settle
+from spinepipe.statics.settling import ALPHA, COUPLING, ERROR_WEIGHTS, GAMMA, WEIGHTS
+from spinepipe.status import Status
+from spinepipe.world import Chain
 
 ACCURACY = 2e-5
 """rad over a run: some twenty steps that may each err by 3e-4 of 0.1 rad at most, mostly less."""

@@ -11,11 +11,9 @@ from spinepipe.calibrate.solvers import Settling
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics import (
-    Chain,
     Course,
     FreeParameter,
     Loading,
-    Status,
     System,
     free_parameters,
     move,
@@ -23,6 +21,8 @@ from spinepipe.statics import (
     settle,
     settled_by_parameters,
 )
+from spinepipe.status import Status
+from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers.chain import Load

@@ -12,9 +12,11 @@ from SALib.sample.morris import morris
 from spinepipe import cohort as cohorts
 from spinepipe import studies
 from spinepipe.problems import InputError
-from spinepipe.studies import GlobalSensitivity, size_of_design
-from spinepipe.studies.size_of_design import Size, available_memory, free_disk
-from spinepipe.tables import RESPONSES, to_arrow
+from spinepipe.studies.global_sensitivity import size_of_design
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.size_of_design import Size, available_memory, free_disk
+from spinepipe.studies.global_sensitivity.tables import RESPONSES
+from spinepipe.tables import to_arrow
 from spinepipe.tables import write as write_table
 
 FACTORS = [
@@ -30,9 +32,13 @@ def study(method: str, samples: int, grouped: bool = False, **more: object) -> G
         key: more.pop(key) for key in ("second_order",) if key in more
     }
     return GlobalSensitivity(
-        study="probe", kind="global_sensitivity", cohort="small", factors=factors, design=design,
+        study="probe",
+        kind="global_sensitivity",
+        cohort="small",
+        factors=factors,
+        design=design,
         **more,
-    )  # fmt: skip
+    )
 
 
 def drawn(found: GlobalSensitivity) -> int:
@@ -70,9 +76,13 @@ def test_the_issue_s_design_has_51200_runs() -> None:
         {"of": "load_size", "times": {"sd": 0.1}, "name": f"factor{number}"} for number in range(24)
     ]
     found = GlobalSensitivity(
-        study="s", kind="global_sensitivity", cohort="c", factors=factors, dummy=False,
+        study="s",
+        kind="global_sensitivity",
+        cohort="c",
+        factors=factors,
+        dummy=False,
         design={"samples": 1024},
-    )  # fmt: skip
+    )
     assert found.n_runs == 51_200
 
 
@@ -113,10 +123,14 @@ def test_stated_bytes_per_row_hold(tmp_path: Path) -> None:
     columns = {c.name: rng.normal(size=rows) for c in RESPONSES.columns if c.kind == "number"}
     samples = np.repeat(np.arange(rows // 4), 4).tolist()
     names = {
-        "specimen": ["s01"] * rows, "sample": samples, "test": ["flexion_extension"] * rows,
-        "step": [1] * rows, "joint": ["L4L5", "L3L4", "L2L3", "L1L2"] * (rows // 4),
-        "status": ["converged"] * rows, "message": [""] * rows,
-    }  # fmt: skip
+        "specimen": ["s01"] * rows,
+        "sample": samples,
+        "test": ["flexion_extension"] * rows,
+        "step": [1] * rows,
+        "joint": ["L4L5", "L3L4", "L2L3", "L1L2"] * (rows // 4),
+        "status": ["converged"] * rows,
+        "message": [""] * rows,
+    }
     write_table(to_arrow(RESPONSES, columns | names), tmp_path / "r.parquet", {})
     per_row = (tmp_path / "r.parquet").stat().st_size / rows
     assert 0.8 * size_of_design.RESPONSE_ON_DISK < per_row < size_of_design.RESPONSE_ON_DISK

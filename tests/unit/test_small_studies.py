@@ -14,20 +14,23 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.agreement import agreement_figure
-from spinepipe.report.bootstrap import bootstrap_figure
-from spinepipe.report.errors import errors_figure
-from spinepipe.report.landmark_precision import landmark_precision_figure
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.page import Results
-from spinepipe.report.page.captions import caption
+from spinepipe.report.page.document import Results
 from spinepipe.report.page.scene import scenes
-from spinepipe.report.pose_against_stiffness import pose_against_stiffness_figure
-from spinepipe.report.sections import across_of
-from spinepipe.report.specimen_view import view_of
+from spinepipe.report.panels import across_of, log_ticks
+from spinepipe.report.specimen import view_of
 from spinepipe.report.style import TALLEST_MM, style
-from spinepipe.report.success import success_figure
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.figures.agreement import agreement_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.errors import errors_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
+    landmark_precision_figure,
+)
+from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
+    pose_against_stiffness_figure,
+)
+from spinepipe.studies.joint_pose_sensitivity.figures.success import success_figure
+from spinepipe.studies.joint_pose_sensitivity.page import caption
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 
 FOUR = ("anterior", "superior", "extension", "right_bending")
@@ -70,11 +73,15 @@ def overlaps(figure: Figure, along: str) -> bool:
         axes = axis.xaxis if along == "x" else axis.yaxis
         ends = axes.get_view_interval()
         boxes = sorted(
-            (tick.label1.get_window_extent() for tick in axes.get_major_ticks()
-             if tick.label1.get_visible() and tick.label1.get_text()
-             and min(ends) <= tick.get_loc() <= max(ends)),
+            (
+                tick.label1.get_window_extent()
+                for tick in axes.get_major_ticks()
+                if tick.label1.get_visible()
+                and tick.label1.get_text()
+                and min(ends) <= tick.get_loc() <= max(ends)
+            ),
             key=lambda box: float(getattr(box, low)),
-        )  # fmt: skip
+        )
         if any(getattr(b, low) < getattr(a, high) for a, b in pairwise(boxes)):
             return True
     return False
@@ -141,8 +148,11 @@ def test_trees_of_too_few_rows_keep_their_panels(tmp_path: Path) -> None:
     with style():
         figure = pose_against_stiffness_figure(study, cohort, tables)
     assert [a.get_title(loc="left").split(": ")[1] for a in panels(figure)] == [
-        "variance", "variance", "tree", "tree",
-    ]  # fmt: skip
+        "variance",
+        "variance",
+        "tree",
+        "tree",
+    ]
     assert words(figure).count(why) == 5, "in two rows of two panels, and below them"
     assert f"no tree for 4 of 4 errors: {why}" in words(figure)
 
@@ -179,8 +189,9 @@ def test_exact_fits_are_exact_not_1e_16(tmp_path: Path) -> None:
         figures = [agreement_figure(study, cohort, tables), errors_figure(cohort, runs)]
         for figure in figures:
             figure.canvas.draw()
-            offsets = [a.get_offset_text().get_text() for p in panels(figure)
-                       for a in (p.xaxis, p.yaxis)]  # fmt: skip
+            offsets = [
+                a.get_offset_text().get_text() for p in panels(figure) for a in (p.xaxis, p.yaxis)
+            ]
             assert not any(offsets)
     assert words(figures[0]).count("exact to rounding, n = 12") == 4
     assert "bias" not in words(figures[0])

@@ -10,15 +10,21 @@ from scipy.optimize import brentq
 from spinepipe.effects import Wrench
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
-from spinepipe.statics import Chain, SolvedStep, Status, System, follow
-from spinepipe.world import StaleChain
+from spinepipe.statics import SolvedStep, System, follow
+from spinepipe.status import Status
+from spinepipe.world import Chain, StaleChain
 
 ROUND_OFF = 1e-13
 """m and rad: loads are good to 1e-13 of their size, motion is of order 0.1."""
 
 
-def upright(n: int, stiffness: tuple[float, ...], mass: float = 0.0, arm=(0.0, 0.02, 0.0),
-            inertia: float = 0.0) -> SpineModel:  # fmt: skip
+def upright(
+    n: int,
+    stiffness: tuple[float, ...],
+    mass: float = 0.0,
+    arm=(0.0, 0.02, 0.0),
+    inertia: float = 0.0,
+) -> SpineModel:
     """n upright joints 30 mm apart; the masses stand ``arm`` off their joint's centre."""
     origins = [np.array([0.0, 0.03 * j, 0.0]) for j in range(n)]
     scope = bushing(n)

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinepipe.jobs.discrepancy import store as store_module
-from spinepipe.jobs.discrepancy.content import content_digest
-from spinepipe.jobs.discrepancy.store import Store
+from spinepipe.studies.discrepancy import store as store_module
+from spinepipe.studies.discrepancy.store import Store, content_digest
 
 MODULE = "spinepipe.jobs.discrepancy.search"
 
@@ -151,10 +150,33 @@ def test_content_is_what_a_value_holds() -> None:
 
 def test_content_tells_apart() -> None:
     values: list[Any] = [
-        None, 0, 0.0, False, "", b"", "left", Side.LEFT, (), {}, [1, [2]], [[1], 2], [1, 2],
-        {"a": 1}, {"a": 1, "b": 2}, {"b": 2, "a": 1}, np.zeros(2), np.zeros(2, int),
-        np.zeros((2, 1)), np.float64(0.0), of(0.0, 0.0), {1, 2}, len, max, Held, scaled,
-    ]  # fmt: skip
+        None,
+        0,
+        0.0,
+        False,
+        "",
+        b"",
+        "left",
+        Side.LEFT,
+        (),
+        {},
+        [1, [2]],
+        [[1], 2],
+        [1, 2],
+        {"a": 1},
+        {"a": 1, "b": 2},
+        {"b": 2, "a": 1},
+        np.zeros(2),
+        np.zeros(2, int),
+        np.zeros((2, 1)),
+        np.float64(0.0),
+        of(0.0, 0.0),
+        {1, 2},
+        len,
+        max,
+        Held,
+        scaled,
+    ]
     assert len({content_digest(value) for value in values}) == len(values)
 
 
@@ -179,8 +201,11 @@ def process(folder: Path, what: str, seed: str = "0") -> subprocess.CompletedPro
     return subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, **places, "PYTHONPATH": paths, "PYTHONHASHSEED": seed},
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
 
 
 def test_another_process_finds_the_piece_and_nothing_is_said_or_left(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from cohort_cases import Change, cell, joints, line, swap, text, without, write
 
 from spinepipe import studies
 from spinepipe.problems import InputError, Problem
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 STUDY = """\
 study: probe

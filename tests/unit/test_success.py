@@ -4,8 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.jobs.success_by_method import count_by_method
-from spinepipe.sensitivity.success import above_start, near_start
+from spinepipe.studies.joint_pose_sensitivity.success import (
+    above_start,
+    count_by_method,
+    near_start,
+)
 
 START = np.array([100.0, 40.0])
 

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from spinepipe.statics import Status
+from spinepipe.status import Status
 from spinepipe.tables import (
     TABLES,
     BadTable,
@@ -19,7 +19,7 @@ from spinepipe.tables import (
     to_arrow,
     write,
 )
-from spinepipe.tables.columns import MESSAGE, SPECIMEN, status
+from spinepipe.tables.schema import MESSAGE, SPECIMEN, status
 
 TABLE = Table(
     "small",
@@ -86,9 +86,8 @@ def test_bad_cells_are_refused_with_their_column(column, value, said) -> None:
 
 @pytest.mark.parametrize(
     ("column", "value"),
-    [("pose", np.nan), ("pose", 2**40), ("specimen", 3), ("specimen", np.nan),
-     ("sure", "yes")],
-)  # fmt: skip
+    [("pose", np.nan), ("pose", 2**40), ("specimen", 3), ("specimen", np.nan), ("sure", "yes")],
+)
 def test_cells_of_the_wrong_kind_are_refused_with_their_column(column, value) -> None:
     with pytest.raises(BadTable, match=rf"small\.{column}"):
         to_arrow(TABLE, spoiled(column, value))

@@ -16,16 +16,20 @@ from testable_cases import (
     tried_in,
 )
 
-from spinepipe.discrepancy.design import extra_tests
-from spinepipe.discrepancy.design.additions import MENU
-from spinepipe.discrepancy.design.confusions import Confusion, confusions, families
-from spinepipe.discrepancy.design.seen import Design, candidates, seen_in
-from spinepipe.discrepancy.design.testable import Detectable, judgements
-from spinepipe.discrepancy.design.told_apart import told_apart
-from spinepipe.discrepancy.evidence import SIZES
-from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread
+from spinepipe.studies.discrepancy.design import extra_tests
+from spinepipe.studies.discrepancy.design.extra_tests import MENU
+from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.studies.discrepancy.design.testable import Detectable, judgements
+from spinepipe.studies.discrepancy.design.told_apart import (
+    Confusion,
+    confusions,
+    families,
+    told_apart,
+)
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.screen import SIZES
+from spinepipe.studies.discrepancy.store import at_once
 
 ASYMMETRY = only("flexion_extension_asymmetry", coordinate="extension")
 

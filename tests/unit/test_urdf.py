@@ -102,8 +102,12 @@ def test_pybullet_moves_points_and_weighs_as_the_model_says() -> None:
     skew = rng.normal(0, 1e-4, (3, 3))
     inertia = np.diag([3e-4, 4e-4, 5e-4]) + skew @ skew.T * 1e3  # principal axes of its own
     body = model.bodies[2]
-    model = SpineModel(**{**vars(model), "bodies": (*model.bodies[:2], type(body)(
-        body.name, body.mass, body.com, inertia))} )  # fmt: skip
+    model = SpineModel(
+        **{
+            **vars(model),
+            "bodies": (*model.bodies[:2], type(body)(body.name, body.mass, body.com, inertia)),
+        }
+    )
     chain, point = Chain(model), np.array([0.02, 0.11, -0.01])
     q = np.tile([1e-3] * 3 + [0.2] * 3, 3) * rng.normal(size=18)
     linear, _ = chain.jacobian(q, 2, chain.local_point(2, point))
@@ -114,8 +118,9 @@ def test_pybullet_moves_points_and_weighs_as_the_model_says() -> None:
             return placed(model, q + h * along, 2, point)
 
         def mass_moment(h: float, along: np.ndarray = unit) -> np.ndarray:
-            return sum(b.mass * placed(model, q + h * along, i, b.com)
-                       for i, b in enumerate(model.bodies))  # fmt: skip
+            return sum(
+                b.mass * placed(model, q + h * along, i, b.com) for i, b in enumerate(model.bodies)
+            )
 
         # fourth-order differences of positions of 0.1 m, good to 1e-17, over 1e-3
         np.testing.assert_allclose(linear[column], slope(position, 1e-3), rtol=0, atol=1e-12)

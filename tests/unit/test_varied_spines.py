@@ -11,12 +11,16 @@ from scipy.spatial.transform import Rotation
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, landmarks
-from spinepipe.cohort.varied.asked_test import asked_tests
-from spinepipe.cohort.varied.change import Change, Of
-from spinepipe.cohort.varied.landmark_frames import many_joint_frames, one_joint_frame
-from spinepipe.cohort.varied.start import Start, start_of
-from spinepipe.cohort.varied.vary import Varied, vary
 from spinepipe.frames import FRAME_LANDMARKS, joint_pose, transform_of
+from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.start import (
+    Start,
+    asked_tests,
+    many_joint_frames,
+    one_joint_frame,
+    start_of,
+)
+from spinepipe.studies.global_sensitivity.vary import Varied, vary
 
 STIFFNESS = np.array([24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0])
 DAMPING = np.array([1000.0] * 3 + [1.4] * 3)
@@ -149,9 +153,13 @@ def test_frames_move_along_and_turn_about_their_own_axes(cohort: Cohort) -> None
 def test_landmarks_are_moved_before_the_frames_they_make(cohort: Cohort) -> None:
     landmark = Change(Of.LANDMARK, ("L3",), 2, "superior_endplate_centre")
     centre = Change(Of.JOINT_CENTRE, (), 0)
-    both_ways = [one(cohort, *order) for order in (
-        ((landmark, 0.004), (centre, 0.002)), ((centre, 0.002), (landmark, 0.004)),
-    )]  # fmt: skip
+    both_ways = [
+        one(cohort, *order)
+        for order in (
+            ((landmark, 0.004), (centre, 0.002)),
+            ((centre, 0.002), (landmark, 0.004)),
+        )
+    ]
     made = one(cohort, (landmark, 0.004)).spines
     for varied in both_ways:
         expected = made.origins[0] + 0.002 * made.rotations[0, :, :, 0]

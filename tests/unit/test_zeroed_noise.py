@@ -8,9 +8,10 @@ import statsmodels.api as sm
 from example_effects import loaded, spine
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
-from spinepipe.calibrate.zeroing import whitened
+from spinepipe.calibrate.problem import whitened
 from spinepipe.effects.contract import Array
-from spinepipe.statics import Chain, System, follow, free_parameters
+from spinepipe.statics import System, follow, free_parameters
+from spinepipe.world import Chain
 
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)

@@ -3,20 +3,27 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from spinepipe.discrepancy.base import BUSHING, DAMPING, base_parameters
-from spinepipe.discrepancy.design.extra_tests import bench, not_testable
-from spinepipe.discrepancy.design.seen import seen_in
-from spinepipe.discrepancy.design.testable import Judgement, judgements
-from spinepipe.discrepancy.forms import Form, Trials, Variant, trials
-from spinepipe.discrepancy.grounds import Grounds, Start, laid
-from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.nuisance import NuisancePriors
-from spinepipe.discrepancy.prediction import Simulated
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
-from spinepipe.discrepancy.tasks import at_once
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
+from spinepipe.studies.discrepancy.design.seen import seen_in
+from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
+from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    BUSHING,
+    DAMPING,
+    Form,
+    Trials,
+    Variant,
+    base_parameters,
+    trials,
+)
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
+from spinepipe.studies.discrepancy.search.prediction import Simulated
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
 STIFFNESS = np.array([1.5e5, 1.5e6, 1.5e5, 60.0, 50.0, 70.0])

@@ -12,10 +12,9 @@ from scipy.stats import t
 
 from spinepipe import cohort as cohorts
 from spinepipe.calibrate import fit, pool
-from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.statics import moved
-from spinepipe.studies import CohortStiffness
+from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.units import COORDINATES
 from tests.generators.phantom import phantom, write
 from tests.validation.made_by import made_by
@@ -40,16 +39,18 @@ def table(seeds: Sequence[int] = range(PHANTOMS)) -> pd.DataFrame:
         known = part[part["identifiable"]]
         inside = known.groupby("seed")["inside"].mean()
         ends = t.interval(0.95, len(inside) - 1, inside.mean(), inside.sem())
-        found.append({
-            **dict(zip(keys, key, strict=True)),
-            "parameters": len(part),
-            "identifiable": len(known),
-            "coverage_percent": 100.0 * known["inside"].mean(),
-            "low_percent": 100.0 * ends[0],
-            "high_percent": 100.0 * ends[1],
-            "worst_phantom_percent": 100.0 * inside.min(),
-            "median_error_percent": 100.0 * float(known["log_error"].abs().median()),
-        })  # fmt: skip
+        found.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "parameters": len(part),
+                "identifiable": len(known),
+                "coverage_percent": 100.0 * known["inside"].mean(),
+                "low_percent": 100.0 * ends[0],
+                "high_percent": 100.0 * ends[1],
+                "worst_phantom_percent": 100.0 * inside.min(),
+                "median_error_percent": 100.0 * float(known["log_error"].abs().median()),
+            }
+        )
     return pd.DataFrame(found)
 
 
@@ -114,10 +115,12 @@ def _rows(seed: int, error: float, folder: Path) -> pd.DataFrame:
 def _frame(
     representation: str, at: Sequence[tuple[int, int]], off: Sequence[float], error: np.ndarray
 ) -> pd.DataFrame:
-    return pd.DataFrame({
-        "representation": representation,
-        "coordinate": [COORDINATES[column] for _, column in at],
-        "log_error": off,
-        "inside": np.abs(off) <= Z * error,
-        "identifiable": error < STUDY.identifiable_below,
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "representation": representation,
+            "coordinate": [COORDINATES[column] for _, column in at],
+            "log_error": off,
+            "inside": np.abs(off) <= Z * error,
+            "identifiable": error < STUDY.identifiable_below,
+        }
+    )

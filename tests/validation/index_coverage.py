@@ -110,12 +110,14 @@ def _summary(rows: pd.DataFrame) -> pd.DataFrame:
     found = []
     for key, part in rows.groupby(KEYS, sort=False):
         each = part.groupby(["factor", "other"])["inside"].mean()
-        found.append({
-            **dict(zip(KEYS, key, strict=True)),
-            "pairs": len(part),
-            "coverage_percent": 100.0 * part["inside"].mean(),
-            "worst_index_percent": 100.0 * each.min(),
-            "median_width": part["width"].median(),
-            "rms_error": float(np.sqrt((part["off"] ** 2).mean())),
-        })  # fmt: skip
+        found.append(
+            {
+                **dict(zip(KEYS, key, strict=True)),
+                "pairs": len(part),
+                "coverage_percent": 100.0 * part["inside"].mean(),
+                "worst_index_percent": 100.0 * each.min(),
+                "median_width": part["width"].median(),
+                "rms_error": float(np.sqrt((part["off"] ** 2).mean())),
+            }
+        )
     return pd.DataFrame(found)

@@ -3,7 +3,7 @@
 import pytest
 from small_project import Project
 
-from spinepipe.jobs.layout import FIGURES
+from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from small_project import SKIPPED, Project, copy_project, written
 
-from spinepipe.jobs.range_of_motion.layout import ROM_FIGURES, TABLES
+from spinepipe.studies.range_of_motion.kind import ROM_FIGURES, TABLES
 from spinepipe.tables import TABLES as SCHEMAS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))

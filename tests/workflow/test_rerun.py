@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from small_project import Project, written
 
-from spinepipe.jobs import layout
+from spinepipe.studies.joint_pose_sensitivity import kind as layout
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from small_project import Project
 
-from spinepipe.jobs import layout
+from spinepipe.studies.joint_pose_sensitivity import kind as layout
 from spinepipe.tables import TABLES
 from spinepipe.units import COORDINATE_COLUMNS
 

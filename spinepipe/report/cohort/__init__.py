@@ -1,9 +1,11 @@
 """Figures and report of studies of kind cohort_stiffness."""
 
-from spinepipe.report.cohort.error_map import error_map_figure
-from spinepipe.report.cohort.held_out_error import held_out_error_figure
-from spinepipe.report.cohort.load_case_stiffness import load_case_stiffness_figure
-from spinepipe.report.cohort.stiffness_by_level import stiffness_by_level_figure
+from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure
+from spinepipe.studies.cohort_stiffness.figures.held_out_error import held_out_error_figure
+from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import (
+    load_case_stiffness_figure,
+)
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import stiffness_by_level_figure
 
 __all__ = [
     "error_map_figure",

@@ -6,13 +6,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.discrepancy.effect_confusions import effect_confusions_figure
-from spinepipe.report.discrepancy.effect_evidence import effect_evidence_figure
-from spinepipe.report.discrepancy.gap_by_step import gap_by_step_figure
-from spinepipe.report.discrepancy.gap_held_out import gap_held_out_figure
-from spinepipe.report.discrepancy.gap_map import gap_map_figure
-from spinepipe.report.discrepancy.read_verdict import read_verdict
-from spinepipe.report.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.figures.effects import (
+    effect_confusions_figure,
+    effect_evidence_figure,
+)
+from spinepipe.studies.discrepancy.figures.gap_held_out import gap_held_out_figure
+from spinepipe.studies.discrepancy.figures.gap_map import gap_by_step_figure, gap_map_figure
+from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
 
 __all__ = ["DRAW", "read_verdict"]
 

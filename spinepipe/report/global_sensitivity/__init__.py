@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from spinepipe.report.global_sensitivity.convergence import convergence_figure
-from spinepipe.report.global_sensitivity.indices import indices_figure
-from spinepipe.report.global_sensitivity.page import sensitivity_page
-from spinepipe.report.global_sensitivity.scatter import scatter_figure
+from spinepipe.studies.global_sensitivity.figures.convergence import convergence_figure
+from spinepipe.studies.global_sensitivity.figures.indices import indices_figure
+from spinepipe.studies.global_sensitivity.figures.scatter import scatter_figure
+from spinepipe.studies.global_sensitivity.page import sensitivity_page
 
 __all__ = ["DRAW", "convergence_figure", "indices_figure", "scatter_figure", "sensitivity_page"]
 

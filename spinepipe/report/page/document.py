@@ -1,24 +1,238 @@
-"""One HTML document, whatever the kind of study: what goes into the template."""
+"""One HTML document, whatever the kind of study: what goes into the template.
+
+What was run: settings, seed, versions and digests, from the files of the tables.
+
+What a report is made of.
+
+Finding about the paper: how many of its numbers ours are inside the range of.
+
+Tables as the page shows them: columns with unit and meaning, cells with a value to sort by.
+"""
 
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from typing import Any
 
 import pandas as pd
+import yaml
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.origin import origin
 from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
-from spinepipe.report.page.sortable import Sortable
-from spinepipe.report.specimen import draw_specimen
-from spinepipe.report.specimen_view import SpecimenView, view_of
+from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
 from spinepipe.report.style import picture, style
-from spinepipe.report.words import count
-from spinepipe.studies import JointPoseSensitivity, Study
+from spinepipe.report.words import count, number
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.study import Study
+from spinepipe.tables.schema import Column
+
+_VERSION = "version_"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the tables come from.
+
+    Attributes
+    ----------
+    facts : name and value of what all tables agree on; where they do not, every value.
+    digests : table, digest of the code that made it and digest of its settings.
+    settings : all settings of the study as YAML.
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    digests: tuple[tuple[str, str, str], ...]
+    settings: str
+
+
+def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
+    """What the metadata of all tables say, in alphabetical order."""
+    settings = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    digests = tuple(
+        (name, found.get("code_digest", ""), found.get("config_digest", ""))
+        for name, found in sorted(metadata.items())
+    )
+    return Origin(tuple(_facts(metadata)), digests, settings)
+
+
+def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
+    """Optional parts that the settings leave out, each with the setting that does."""
+    parts = (
+        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
+        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
+        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
+        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+    )
+    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
+
+
+def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
+    names = sorted({name for found in metadata.values() for name in found})
+    plain = [name for name in names if not name.startswith(_VERSION)]
+    versions = [name for name in names if name.startswith(_VERSION)]
+    facts = []
+    for name in [*plain, *versions]:
+        if name in ("code_digest", "config_digest", "pandas"):
+            continue
+        values = sorted({found[name] for found in metadata.values() if name in found})
+        label = name.removeprefix(_VERSION) if name in versions else name.replace("_", " ")
+        facts.append((label, ", ".join(values)))
+    return facts
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Results of one study, each by its name.
+
+    Attributes
+    ----------
+    tables : rows of each table that the study has.
+    metadata : what each table's file says of where it comes from.
+    pictures : each figure as SVG text, in the order of the report.
+    captions : the words below each figure.
+    """
+
+    tables: Mapping[str, pd.DataFrame]
+    metadata: Mapping[str, Mapping[str, str]]
+    pictures: Mapping[str, str]
+    captions: Mapping[str, str]
+
+    def table(self, name: str) -> pd.DataFrame:
+        """Rows of a table, none where the study does not have it."""
+        return self.tables.get(name, pd.DataFrame())
+
+
+def paper(study: JointPoseSensitivity, results: Results) -> str:
+    """How the published quantities were judged."""
+    return judged(results.table("against_gould_2024a"))
+
+
+def judged(rows: pd.DataFrame) -> str:
+    """The same of any table of published quantities with verdicts."""
+    if rows.empty:
+        return ""
+    found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
+    inside, outside = found.get("inside", 0), found.get("outside", 0)
+    others = (
+        ("circular", "are what the cohort was built to have"),
+        ("recomputed", "only follow from the paper's own numbers"),
+        ("contradicted", "are contradicted by other numbers of the paper and not chased"),
+        ("not_computed", "are not computed"),
+    )
+    told = [f"{found[name]} {words}" for name, words in others if name in found]
+    words = (
+        f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
+        f"outside for {outside}"
+    )
+    return "; ".join(part for part in (words, ", ".join(told)) if part) + "."
+
+
+MOST_ROWS = 400
+"""More rows than this are left to the file of the table."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """A column's heading; ``meaning`` is its tooltip."""
+
+    name: str
+    unit: str
+    meaning: str
+    numeric: bool
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Text of a cell and, of a number, the value it is sorted by."""
+
+    text: str
+    value: float | None
+
+
+@dataclass(frozen=True)
+class Sortable:
+    """One table of the page.
+
+    Attributes
+    ----------
+    note : what was left out, or nothing.
+    """
+
+    name: str
+    title: str
+    about: str
+    heads: tuple[Head, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str
+
+
+def sortable(
+    name: str,
+    title: str,
+    about: str,
+    frame: pd.DataFrame,
+    columns: Sequence[Column],
+) -> Sortable:
+    """Rows of a frame.
+
+    Columns that say nothing are left out: all empty, or the one specimen or status of all rows.
+    """
+    kept = [c for c in columns if c.name in frame and _says_something(frame[c.name])]
+    shown = frame.head(MOST_ROWS)
+    note = ""
+    if len(frame) > len(shown):
+        note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {name}.parquet."
+    values = [[_cell(value, c) for value in shown[c.name]] for c in kept]
+    heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.kind in _NUMERIC) for c in kept)
+    return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note)
+
+
+_NUMERIC = ("number", "integer")
+_SAME = ("specimen", "status")
+_UNITS: Mapping[str, str] = {
+    "see unit": "",
+    "mm or deg, see unit": "",
+    "N/m or N m/rad, see unit": "",
+    "mm2, deg2": "",
+}
+
+
+def _unit(column: Column) -> str:
+    return _UNITS.get(column.unit, column.unit)
+
+
+def _meaning(column: Column) -> str:
+    empty = f"; empty: {column.null}" if column.null else ""
+    return f"{column.meaning}{empty}"
+
+
+def _title(column: Column) -> str:
+    """Name without the unit, which stands beside it."""
+    name = column.name.removesuffix(f"_{column.unit}") if column.unit else column.name
+    return name.replace("_", " ")
+
+
+def _says_something(values: pd.Series) -> bool:
+    if values.name in _SAME and values.nunique() <= 1:
+        return False
+    return bool((values.notna() & (values != "")).any())
+
+
+def _cell(value: Any, column: Column) -> Cell:
+    if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
+        return Cell("", None)
+    if column.kind == "number":
+        return Cell(number(float(value)), float(value))
+    if column.kind == "integer":
+        return Cell(f"{int(value):,}".replace(",", "\u2009"), float(value))
+    if column.kind == "flag":
+        return Cell("yes" if value else "no", None)
+    return Cell(str(value), None)
+
 
 _MOST_NAMES, _MOST_SHOWN = 12, 6
 

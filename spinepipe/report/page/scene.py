@@ -1,7 +1,11 @@
-"""3-D view of a segment: vertebrae, its own joint frames, sampled ones, and the loads."""
+"""3-D view of a segment: vertebrae, its own joint frames, sampled ones, and the loads.
+
+Simple solids for vertebrae: two discs at the endplates, as wide as the pedicles are apart.
+"""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,14 +13,89 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import Landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.report.page.solids import solids
-from spinepipe.report.specimen import AXIS_COLORS, largest_load
-from spinepipe.report.specimen_view import SpecimenView
+from spinepipe.report.specimen import AXIS_COLORS, SpecimenView, largest_load
 from spinepipe.report.style import BLACK, GREY
-from spinepipe.statics.status import Status
+from spinepipe.status import Status
 from spinepipe.units import MM_PER_M, ROTATIONS
+
+CORNERS = 20
+LONE_DISC_MM = 6.0
+"""Thickness drawn of a vertebra of which only one endplate is known."""
+
+_USUAL_RADIUS_MM = 18.0
+_PEDICLES = ("left_pedicle_base", "right_pedicle_base")
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A drum: corners of its lower and upper face, mm.
+
+    Attributes
+    ----------
+    points : (2 * CORNERS + 2, 3) lower ring, upper ring, the two centres.
+    triangles : (n, 3) indices into the points.
+    """
+
+    points: Array
+    triangles: Array
+
+
+def solids(points: Landmarks, frames: Mapping[str, Pose], mm_per_m: float) -> dict[str, Solid]:
+    """Drum of each vertebra; one without endplate centres has none.
+
+    Parameters
+    ----------
+    points : landmarks, m.
+    frames : of each vertebra, the joint frame that gives a lone endplate its tilt.
+    """
+    widths = [
+        float(np.linalg.norm(named[_PEDICLES[1]] - named[_PEDICLES[0]]))
+        for named in points.values()
+        if set(_PEDICLES) <= set(named)
+    ]
+    radius = 0.5 * mm_per_m * float(np.mean(widths)) if widths else _USUAL_RADIUS_MM
+    found = {}
+    for vertebra, named in points.items():
+        ends = _ends(named, frames[vertebra].rotation[:, 1], mm_per_m)
+        if ends is not None:
+            found[vertebra] = _drum(*ends, radius)
+    return found
+
+
+def _ends(named: Mapping[str, Array], up: Array, mm_per_m: float) -> tuple[Array, Array] | None:
+    """Centres of the lower and upper face."""
+    low, high = (named.get(f"{side}_endplate_centre") for side in ("inferior", "superior"))
+    if low is not None and high is not None:
+        return low * mm_per_m, high * mm_per_m
+    if high is not None:
+        return high * mm_per_m - LONE_DISC_MM * up, high * mm_per_m
+    if low is not None:
+        return low * mm_per_m, low * mm_per_m + LONE_DISC_MM * up
+    return None
+
+
+def _drum(low: Array, high: Array, radius: float) -> Solid:
+    axis = (high - low) / np.linalg.norm(high - low)
+    across = np.cross(axis, [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+    ring = radius * (
+        np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(axis, across))
+    )
+    points = np.vstack([low + ring, high + ring, low, high])
+    first = np.arange(CORNERS)
+    following = (first + 1) % CORNERS
+    sides = [
+        (first, following, first + CORNERS),
+        (following, following + CORNERS, first + CORNERS),
+        (first, following, np.full(CORNERS, 2 * CORNERS)),
+        (first + CORNERS, following + CORNERS, np.full(CORNERS, 2 * CORNERS + 1)),
+    ]
+    return Solid(points, np.vstack([np.column_stack(side) for side in sides]))
+
 
 MOST_POSES = 100
 GROUPS = {
@@ -90,8 +169,20 @@ def _vertebrae(view: SpecimenView, cohort: Cohort) -> Iterator[Any]:
     tilts = dict(zip(cohort.vertebrae, above, strict=True))
     for vertebra, solid in solids(view.points, tilts, MM_PER_M).items():
         (x, y, z), (i, j, k) = _columns(solid.points), solid.triangles.T.tolist()
-        yield go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, color=_BONE, opacity=0.35, flatshading=True,
-                        hoverinfo="name", name=vertebra, meta="vertebrae")  # fmt: skip
+        yield go.Mesh3d(
+            x=x,
+            y=y,
+            z=z,
+            i=i,
+            j=j,
+            k=k,
+            color=_BONE,
+            opacity=0.35,
+            flatshading=True,
+            hoverinfo="name",
+            name=vertebra,
+            meta="vertebrae",
+        )
     yield from _landmarks(view)
 
 
@@ -102,8 +193,17 @@ def _landmarks(view: SpecimenView) -> Iterator[Any]:
     if not points:
         return
     x, y, z = _columns(np.array(points))
-    yield go.Scatter3d(x=x, y=y, z=z, mode="markers", marker={"size": 3, "color": GREY}, text=names,
-                       hoverinfo="text+x+y+z", name="landmarks", meta="vertebrae")  # fmt: skip
+    yield go.Scatter3d(
+        x=x,
+        y=y,
+        z=z,
+        mode="markers",
+        marker={"size": 3, "color": GREY},
+        text=names,
+        hoverinfo="text+x+y+z",
+        name="landmarks",
+        meta="vertebrae",
+    )
     ends = []
     for named in view.points.values():
         plates = [p for name, p in named.items() if name.endswith("endplate_centre")]
@@ -111,8 +211,16 @@ def _landmarks(view: SpecimenView) -> Iterator[Any]:
         middle = np.mean(plates, axis=0) if plates else None
         ends += [(middle * MM_PER_M, p * MM_PER_M) for p in bases if middle is not None]
     x, y, z = _lines(ends)
-    yield go.Scatter3d(x=x, y=y, z=z, mode="lines", line={"color": GREY, "width": 3},
-                       hoverinfo="name", name="pedicle bases", meta="vertebrae")  # fmt: skip
+    yield go.Scatter3d(
+        x=x,
+        y=y,
+        z=z,
+        mode="lines",
+        line={"color": GREY, "width": 3},
+        hoverinfo="name",
+        name="pedicle bases",
+        meta="vertebrae",
+    )
 
 
 def _sampled(poses: pd.DataFrame, specimen: str) -> list[Pose]:
@@ -142,8 +250,17 @@ def _frames(
         ]
         x, y, z = _lines(ends)
         name = f"{axis} axis, {group}"
-        yield go.Scatter3d(x=x, y=y, z=z, mode="lines", line={"color": color, "width": width},
-                           opacity=opacity, hoverinfo="name", name=name, meta=group)  # fmt: skip
+        yield go.Scatter3d(
+            x=x,
+            y=y,
+            z=z,
+            mode="lines",
+            line={"color": color, "width": width},
+            opacity=opacity,
+            hoverinfo="name",
+            name=name,
+            meta=group,
+        )
 
 
 def _loads(view: SpecimenView) -> Iterator[Any]:
@@ -154,8 +271,9 @@ def _loads(view: SpecimenView) -> Iterator[Any]:
         for wrench in largest_load(case):
             point = wrench.point * MM_PER_M
             for vector, unit, color in (
-                (wrench.force, "N", BLACK), (wrench.moment, "N m", GREY),
-            ):  # fmt: skip
+                (wrench.force, "N", BLACK),
+                (wrench.moment, "N m", GREY),
+            ):
                 size = float(np.linalg.norm(vector))
                 if size > 1e-9:
                     words = f"{case.test}: {size:.4g} {unit}"
@@ -179,9 +297,19 @@ def _arrow(tip: Array, along: Array, color: str, words: str) -> Iterator[Any]:
     yield go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, **look)
     at, (u, v, w) = _columns(tip[None, :]), _columns(along[None, :])
     yield go.Cone(
-        x=at[0], y=at[1], z=at[2], u=u, v=v, w=w, anchor="tip", sizemode="absolute", sizeref=5,
-        colorscale=[[0, color], [1, color]], showscale=False, **look,
-    )  # fmt: skip
+        x=at[0],
+        y=at[1],
+        z=at[2],
+        u=u,
+        v=v,
+        w=w,
+        anchor="tip",
+        sizemode="absolute",
+        sizeref=5,
+        colorscale=[[0, color], [1, color]],
+        showscale=False,
+        **look,
+    )
 
 
 def _columns(points: Array) -> list[list[float | None]]:

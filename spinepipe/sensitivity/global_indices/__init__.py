@@ -1,13 +1,16 @@
 """Global sensitivity: designs of factors, indices of outputs with intervals, their noise floor."""
 
 from spinepipe.sensitivity.global_indices.convergence import Stage, convergence
-from spinepipe.sensitivity.global_indices.design import DUMMY, Design, Method
-from spinepipe.sensitivity.global_indices.draw import draw
-from spinepipe.sensitivity.global_indices.dummy import above_floor, noise_floor
-from spinepipe.sensitivity.global_indices.index import Index, Known
-from spinepipe.sensitivity.global_indices.indices import indices
-from spinepipe.sensitivity.global_indices.run_count import design_problems, run_count
-from spinepipe.sensitivity.global_indices.settings import INDICES, Settings
+from spinepipe.sensitivity.global_indices.design import (
+    DUMMY,
+    Design,
+    Method,
+    design_problems,
+    draw,
+    run_count,
+)
+from spinepipe.sensitivity.global_indices.estimates import INDICES, Index, Known, Settings
+from spinepipe.sensitivity.global_indices.indices import above_floor, indices, noise_floor
 from spinepipe.sensitivity.global_indices.spread import (
     LogNormal,
     LogUniform,

@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from spinepipe.sensitivity.global_indices.design import Design, Method
-from spinepipe.sensitivity.global_indices.index import Index
-from spinepipe.sensitivity.global_indices.indices import FEWEST, indices
-from spinepipe.sensitivity.global_indices.report import names_of
-from spinepipe.sensitivity.global_indices.settings import Settings
+from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.indices import FEWEST, indices, names_of
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,19 @@
 """A design of a global analysis: which points of the unit cube are computed, and how they hang
-together."""
+together.
 
+How many runs a design takes, and what is wrong with one, before anything is drawn.
+
+Draw a design. Sampling is SALib's; the same seed gives the same design.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from SALib.sample import fast_sampler, latin, sobol
+from SALib.sample.morris import morris
 
 from spinepipe.effects.contract import Array
 
@@ -73,3 +84,153 @@ class Design:
             raise ValueError(f"samples must be 1 to {self.samples}, found {samples}")
         rows = self.n if self.method is Method.FAST else samples * self.block
         return replace(self, unit=self.unit[:rows], samples=samples)
+
+
+def run_count(method: str, inputs: int, samples: int, second_order: bool = True) -> int:
+    """Number of runs of a design.
+
+    Parameters
+    ----------
+    inputs : number of groups, a factor without one counting as a group, the dummy included.
+    samples : see `Design`.
+    second_order : of Sobol only.
+    """
+    per_sample = {
+        Method.SOBOL: (2 if second_order else 1) * inputs + 2,
+        Method.LATIN_HYPERCUBE: 1,
+        Method.MORRIS: inputs + 1,
+        Method.FAST: inputs,
+    }
+    return samples * per_sample[Method(method)]
+
+
+def design_problems(
+    method: str,
+    factors: Sequence[str],
+    groups: Sequence[str | None],
+    samples: int,
+    levels: int = 4,
+    harmonics: int = 4,
+) -> list[str]:
+    """All that stands against a design, in plain words; empty where it can be drawn."""
+    found = _names(factors, groups)
+    if len(groups) == len(factors) and any(group is not None for group in groups):
+        found += _groups(Method(method))
+    if Method(method) is Method.FAST:
+        return found + _fast_samples(len(factors), samples, harmonics)
+    return found + _samples(Method(method), samples, levels)
+
+
+def _names(factors: Sequence[str], groups: Sequence[str | None]) -> list[str]:
+    found = [] if factors else ["a design needs at least one factor"]
+    if len(set(factors)) != len(factors):
+        twice = sorted({name for name in factors if list(factors).count(name) > 1})
+        found.append(f"factors of the same name: {', '.join(twice)}")
+    if len(groups) != len(factors):
+        found.append(f"{len(factors)} factors but {len(groups)} groups (None for a factor alone)")
+    alone = {name for name, group in zip(factors, groups, strict=False) if group is None}
+    found += [f"group {name!r} is also a factor" for name in sorted(alone & set(groups) - {None})]
+    return found
+
+
+def _groups(method: Method) -> list[str]:
+    """Methods that look at one factor at a time have nothing to say of a group.
+
+    SALib's Latin hypercube gives all factors of a group the same share (rank correlation 1), so
+    that opposite effects cancel; its FAST knows no groups.
+    """
+    if method in (Method.SOBOL, Method.MORRIS):
+        return []
+    return [f"{method.value} has no indices of groups: leave groups out, or use sobol or morris"]
+
+
+def _samples(method: Method, samples: int, levels: int) -> list[str]:
+    if method is Method.SOBOL and (samples < 2 or samples & (samples - 1)):
+        return [f"sobol needs a power of two as samples (balance of the sequence), found {samples}"]
+    if method is Method.MORRIS and (levels < 2 or levels % 2):
+        return [f"morris needs an even number of levels, found {levels}"]
+    return [] if samples >= 2 else [f"at least 2 samples are needed, found {samples}"]
+
+
+def _fast_samples(factors: int, samples: int, harmonics: int) -> list[str]:
+    """With fewer samples SALib lets two other factors share a frequency; they then move as one."""
+    least = 4 * harmonics**2 * max(1, factors - 1) + 1
+    if harmonics >= 1 and samples >= least:
+        return []
+    return [
+        f"fast with {harmonics} harmonics and {factors} factors needs at least {least} samples per "
+        f"curve, for each factor its own frequency, found {samples}"
+    ]
+
+
+def draw(
+    method: str,
+    factors: Sequence[str],
+    samples: int,
+    seed: int,
+    *,
+    groups: Sequence[str | None] | None = None,
+    second_order: bool = True,
+    levels: int = 4,
+    harmonics: int = 4,
+    dummy: bool = False,
+) -> Design:
+    """A design of the factors.
+
+    Parameters
+    ----------
+    method, samples, second_order, levels, harmonics : see `Design`. Sobol points are scrambled
+        (scipy's generator), and their number is a power of two. Morris trajectories are not
+        selected for spread: selected ones are no independent draws to bootstrap.
+    groups : group of each factor, None for a factor alone; for Sobol and Morris.
+    dummy : whether a last factor `DUMMY` that changes nothing is added.
+
+    Raises
+    ------
+    ValueError
+        With all that stands against the design.
+    """
+    names = (*factors, DUMMY) if dummy else tuple(factors)
+    given = tuple(groups) if groups is not None else (None,) * len(factors)
+    given = (*given, None) if dummy else given
+    wrong = design_problems(method, names, given, samples, levels, harmonics)
+    if wrong:
+        raise ValueError("; ".join(wrong))
+    own = tuple(name if g is None else g for name, g in zip(names, given, strict=True))
+    bare = Design(
+        Method(method),
+        names,
+        own,
+        np.empty((0, len(names))),
+        samples,
+        seed,
+        second_order,
+        levels,
+        harmonics,
+    )
+    return Design(**{**vars(bare), "unit": _points(bare)})
+
+
+def salib_problem(design: Design) -> dict[str, Any]:
+    """SALib's description of the unit cube; a new one for each call, for SALib writes into it."""
+    problem: dict[str, Any] = {
+        "num_vars": len(design.factors),
+        "names": list(design.factors),
+        "bounds": [[0.0, 1.0]] * len(design.factors),
+    }
+    if design.groups != design.factors:
+        problem["groups"] = list(design.groups)
+    return problem
+
+
+def _points(design: Design) -> Array:
+    """(n, D) points; all of SALib's samplers that are used."""
+    problem, samples, seed = salib_problem(design), design.samples, design.seed
+    if design.method is Method.SOBOL:
+        order = design.second_order
+        return sobol.sample(problem, samples, calc_second_order=order, seed=seed)
+    if design.method is Method.LATIN_HYPERCUBE:
+        return latin.sample(problem, samples, seed=seed)
+    if design.method is Method.MORRIS:
+        return morris.sample(problem, samples, num_levels=design.levels, seed=seed)
+    return fast_sampler.sample(problem, samples, M=design.harmonics, seed=seed)

@@ -1,19 +1,217 @@
-"""All indices of a design's outputs."""
+"""All indices of a design's outputs.
+
+The noise floor: what an index says of a factor that changes nothing.
+
+Which runs are left when some failed, block by block.
+
+From estimates to indices with status and message.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design, Method
-from spinepipe.sensitivity.global_indices.estimated import NOTHING, Estimated
-from spinepipe.sensitivity.global_indices.fast import fast_indices
+from spinepipe.sensitivity.global_indices.design import DUMMY, Design, Method
+from spinepipe.sensitivity.global_indices.estimates import (
+    INDICES,
+    NOTHING,
+    Estimated,
+    Index,
+    Known,
+    Masked,
+    Settings,
+    masked,
+)
 from spinepipe.sensitivity.global_indices.given_data import given_data_indices
-from spinepipe.sensitivity.global_indices.index import Index, Known
-from spinepipe.sensitivity.global_indices.kept import BLOCKS, Kept, kept, without_lost
-from spinepipe.sensitivity.global_indices.morris import morris_indices
-from spinepipe.sensitivity.global_indices.report import Report, names_of
-from spinepipe.sensitivity.global_indices.settings import Settings
-from spinepipe.sensitivity.global_indices.sobol import sobol_indices
+from spinepipe.sensitivity.global_indices.structured import (
+    fast_indices,
+    morris_indices,
+    sobol_indices,
+)
+
+
+def noise_floor(found: Sequence[Index]) -> dict[str, Masked]:
+    """(K,) upper interval end of the dummy, by name of index; empty without a dummy.
+
+    Of S2 it is the highest end among the dummy's pairs, of an index that may be negative (mu) the
+    end farther from 0. An index without intervals (FAST) has the dummy's estimate as its floor.
+
+    In Sobol and Morris designs the runs that a dummy changes are repetitions, so that its S1, ST,
+    mu and sigma are 0 but for the model's own scatter: these estimators have no noise floor, and a
+    factor above it is one whose interval leaves 0 out. In S2, FAST and given-data indices the
+    floor is the method's noise.
+    """
+    floors: dict[str, Masked] = {}
+    for index in found:
+        if DUMMY in (index.factor, index.other):
+            top = _farthest(index)
+            floors[index.index] = np.ma.maximum(floors.get(index.index, top), top)
+    return floors
+
+
+def above_floor(index: Index, floors: dict[str, Masked]) -> tuple[bool | None, ...]:
+    """(K,) whether the whole interval lies above the floor; None where one of both is missing."""
+    if index.index not in floors:
+        return (None,) * len(index.status)
+    return tuple((_nearest(index) > floors[index.index]).tolist())
+
+
+def _farthest(index: Index) -> Masked:
+    low, high = _ends(index)
+    return np.ma.maximum(high, -low) + 0.0 if index.index == "mu" else high
+
+
+def _nearest(index: Index) -> Masked:
+    low, high = _ends(index)
+    return np.ma.maximum(low, -high) if index.index == "mu" else low
+
+
+def _ends(index: Index) -> tuple[Masked, Masked]:
+    if np.ma.getmaskarray(index.low).all():
+        return index.estimate, index.estimate
+    return index.low, index.high
+
+
+BLOCKS = {
+    Method.SOBOL: "base samples",
+    Method.LATIN_HYPERCUBE: "points",
+    Method.MORRIS: "trajectories",
+    Method.FAST: "curves",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What is left of a design.
+
+    Attributes
+    ----------
+    rows : (n,) bool, runs in blocks without a failure. blocks : (n / block,) bool.
+    failed : number of runs that failed. message : what was lost; empty without a failure.
+    """
+
+    rows: NDArray[np.bool_]
+    blocks: NDArray[np.bool_]
+    failed: int
+    message: str
+
+    @property
+    def lost(self) -> float:
+        """Share of blocks that were lost."""
+        return float(1.0 - self.blocks.mean())
+
+
+def kept(design: Design, ok: NDArray[np.bool_]) -> Kept:
+    """A failed run takes its whole block with it: a base sample of Sobol, a trajectory of Morris,
+    a curve of FAST; of a Latin hypercube itself.
+
+    What is left speaks of those inputs only at which runs succeed.
+    """
+    blocks: NDArray[np.bool_] = np.all(ok.reshape(-1, design.block), axis=1)
+    failed, lost = int((~ok).sum()), int((~blocks).sum())
+    what = BLOCKS[design.method]
+    message = f"{failed} failed runs: {lost} of {len(blocks)} {what} left out" if failed else ""
+    return Kept(np.repeat(blocks, design.block), blocks, failed, message)
+
+
+def without_lost(design: Design, left: Kept) -> Design:
+    """The design's whole blocks alone; not for FAST, whose blocks are not alike."""
+    return replace(design, unit=design.unit[left.rows], samples=int(left.blocks.sum()))
+
+
+Name = tuple[str, str, str]
+"""Index, factor or group, second one of a pair (else empty)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """All that is known of K outputs.
+
+    Attributes
+    ----------
+    found : estimates of the outputs that vary. varies : (K,) bool.
+    status, why : of all outputs alike; ``done`` where nothing stands against indices.
+    """
+
+    design: Design
+    left: Kept
+    found: Estimated
+    varies: NDArray[np.bool_]
+    status: Known
+    why: str
+
+    def index(self, name: Name) -> Index:
+        """One index of all outputs."""
+        status, message = self._told(name)
+        at = self._at.get(name)
+        known = self.varies & (at is not None)
+        ends = None if self.found.ends is None or at is None else self.found.ends[:, at]
+        low, high = (None, None) if ends is None else ends
+        estimate = None if at is None else self.found.estimate[at]
+        return Index(
+            *name,
+            self._spread_out(estimate, known),
+            self._spread_out(low, known),
+            self._spread_out(high, known),
+            self._runs,
+            self.left.failed,
+            status,
+            message,
+        )
+
+    @cached_property
+    def _at(self) -> dict[Name, int]:
+        return {name: at for at, name in enumerate(self.found.names)}
+
+    @property
+    def _runs(self) -> int:
+        one_curve = self.design.method is Method.FAST
+        return self.design.block if one_curve else int(self.left.rows.sum())
+
+    def _told(self, name: Name) -> tuple[tuple[Known, ...], tuple[str, ...]]:
+        each = [self._told_of_one(name, bool(varies)) for varies in self.varies]
+        return tuple(status for status, _ in each), tuple(message for _, message in each)
+
+    def _told_of_one(self, name: Name, varies: bool) -> tuple[Known, str]:
+        if self.status is not Known.DONE:
+            return self.status, self.why
+        if not varies:
+            return Known.CONSTANT, "the output is the same in all runs"
+        if name not in self._at:
+            return Known.TOO_MANY_FAILED, f"{self.left.message}, {name[1]}'s among them"
+        return Known.DONE, "; ".join(filter(None, (self.left.message, self.found.note)))
+
+    def _spread_out(self, part: Array | None, known: NDArray[np.bool_]) -> Masked:
+        """(K,) of numbers for the outputs that vary, or of nothing."""
+        values = np.zeros(len(known))
+        if part is None:
+            return masked(values, np.ones(len(known)))
+        values[known] = part
+        return masked(values, ~known)
+
+
+def names_of(design: Design) -> list[Name]:
+    """All indices a design has, in the order of tables."""
+    found: list[Name] = []
+    for index in INDICES[design.method]:
+        if index == "S2":
+            pairs = combinations(design.inputs, 2) if design.second_order else ()
+            found += [(index, first, second) for first, second in pairs]
+        else:
+            found += [(index, name, "") for name in design.inputs if _has(design, index, name)]
+    return found
+
+
+def _has(design: Design, index: str, name: str) -> bool:
+    """Of Morris, groups of several have no sign, so no mean and SD of signed effects."""
+    signed = design.method is Method.MORRIS and index != "mu_star"
+    return not (signed and design.groups.count(name) > 1)
+
 
 FEWEST = {Method.SOBOL: 8, Method.LATIN_HYPERCUBE: 50, Method.MORRIS: 4, Method.FAST: 0}
 """Whole base samples, points or trajectories below which no index is given."""

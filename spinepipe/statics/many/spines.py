@@ -125,10 +125,14 @@ class Cases:
         steps = []
         for row, step in enumerate(self.like.steps):
             wrenches = tuple(
-                Wrench(one.body, self.points[i, row, w], self.forces[i, row, w],
-                       self.moments[i, row, w])
+                Wrench(
+                    one.body,
+                    self.points[i, row, w],
+                    self.forces[i, row, w],
+                    self.moments[i, row, w],
+                )
                 for w, one in enumerate(step.wrenches)
-            )  # fmt: skip
+            )
             steps.append(replace(step, wrenches=wrenches))
         return replace(self.like, steps=tuple(steps))
 

@@ -7,14 +7,14 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.report.cohort import (
-    error_map_figure,
-    held_out_error_figure,
-    load_case_stiffness_figure,
-    stiffness_by_level_figure,
-)
 from spinepipe.report.style import save, style
-from spinepipe.studies import CohortStiffness
+from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure
+from spinepipe.studies.cohort_stiffness.figures.held_out_error import held_out_error_figure
+from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import (
+    load_case_stiffness_figure,
+)
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import stiffness_by_level_figure
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.tables import read_frames
 
 Draw = Callable[[CohortStiffness, Cohort, Mapping[str, pd.DataFrame]], Figure]

@@ -7,17 +7,30 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin
-from spinepipe.jobs.cohort_stiffness.criteria import SHARED_ERROR, criteria, independent, no_fit
-from spinepipe.jobs.cohort_stiffness.predict import error_rows
-from spinepipe.jobs.cohort_stiffness.problem import calibration_problem, start_stiffness
-from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.statics import Status, moved
-from spinepipe.studies import CohortStiffness
-from spinepipe.tables import ERRORS, FITS, STIFFNESS, from_rows, write
+from spinepipe.statics import moved
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.fit_rows import (
+    SHARED_ERROR,
+    criteria,
+    independent,
+    no_fit,
+    stiffness_rows,
+)
+from spinepipe.studies.cohort_stiffness.predict import error_rows
+from spinepipe.studies.cohort_stiffness.problem import (
+    SpecimenTests,
+    TestedCycle,
+    base_effects,
+    calibration_problem,
+    origin,
+    specimen_tests,
+    start_stiffness,
+)
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.tables import from_rows, write
 
 Row = dict[str, Any]
 IN_FOLDERS = ("specimen", "representation", "fitted_to")

@@ -7,8 +7,14 @@ from functools import cached_property
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.report.published import OF_COHORTS, stands_for
-from spinepipe.studies import CohortStiffness
-from spinepipe.studies.fitted_to import ALL, NOBODY, POOLED, load_sets, tests_of
+from spinepipe.studies.cohort_stiffness.settings import (
+    ALL,
+    NOBODY,
+    POOLED,
+    CohortStiffness,
+    load_sets,
+    tests_of,
+)
 
 OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""

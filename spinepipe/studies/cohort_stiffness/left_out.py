@@ -7,17 +7,22 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin, seen_note
-from spinepipe.jobs.cohort_stiffness.claims import joined
-from spinepipe.jobs.cohort_stiffness.fit import IN_FOLDERS
-from spinepipe.jobs.cohort_stiffness.predict import error_rows
-from spinepipe.jobs.cohort_stiffness.problem import start_stiffness
-from spinepipe.jobs.cohort_stiffness.stiffness_rows import stiffness_rows
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.statics import Status
-from spinepipe.studies import CohortStiffness
-from spinepipe.tables import ERRORS, STIFFNESS, from_rows, read_frame, write
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.claims import joined
+from spinepipe.studies.cohort_stiffness.fit import IN_FOLDERS
+from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
+from spinepipe.studies.cohort_stiffness.predict import error_rows
+from spinepipe.studies.cohort_stiffness.problem import (
+    base_effects,
+    origin,
+    seen_note,
+    specimen_tests,
+    start_stiffness,
+)
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, STIFFNESS
+from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.units import COORDINATES
 
 SOURCE = "others_median"

@@ -1,11 +1,70 @@
-"""The report of a cohort study."""
+"""The report of a cohort study.
+
+Which tables the page of a cohort study shows, and which of their rows.
+"""
+
+import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.findings import findings
-from spinepipe.report.cohort.tables import SHOWN, shown_tables
-from spinepipe.report.page.document import Document, Picture
-from spinepipe.report.page.results import Results
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.studies.cohort_stiffness.page_findings import findings
+from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, NOBODY, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.tables import FINDINGS
+from spinepipe.studies.joint_pose_sensitivity.page import AGAINST_COLUMNS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024B
+from spinepipe.tables import TABLES
+
+SHOWN = {
+    "findings": "Claims about the cohort, checked",
+    "ranking": "Representations in order",
+    "mae": "Mean absolute errors in the loaded direction",
+    "pooling": "How stiffness is spread over the cohort",
+    "against_gould_2024b": "Beside Gould et al. 2024b",
+    "sign_checks": "Does each joint move with the load?",
+    "fits": "Fits",
+    "stiffness": "Stiffness fitted to all load cases",
+    "statistics": "Tests of significance",
+}
+"""Tables of the page in their order, with their titles."""
+
+_CLAIM_ORDER = ("statement", "holds", "value", "unit", "low", "high", "p", "quantity", "message")
+_COLUMNS = {
+    FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
+    AGAINST_GOULD_2024B.name: AGAINST_COLUMNS,
+}
+"""What a reader compares stands first; short names are left to the files."""
+
+
+def shown_tables(results: Results) -> list[Sortable]:
+    """Tables that the study has, as the page shows them; those without rows are left out."""
+    found = []
+    for name, title in SHOWN.items():
+        frame = results.table(name)
+        if not len(frame):
+            continue
+        rows, told = _rows(name, frame)
+        shape = TABLES[name]
+        columns = _COLUMNS.get(shape.name, shape.columns)
+        found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
+    return [table for table in found if table.rows]
+
+
+def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
+    """Rows that the page shows, and what is said of those that it does not."""
+    chosen, told = frame, ""
+    if name == "stiffness":
+        whole = frame["fitted_to"] == joint_label_of(frame)
+        chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
+    elif name == "pooling":
+        chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
+    elif name in ("fits", "mae"):
+        left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
+        chosen, told = frame[~left_out], "fits that leave no load case out"
+    if len(chosen) == len(frame):
+        return frame, ""
+    return chosen, f"Here: {told}; the others are in {name}.parquet."
+
 
 QUESTION = (
     "Does stiffness differ between specimens, levels and load cases, how should it be described, "
@@ -27,15 +86,19 @@ def cohort_page(study: CohortStiffness, cohort: Cohort, results: Results) -> str
         question=QUESTION,
         findings=findings(study, results),
         pictures=[
-            Picture.of(name, TITLES.get(name, name.replace("_", " ")), svg,
-                       " ".join(results.captions[name].split()))
+            Picture.of(
+                name,
+                TITLES.get(name, name.replace("_", " ")),
+                svg,
+                " ".join(results.captions[name].split()),
+            )
             for name, svg in results.pictures.items()
         ],
         tables=shown_tables(results),
         metadata=results.metadata,
         left_out=left_out(study, len(cohort.specimen_names)),
         poses=results.table("poses"),
-    )  # fmt: skip
+    )
     return whole.html(study, cohort)
 
 
@@ -43,11 +106,16 @@ def left_out(study: CohortStiffness, specimens: int) -> tuple[str, ...]:
     """Parts that the settings or the cohort leave out, each with the reason."""
     held = study.cross_validation
     parts = (
-        ("prediction of left-out specimens", "cross_validation: specimens: false",
-         held.specimens),
-        ("prediction of left-out specimens", "the cohort has one specimen",
-         not held.specimens or specimens > 1),
-        ("prediction of left-out load cases", "cross_validation: load_cases: false",
-         held.load_cases),
-    )  # fmt: skip
+        ("prediction of left-out specimens", "cross_validation: specimens: false", held.specimens),
+        (
+            "prediction of left-out specimens",
+            "the cohort has one specimen",
+            not held.specimens or specimens > 1,
+        ),
+        (
+            "prediction of left-out load cases",
+            "cross_validation: load_cases: false",
+            held.load_cases,
+        ),
+    )
     return tuple(f"{part} ({why})" for part, why, done in parts if not done)

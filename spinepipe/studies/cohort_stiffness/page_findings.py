@@ -1,16 +1,72 @@
-"""Findings that cast doubt on others: flipped signs, fits that failed, doubtful stiffness."""
+"""Findings that cast doubt on others: flipped signs, fits that failed, doubtful stiffness.
 
-from collections.abc import Iterator
+Findings about the paper's claims and numbers.
+
+Findings about errors: which representation is best, and how large errors are.
+
+Finding about the cohort: how much stiffness differs between specimens, levels and joints.
+
+Key findings of a cohort study as sentences, what casts doubt on all others first.
+"""
+
+from collections.abc import Callable, Iterator
+from math import exp
 from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.cohort.named import NAME, case
-from spinepipe.report.page.results import Results
-from spinepipe.report.stage_errors import joint_label_of
-from spinepipe.report.words import AXIS, count, percent
-from spinepipe.statics.status import Status
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.page.document import Results, judged
+from spinepipe.report.words import AXIS, NAME, case, count, number, percent
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+
+_VERDICTS = {
+    "yes": ("hold", "Holds here"),
+    "no": ("do not hold", "Does not hold here"),
+    "undecided": ("cannot be decided", "Cannot be decided with this cohort"),
+}
+_MOST = 6
+
+
+def claims(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """How many claims hold, and the first of each verdict with their numbers."""
+    rows = results.table("findings")
+    if rows.empty:
+        return
+    parts = {name: rows[rows["holds"] == name] for name in _VERDICTS}
+    told = [f"{_VERDICTS[name][0]} {len(part)}" for name, part in parts.items() if len(part)]
+    yield (
+        f"Of {count(len(rows), 'claim')} about this cohort: {', '.join(told)}; table 1 has the "
+        "numbers that decide, and what they are."
+    )
+    for name, part in parts.items():
+        if len(part):
+            first = "; ".join(_claim(row) for row in part.head(_MOST).to_dict("records"))
+            more = f"; and {len(part) - _MOST} more" if len(part) > _MOST else ""
+            yield f"{_VERDICTS[name][1]}: {first}{more}."
+
+
+def _claim(row: dict[Any, Any]) -> str:
+    """Statement with its value, interval and p; the message where there is no value."""
+    statement = str(row["statement"]).rstrip(".")
+    words = f"{statement[:1].lower()}{statement[1:]}"
+    if pd.isna(row["value"]):
+        return f"{words} ({row['message']})" if row["message"] else words
+    numbers = [f"{number(row['value'])} {row['unit']}".rstrip()]
+    if not (pd.isna(row["low"]) or pd.isna(row["high"])):
+        numbers.append(f"95 % interval {number(row['low'])} to {number(row['high'])}")
+    if not pd.isna(row["p"]):
+        numbers.append(f"p {number(row['p'], 2)}")
+    return f"{words} ({', '.join(numbers)})"
+
+
+def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """How the published quantities were judged."""
+    told = judged(results.table("against_gould_2024b"))
+    if told:
+        yield told
+
 
 _MOST_PLACES = 6
 
@@ -115,3 +171,119 @@ def _fit(row: dict[Any, Any]) -> str:
 def _some(places: list[str]) -> str:
     more = len(places) - _MOST_PLACES
     return "; ".join(places[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
+
+
+_CRITERIA = {
+    "fitted": "Motion that was fitted",
+    "left_out_case": "Motion under a left-out load case",
+    "left_out_specimen": "Motion of a left-out specimen",
+}
+
+
+def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """The order of representations by each criterion."""
+    rows = results.table("ranking")
+    if rows.empty:
+        return
+    for criterion, words in _CRITERIA.items():
+        ranked = rows[(rows["criterion"] == criterion) & rows["rank"].notna()].sort_values("rank")
+        if (~ranked["representation"].str.startswith("literature")).any():
+            told = [_place(row, study.significance) for row in ranked.to_dict("records")]
+            yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}."
+    best = [
+        f"{words} prefers {_best(part)}"
+        for name, words in (("aicc", "Akaike's criterion"), ("bic", "Schwarz's criterion"))
+        if len(part := rows[(rows["criterion"] == name) & (rows["rank"] == 1)])
+    ]
+    if best:
+        yield f"Of fits to all load cases, {', '.join(best)}."
+
+
+def _place(row: dict[Any, Any], significance: float) -> str:
+    """Name and error with its standard error; where it is no worse than the first, that."""
+    error = row["standard_error"]
+    spread = "" if pd.isna(error) else f" ± {number(error, 2)}"
+    same = (
+        ""
+        if pd.isna(row["p"]) or row["p"] < significance
+        else (f" (not told apart from the first, p {number(row['p'], 2)})")
+    )
+    return f"{NAME[row['representation']]} {number(row['value'])}{spread}°{same}"
+
+
+def _best(part: pd.DataFrame) -> str:
+    return " and ".join(NAME[name] for name in part["representation"])
+
+
+def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """Errors in the loaded direction at the largest load, load case by load case."""
+    rows = results.table("mae")
+    if rows.empty:
+        return
+    labels = [joint_label_of(rows), NOTHING]
+    chosen = rows[
+        (rows["steps"] == "peak")
+        & rows["stage"].isin(["literature", "fitted"])
+        & rows["fitted_to"].isin(labels)
+        & rows["mae_deg"].notna()
+    ]
+    for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
+        told = [
+            f"{NAME[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
+            for row in part.to_dict("records")
+        ]
+        yield (
+            f"{case(str(test))}, error in the loaded direction at the largest load (median over "
+            f"specimens, share of the largest motion): {'; '.join(told)}."
+        )
+
+
+def _share(row: dict[Any, Any]) -> str:
+    share = row["mae_percent"]
+    return "" if pd.isna(share) else f" ({number(share, 2)} %)"
+
+
+_PARTS = {
+    "between_specimens": "between specimens",
+    "between_levels": "between levels",
+    "between_joints": "of joints beyond that",
+}
+
+
+def spreads(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """Spreads that the hierarchical fit found, as factors: one SD up or down."""
+    rows = results.table("pooling")
+    if rows.empty:
+        return
+    whole = rows[(rows["without"] == NOBODY) & (rows["fitted_to"] == joint_label_of(rows))]
+    settled = whole[whole["status"].map(lambda name: Status(name).usable).astype(bool)]
+    told = [_spread(row) for row in settled.dropna(subset=["centre"]).to_dict("records")]
+    if told:
+        yield (
+            "Stiffness in the middle of the cohort, and the factor that one SD stands for: "
+            f"{'; '.join(told)}."
+        )
+
+
+def _spread(row: dict[Any, Any]) -> str:
+    factors = [
+        f"{words} {number(exp(row[name]))}"
+        for name, words in _PARTS.items()
+        if not pd.isna(row[name])
+    ]
+    centre = f"{AXIS[row['coordinate']].lower()} {number(row['centre'])} {row['unit']}"
+    return f"{centre} ({', '.join(factors)})" if factors else centre
+
+
+Finding = Callable[[CohortStiffness, Results], Iterator[str]]
+
+MAKERS: tuple[Finding, ...] = (
+    *(signs, failed, bounds, optima, identifiable),
+    *(ranking, claims, loaded_errors, spreads, beside_the_paper),
+)
+
+
+def findings(study: CohortStiffness, results: Results) -> list[str]:
+    """The sentences, without those that the study has no table for."""
+    told = [sentence for make in MAKERS for sentence in make(study, results)]
+    return [sentence.replace(" %", "\u00a0%") for sentence in told]

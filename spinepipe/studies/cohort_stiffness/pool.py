@@ -1,18 +1,225 @@
-"""Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one."""
+"""Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one.
+
+Rows of the tables of a pooled fit.
+"""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-from spinepipe.calibrate import Problem, pool
+import numpy as np
+
+from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem, pool
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.cohort_stiffness.base_model import base_effects, origin, seen_note
-from spinepipe.jobs.cohort_stiffness.pooled_rows import PooledRows
-from spinepipe.jobs.cohort_stiffness.problem import calibration_problem
-from spinepipe.jobs.cohort_stiffness.tested import specimen_tests
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.studies import CohortStiffness
-from spinepipe.studies.fitted_to import NOBODY, POOLED
-from spinepipe.tables import ERRORS, FITS, POOLING, STIFFNESS, from_rows, write
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.claims import joined
+from spinepipe.studies.cohort_stiffness.fit_rows import (
+    SHARED_ERROR,
+    criteria,
+    independent,
+    no_fit,
+    stiffness_rows,
+)
+from spinepipe.studies.cohort_stiffness.predict import error_rows
+from spinepipe.studies.cohort_stiffness.problem import (
+    base_effects,
+    calibration_problem,
+    origin,
+    seen_note,
+    specimen_tests,
+    start_stiffness,
+)
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, POOLED, CohortStiffness
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
+from spinepipe.tables import from_rows, write
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
+
+Row = dict[str, Any]
+NOBODY_FITTED = "no specimen has motion to fit"
+DECIDED = 0.5
+"""Share of a newcomer's variance below which a specimen's own readings decide."""
+
+NOT_DECIDED = "the specimen's readings do not decide: value and interval are the cohort's"
+
+
+@dataclass(frozen=True)
+class PooledRows:
+    """What a pooled fit says, specimen by specimen; nothing where it did not end.
+
+    Attributes
+    ----------
+    problems : of the specimens that were fitted. refusals : why some have no problem. A specimen
+        in neither is a newcomer to them.
+    found : None where there was nothing to fit.
+    others : effects of each specimen besides the bushings. note : to be told of a newcomer's.
+    """
+
+    study: CohortStiffness
+    cohort: Cohort
+    fitted_to: str
+    problems: Mapping[str, Problem]
+    refusals: Mapping[str, str]
+    found: Pooled | None
+    others: Mapping[str, tuple[ScopedEffect, ...]] = field(default_factory=dict)
+    note: str = ""
+
+    def stiffness(self, specimen: str) -> list[Row]:
+        """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
+        values = self._values(specimen)
+        none = np.zeros((len(self.cohort.joint_names), 6), dtype=int)
+        if values is None:
+            return self._rows(np.full(none.shape, np.nan), none + np.nan, none, none, specimen)
+        return self._rows(*values, specimen)
+
+    def errors(self, specimen: str) -> list[Row]:
+        """Rows of table ``errors``: all tests of a fitted specimen, those fitted of a newcomer."""
+        values = self._values(specimen)
+        if values is None:
+            return []
+        tests = specimen_tests(self.study, self.cohort, specimen)
+        found = error_rows(self.cohort, specimen, tests, values[0], self.others.get(specimen, ()))
+        rows = [{**row, "specimen": specimen} for row in found]
+        if specimen not in self.problems:
+            within = [r for r in rows if tests.stage(r["test"], self.fitted_to) == "fitted"]
+            return [{**r, "stage": "left_out_specimen"} for r in within]
+        return [{**r, "stage": tests.stage(r["test"], self.fitted_to)} for r in rows]
+
+    def record(self, specimen: str) -> Row:
+        """The row of table ``fits`` of a fitted specimen."""
+        own = self._own(specimen)
+        status, message = self._ended(specimen)
+        ended = {"specimen": specimen, "status": status.value, "message": message}
+        if own is None or self.found is None:
+            return {"specimen": specimen, **no_fit(status.value, message)}
+        usable = status.usable
+        cost, effective = (own.cost, own.effective_parameters) if usable else (None, None)
+        alone = independent(self.problems[specimen])
+        if usable and not alone:
+            ended["message"] = joined(message, SHARED_ERROR)
+        return {
+            "readings": own.n_readings,
+            "unknowns": len(own.x),
+            "effective_unknowns": effective,
+            "cost": cost,
+            **criteria(cost, own.n_readings, effective, independent=alone),
+            "iterations": self.found.iterations,
+            "evaluations": own.evaluations,
+            "n_optima": int(usable),
+            **ended,
+        }
+
+    def pooling(self) -> list[Row]:
+        """Rows of table ``pooling``, one per free coordinate."""
+        spreads = {s.name: s for s in self.found.spreads} if self.found else {}
+        return [self._spread(name, spreads) for name in self.study.free]
+
+    def _spread(self, name: str, spreads: Mapping[str, CohortSpread]) -> Row:
+        place = COORDINATES.index(name)
+        spread = spreads.get(STIFFNESS_COLUMNS[place])
+        found = self.found
+        empty: Row = dict.fromkeys(
+            (
+                "centre",
+                "between_levels",
+                "between_specimens",
+                "between_joints",
+                "scatter",
+                "effective_unknowns",
+                "log_likelihood",
+            )
+        )
+        row: Row = {
+            "coordinate": name,
+            "unit": STIFFNESS_UNITS[name],
+            "specimens": self._specimens(),
+            "iterations": 0,
+            "status": Status.REFUSED.value,
+            "message": NOBODY_FITTED,
+            **empty,
+        }
+        if found is None or spread is None:
+            return row
+        start = float(start_stiffness(self.study, self.cohort, POOLED)[0, place])
+        alone = all(independent(problem) for problem in self.problems.values())
+        return row | {
+            "centre": start * float(np.exp(spread.mean)),
+            "between_levels": spread.level or None,  # zero: not told from the rest
+            "between_specimens": spread.specimen or None,
+            "between_joints": spread.rest,
+            "scatter": found.scatter,
+            "effective_unknowns": found.effective_parameters,
+            "log_likelihood": found.log_likelihood if alone else None,
+            "iterations": found.iterations,
+            "status": found.status.value,
+            "message": joined(found.message, "" if alone else SHARED_ERROR),
+        }
+
+    def _own(self, specimen: str) -> PooledSpecimen | None:
+        if self.found is None or specimen not in self.problems:
+            return None
+        return self.found.specimens[list(self.problems).index(specimen)]
+
+    def _ended(self, specimen: str) -> tuple[Status, str]:
+        """Its own status, or the pool's: each stiffness hangs on the spreads of all."""
+        own = self._own(specimen)
+        if specimen in self.refusals:
+            return Status.REFUSED, self.refusals[specimen]
+        if self.found is None:
+            return Status.REFUSED, NOBODY_FITTED
+        pool = self.found.status, self.found.message
+        if own is None:
+            return pool[0], joined("what the others lead one to expect", pool[1], self.note)
+        if own.status.usable and not pool[0].usable:
+            return pool[0], joined(own.message, f"pooled fit: {pool[1] or pool[0].value}")
+        return own.status, own.message
+
+    def _values(self, specimen: str) -> tuple[Array, Array, Indices, Indices] | None:
+        """Stiffness, error of its logarithm, bounds reached and what readings decide, (J, 6).
+
+        None without a fit. A newcomer has one where the pool has ended: it can be expected to be
+        like the others.
+        """
+        if self.found is None or not self._ended(specimen)[0].usable:
+            return None
+        own = self._own(specimen)
+        x = self.found.newcomer if own is None else own.x
+        covariance = self.found.newcomer_covariance if own is None else own.covariance
+        free = next(iter(self.problems.values())).free
+        k = start_stiffness(self.study, self.cohort, POOLED)
+        error = np.full(k.shape, np.inf)
+        bound = np.zeros(k.shape, dtype=int)
+        decided = np.zeros(k.shape, dtype=int)
+        expected = DECIDED * np.diagonal(self.found.newcomer_covariance)
+        for index, unknown in enumerate(free):
+            at = unknown.rows[0], unknown.column
+            k[at] *= np.exp(x[index])
+            bound[at] = 0 if own is None else own.at_bound[index]
+            decided[at] = covariance[index, index] < expected[index]
+            if not bound[at]:  # the covariance is not told of bounds
+                error[at] = np.sqrt(covariance[index, index])
+        return k, error, bound, decided
+
+    def _rows(
+        self, k: Array, error: Array, bound: Indices, decided: Indices, specimen: str
+    ) -> list[Row]:
+        status, message = self._ended(specimen)
+        joints, fitted = self.cohort.joint_names, specimen in {*self.problems, *self.refusals}
+        known = (error < self.study.identifiable_below) & (decided > 0) if fitted else None
+        freedom = np.inf if fitted else self._specimens() - 1.0
+        rows = stiffness_rows(joints, self.study.free, k, error, freedom, known, bound)
+        for row in rows:
+            at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
+            of_cohort = fitted and np.isfinite(error[at]) and not decided[at]
+            note = joined(message, NOT_DECIDED if of_cohort else "")
+            row |= {"specimen": specimen, "status": status.value, "message": note}
+        return rows
+
+    def _specimens(self) -> int:
+        """How many specimens the spreads were estimated from."""
+        return sum(bool(one.poses) for one in self.found.specimens) if self.found else 0
 
 
 def run(

@@ -8,11 +8,17 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.jobs.cohort_stiffness.problem import stiff_model
-from spinepipe.jobs.cohort_stiffness.tested import SpecimenTests, TestedCycle, driven
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.statics import Chain, Status, System, follow, observe
+from spinepipe.statics import System, follow, observe
+from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.problem import (
+    SpecimenTests,
+    TestedCycle,
+    driven,
+    stiff_model,
+)
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+from spinepipe.world import Chain
 
 Row = dict[str, Any]
 
@@ -60,8 +66,11 @@ def error_rows(
     ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
     rows = []
     for test in tests.tests:
-        here = [(one, end) for one, end in zip(tests.tested, ended, strict=True)
-                if one.case.test == test]  # fmt: skip
+        here = [
+            (one, end)
+            for one, end in zip(tests.tested, ended, strict=True)
+            if one.case.test == test
+        ]
         loaded = driven([one for one, _ in here])
         failed = [end for _, end in here if end[0] is None]
         status, message = (failed[0][1], failed[0][2]) if failed else (Status.CONVERGED, "")
@@ -69,16 +78,18 @@ def error_rows(
             for place, coordinate in enumerate(COORDINATES):
                 numbers = _numbers(here, joint, place, lost=bool(failed))
                 if numbers is not None:
-                    rows.append({
-                        "test": test,
-                        "joint": name,
-                        "coordinate": coordinate,
-                        "loaded": loaded == coordinate,
-                        "unit": COORDINATE_UNITS[coordinate],
-                        **numbers,
-                        "status": status.value,
-                        "message": message,
-                    })  # fmt: skip
+                    rows.append(
+                        {
+                            "test": test,
+                            "joint": name,
+                            "coordinate": coordinate,
+                            "loaded": loaded == coordinate,
+                            "unit": COORDINATE_UNITS[coordinate],
+                            **numbers,
+                            "status": status.value,
+                            "message": message,
+                        }
+                    )
     return rows
 
 
@@ -95,8 +106,9 @@ def _numbers(
     if not any(known.any() for known in read):
         return None
     known_peak = np.array([known[one.peak] for known, (one, _) in zip(read, here, strict=True)])
-    sizes = np.concatenate([np.abs(values[known]) for values, known in zip(measured, read,
-                            strict=True)])  # fmt: skip
+    sizes = np.concatenate(
+        [np.abs(values[known]) for values, known in zip(measured, read, strict=True)]
+    )
     at_peak = np.array([values[one.peak] for values, (one, _) in zip(measured, here, strict=True)])
     row: Row = {
         "readings": len(sizes),
@@ -105,8 +117,10 @@ def _numbers(
     }
     if lost:
         return row | dict.fromkeys(("bias", "mae", "rmse", "peak_error"))
-    errors = [_error(end[0], joint, place, values) for (_, end), values in zip(here, measured,
-              strict=True)]  # fmt: skip
+    errors = [
+        _error(end[0], joint, place, values)
+        for (_, end), values in zip(here, measured, strict=True)
+    ]
     every = np.concatenate([error[known] for error, known in zip(errors, read, strict=True)])
     peaks = np.array([error[one.peak] for error, (one, _) in zip(errors, here, strict=True)])
     return row | {

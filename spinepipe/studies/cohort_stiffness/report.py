@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from spinepipe.files import appearing
-from spinepipe.jobs.cohort_stiffness.base_model import NOT_HELD_OUT
+from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.page_inputs import results_of
-from spinepipe.report.cohort.page import READ, cohort_page
-from spinepipe.report.page.results import Results
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.page.document import Results
+from spinepipe.studies.cohort_stiffness.page import READ, cohort_page
+from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 HELD_OUT = "held_out_error"
 

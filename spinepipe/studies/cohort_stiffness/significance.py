@@ -1,4 +1,11 @@
-"""Do two stiffness sets differ in their errors? Tables 6 and 7 of Gould et al. 2024b."""
+"""Do two stiffness sets differ in their errors? Tables 6 and 7 of Gould et al. 2024b.
+
+Do errors differ between specimens, or between levels? Table 5 of Gould et al. 2024b.
+
+Does stiffness hang on the load case? Separate fits per load case against one joint fit.
+
+Job: the tests of Gould et al. 2024b, and beside them those that fit the data.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -6,20 +13,140 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from spinepipe.jobs.tested_rows import Tested
-from spinepipe.report.stage_errors import (
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.tested_rows import Tested, corrected_rows
+from spinepipe.statistics import (
+    Ended,
+    Outcome,
+    f_test_nested,
+    friedman,
+    kruskal_wallis,
+    wilcoxon_signed_rank,
+)
+from spinepipe.statistics.normality import NESTED
+from spinepipe.studies.cohort_stiffness.fit_rows import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.settings import (
+    ALL,
+    POOLED,
+    CohortStiffness,
+    joint_label,
+    load_cases,
+)
+from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
+    LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
     of_single_cases,
+    rotations,
 )
-from spinepipe.statistics import kruskal_wallis, wilcoxon_signed_rank
+from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import ROTATIONS
+
+STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)
+GROUPS = {"specimens": "specimen", "levels": "joint"}
+BLOCKS = {"specimen": "joint", "joint": "specimen"}
+"""In what each factor is seen again and again."""
+
+VALUES_AS_PUBLISHED = "takes values of the same specimen and joint as independent, as published"
+
+
+def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
+    """Kruskal-Wallis as published; Friedman, which keeps what belongs together, beside it.
+
+    Fits to single load cases; of a left out load case, fits to all others.
+    """
+    for stage in STAGES:
+        chosen = of_single_cases(errors, stage)
+        for (representation, test), rows in chosen.groupby(["representation", "test"], sort=False):
+            for what, factor in GROUPS.items():
+                family = f"between_{what}/{representation}/{stage}"
+                for response, part in responses(rows):
+                    for outcome in _both(part, factor):
+                        yield Tested(family, "*", response, factor, str(test), outcome)
+
+
+def responses(rows: pd.DataFrame) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """The loaded coordinate alone, and all rotations."""
+    return ("loaded_error", rows[rows["loaded"].astype(bool)]), ("rotation_error", rows)
+
+
+def _both(rows: pd.DataFrame, factor: str) -> Iterator[Outcome]:
+    known = rows.dropna(subset="peak_error")
+    errors = known["peak_error"].astype(float).abs()
+    groups = [part.to_numpy(float) for _, part in errors.groupby(known[factor], sort=False)]
+    yield _noted(kruskal_wallis(groups), VALUES_AS_PUBLISHED)
+    block = BLOCKS[factor]
+    grid = known.assign(error=errors).pivot(
+        index=[block, "coordinate"], columns=factor, values="error"
+    )
+    complete = grid.dropna()
+    lost = len(grid) - len(complete)
+    # The coordinates of one block hang together: they count as one, by the mean of their ranks.
+    ranks = complete.rank(axis=1).groupby(block, sort=False).mean()
+    note = f"{lost} incomplete blocks of a coordinate left out"
+    yield _noted(friedman(ranks.to_numpy(float)), note, lost > 0)
+
+
+def _noted(outcome: Outcome, note: str, when: bool = True) -> Outcome:
+    """The outcome with a note in its message."""
+    if not when:
+        return outcome
+    return replace(outcome, message="; ".join(part for part in (outcome.message, note) if part))
+
+
+FAMILY = "load_case_specific"
+
+
+def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
+    """The extra sum of squares F test for each specimen and each plain representation.
+
+    Pooled fits are no least squares fits: they are drawn towards the cohort.
+    """
+    plain = fits[fits["representation"] != POOLED]
+    for (representation, specimen), rows in plain.groupby(
+        ["representation", "specimen"], sort=False
+    ):
+        family = f"{FAMILY}/{representation}"
+        outcome = _without(SHARED_ERROR) if _correlated(rows) else nested_fits(rows)
+        yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
+
+
+def nested_fits(rows: pd.DataFrame) -> Outcome:
+    """The test for the fits of one specimen in one representation."""
+    if joint_label(rows["fitted_to"]) != ALL:
+        return _without("one load case only: nothing to compare")
+    joint = rows[rows["fitted_to"] == ALL]
+    single = rows[rows["fitted_to"].isin(load_cases(rows["fitted_to"]))]
+    single = single[single["readings"] > 0]  # the specimen has no such load case
+    if joint["cost"].isna().any() or joint.empty or single["cost"].isna().any():
+        return _without("a fit is missing")
+    if len(single) < 2:
+        return _without("one load case only: nothing to compare")
+    readings, unknowns = int(joint["readings"].sum()), int(joint["unknowns"].sum())
+    if readings != int(single["readings"].sum()):
+        return _without("the fits are not to the same readings")
+    free = readings - int(single["unknowns"].sum())
+    costs = float(joint["cost"].sum()), float(single["cost"].sum())
+    return f_test_nested(costs[0], readings - unknowns, costs[1], free)
+
+
+def _correlated(rows: pd.DataFrame) -> bool:
+    """Whether a fit says that its sum of squares is not one of independent errors."""
+    notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
+    return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
+
+
+def _without(message: str) -> Outcome:
+    return NESTED.without(Ended.TOO_FEW, 0, message)
+
 
 PUBLISHED_OF = {"level_ratio": "literature_levels"}
 """The published set a representation starts from, where it is not ``literature``."""
 
-AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
+FITS_AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
 
 
 def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
@@ -74,7 +201,7 @@ def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
             values = pair.to_numpy(float)
             family = f"per_specimen_against_level_ratio/{test}"
             published = kruskal_wallis([values[:, 0], values[:, 1]])
-            note = f"{published.message}; {AS_PUBLISHED}"
+            note = f"{published.message}; {FITS_AS_PUBLISHED}"
             paired = wilcoxon_signed_rank(values[:, 0], values[:, 1])
             for outcome in (replace(published, message=note), paired):
                 yield Tested(family, "*", response, "representation", "fitted", outcome)
@@ -94,3 +221,21 @@ def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
         if len(known):
             found[f"{name}_rmse"] = squares.mean()[known].map(np.sqrt)
     return found
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``statistics.parquet``."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    frames = read_frames(tables)
+    rows = list(corrected_rows(all_tests(frames["errors"], frames["fits"])))
+    origin = provenance("cohort_stiffness.statistics", settings, cohort)
+    write(from_rows(STATISTICS, rows), output, origin)
+
+
+def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
+    """Every test of the tables ``errors`` and ``fits``, family by family."""
+    seen = rotations(errors)
+    yield from between_groups(seen)
+    yield from signed_ranks(seen)
+    yield from against_level_ratio(seen)
+    yield from load_case_specific(fits)

@@ -1,16 +1,54 @@
-"""Tables of studies of kind cohort_stiffness that are made of job files: fits and their errors."""
+"""Tables of studies of kind cohort_stiffness that are made of job files: fits and their errors.
 
-from spinepipe.tables.cohort_stiffness_columns import (
-    COORDINATE,
-    FITTED_TO,
-    NO_POSE,
-    REPRESENTATION,
-    SOURCE,
-    STAGE,
-    TEST,
+Columns that tables of studies of kind cohort_stiffness share.
+
+Tables of studies of kind cohort_stiffness that are computed from its fits and their errors.
+"""
+
+from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
+from spinepipe.units import COORDINATES
+
+REPRESENTATIONS = (
+    *("literature", "literature_levels"),
+    *("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
 )
-from spinepipe.tables.columns import JOINT, MESSAGE, SPECIMEN, status
-from spinepipe.tables.schema import Column, Table
+"""How stiffness is described, from what is taken as published to what is free in each joint."""
+
+SOURCES = ("literature", "own", "others_median", "others_pooled")
+STAGES = ("literature", "fitted", "left_out_case", "left_out_specimen")
+NO_POSE = "not measured, or no pose was found"
+
+REPRESENTATION = Column(
+    "representation",
+    "text",
+    "literature: one published value for all joints; literature_levels: published values level by "
+    "level; per_specimen: one stiffness for all joints of a specimen; level_ratio: published ratio "
+    "of levels times one factor; per_joint: each joint its own; partially_pooled: each joint its "
+    "own, drawn towards its specimen and its cohort as far as the data ask for it",
+    allowed=REPRESENTATIONS,
+)
+FITTED_TO = Column(
+    "fitted_to",
+    "text",
+    "load cases it was fitted to: a test, all, all_but_<test>, or nothing (literature)",
+)
+SOURCE = Column(
+    "source",
+    "text",
+    "whose motion it was fitted to: own, others_median (median of the other specimens' own fits), "
+    "others_pooled (what the hierarchical fit of the others expects of a new specimen), literature",
+    allowed=SOURCES,
+)
+STAGE = Column(
+    "stage",
+    "text",
+    "literature: not fitted at all; fitted: to these readings; left_out_case: to other load cases "
+    "of this specimen; left_out_specimen: to other specimens",
+    allowed=STAGES,
+)
+TEST = Column("test", "text", "load case")
+COORDINATE = Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES)
+
 
 NO_FIT = "no stiffness was found"
 LITERATURE = "taken from the literature or from other specimens, not fitted"
@@ -44,20 +82,27 @@ STIFFNESS = Table(
             "its standard deviation",
             "not fitted, at a bound, not constrained by the data, or expected from one specimen",
         ),
-        _stiffness("low", "lower end of the 95 % interval, of the logarithm: Student's t for fits "
-                   "of one specimen and for new specimens, normal for specimens of a pooled fit",
-                   "no standard error"),
+        _stiffness(
+            "low",
+            "lower end of the 95 % interval, of the logarithm: Student's t for fits "
+            "of one specimen and for new specimens, normal for specimens of a pooled fit",
+            "no standard error",
+        ),
         _stiffness("high", "upper end of the 95 % interval", "no standard error"),
-        Column("identifiable", "flag",
-               "whether the data constrain this stiffness; where false do not believe it. Of a "
-               "pooled fit: whether its own readings do, more than the cohort",
-               null=LITERATURE),
-        Column("at_bound", "text", "whether the fit ended at a bound",
-               allowed=("no", "lower", "upper")),
+        Column(
+            "identifiable",
+            "flag",
+            "whether the data constrain this stiffness; where false do not believe it. Of a "
+            "pooled fit: whether its own readings do, more than the cohort",
+            null=LITERATURE,
+        ),
+        Column(
+            "at_bound", "text", "whether the fit ended at a bound", allowed=("no", "lower", "upper")
+        ),
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 
 def _criterion(name: str, meaning: str) -> Column:
@@ -74,16 +119,28 @@ FITS = Table(
         FITTED_TO,
         Column("readings", "integer", "readings in the cost", low=0),
         Column("unknowns", "integer", "unknowns of the fit", low=0),
-        Column("effective_unknowns", "number",
-               "unknowns that the data decide about: all of a plain fit, fewer of a pooled one",
-               null=NO_FIT, low=0.0),
-        Column("cost", "number",
-               "sum of squared errors in SDs of one reading, or in deg2 for the published cost",
-               null=NO_FIT, low=0.0),
-        Column("scatter", "number",
-               "root of cost over readings less unknowns inside their bounds (effective ones of a "
-               "pooled fit): 1 where errors are as large as declared",
-               null=f"{NO_FIT}, or no more readings than unknowns", low=0.0),
+        Column(
+            "effective_unknowns",
+            "number",
+            "unknowns that the data decide about: all of a plain fit, fewer of a pooled one",
+            null=NO_FIT,
+            low=0.0,
+        ),
+        Column(
+            "cost",
+            "number",
+            "sum of squared errors in SDs of one reading, or in deg2 for the published cost",
+            null=NO_FIT,
+            low=0.0,
+        ),
+        Column(
+            "scatter",
+            "number",
+            "root of cost over readings less unknowns inside their bounds (effective ones of a "
+            "pooled fit): 1 where errors are as large as declared",
+            null=f"{NO_FIT}, or no more readings than unknowns",
+            low=0.0,
+        ),
         _criterion("log_likelihood", "logarithm of the likelihood, scatter estimated"),
         _criterion("aicc", "Akaike's criterion, corrected for few readings; less is better"),
         _criterion("bic", "Schwarz's criterion; less is better"),
@@ -93,7 +150,7 @@ FITS = Table(
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 
 def _motion(name: str, meaning: str, low: float | None = 0.0, null: str | None = NO_POSE) -> Column:
@@ -122,12 +179,13 @@ ERRORS = Table(
         _motion("rmse", "root mean square error"),
         _motion("peak_error", "mean error at the largest load", low=None),
         _motion("measured", "mean size of the measured motion", null=None),
-        _motion("measured_peak", "mean measured motion at the largest load", None,
-                "not measured there"),
+        _motion(
+            "measured_peak", "mean measured motion at the largest load", None, "not measured there"
+        ),
         status("solve"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 
 def _spread(name: str, meaning: str) -> Column:
@@ -150,15 +208,24 @@ POOLING = Table(
         _spread("between_joints", "SD of what is left: each joint for itself"),
         Column("specimens", "integer", "specimens it was fitted to", low=0),
         Column("scatter", "number", "scatter of readings, see fits", null=NO_FIT, low=0.0),
-        Column("effective_unknowns", "number", "unknowns that the data decide about, all "
-               "coordinates and specimens", null=NO_FIT, low=0.0),
-        Column("log_likelihood", "number", "logarithm of the marginal likelihood",
-               null=f"{NO_FIT}, or {CORRELATED}"),
+        Column(
+            "effective_unknowns",
+            "number",
+            "unknowns that the data decide about, all coordinates and specimens",
+            null=NO_FIT,
+            low=0.0,
+        ),
+        Column(
+            "log_likelihood",
+            "number",
+            "logarithm of the marginal likelihood",
+            null=f"{NO_FIT}, or {CORRELATED}",
+        ),
         Column("iterations", "integer", "iterations", low=0),
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 SIGN_CHECKS = Table(
     "sign_checks",
@@ -171,14 +238,175 @@ SIGN_CHECKS = Table(
         JOINT,
         COORDINATE,
         Column("readings", "integer", "readings compared", low=0),
-        Column("measured_over_expected", "number",
-               "slope of the measured on the expected motion (published stiffness): 1 as "
-               "expected, negative against the load", null="not measured, or no pose was found"),
-        Column("standard_error", "number", "standard error of the slope, all cycles together",
-               null="not measured, or too few readings", low=0.0),
-        Column("verdict", "text", "what it looks like; flipped: in all readings together, or in a "
-               "cycle that message names",
-               allowed=("as_expected", "flipped", "undecided")),
+        Column(
+            "measured_over_expected",
+            "number",
+            "slope of the measured on the expected motion (published stiffness): 1 as "
+            "expected, negative against the load",
+            null="not measured, or no pose was found",
+        ),
+        Column(
+            "standard_error",
+            "number",
+            "standard error of the slope, all cycles together",
+            null="not measured, or too few readings",
+            low=0.0,
+        ),
+        Column(
+            "verdict",
+            "text",
+            "what it looks like; flipped: in all readings together, or in a "
+            "cycle that message names",
+            allowed=("as_expected", "flipped", "undecided"),
+        ),
         MESSAGE,
     ),
-)  # fmt: skip
+)
+
+
+MAE = Table(
+    "mae",
+    "Mean absolute error in the loaded coordinate, over the joints of each specimen: median and "
+    "quartiles over specimens, and as a percentage of the largest mean motion of a specimen.",
+    ("representation", "fitted_to", "source", "test", "coordinate", "steps"),
+    (
+        REPRESENTATION,
+        FITTED_TO,
+        SOURCE,
+        STAGE,
+        TEST,
+        COORDINATE,
+        Column(
+            "steps",
+            "text",
+            "at the largest load, or the mean over all load steps",
+            allowed=("peak", "all"),
+        ),
+        Column("specimens", "integer", "specimens with a result", low=0),
+        Column("mae_deg", "number", "median over specimens", "deg", null=NO_POSE, low=0.0),
+        Column(
+            "low_quartile_deg",
+            "number",
+            "lower quartile over specimens",
+            "deg",
+            null=NO_POSE,
+            low=0.0,
+        ),
+        Column(
+            "high_quartile_deg",
+            "number",
+            "upper quartile over specimens",
+            "deg",
+            null=NO_POSE,
+            low=0.0,
+        ),
+        Column(
+            "largest_motion_deg",
+            "number",
+            "largest over specimens of the mean measured motion over joints",
+            "deg",
+            null="not measured",
+            low=0.0,
+        ),
+        Column(
+            "mae_percent",
+            "number",
+            "median as a percentage of the largest motion",
+            "percent",
+            null=NO_POSE,
+            low=0.0,
+        ),
+    ),
+)
+
+CRITERIA = ("fitted", "left_out_specimen", "left_out_case", "aicc", "bic")
+
+RANKING = Table(
+    "ranking",
+    "Representations in order: by error of what they were fitted to, by error of what was held "
+    "out, and by information criteria. Less is better in all of them. Stiffness from the "
+    "literature, which is never fitted, stands beside in every error.",
+    ("criterion", "representation", "source"),
+    (
+        Column(
+            "criterion",
+            "text",
+            "fitted, left_out_specimen, left_out_case: root mean square error of all measured "
+            "rotations of a specimen, mean over specimens; left_out_case: each load case by the "
+            "fit to all others, else fits to all load cases; aicc, bic: sums over specimens, "
+            "fits to all load cases, the spreads of a pooled fit counted once",
+            allowed=CRITERIA,
+        ),
+        REPRESENTATION,
+        SOURCE,
+        Column("rank", "integer", "1 is best", null="no result", low=1),
+        Column(
+            "unit", "text", "unit of the values; none for information criteria", allowed=("deg", "")
+        ),
+        Column("value", "number", "the criterion", null="no result"),
+        Column(
+            "standard_error",
+            "number",
+            "standard error over specimens",
+            null="no result, or fewer than two specimens",
+            low=0.0,
+        ),
+        Column(
+            "worse_than_best", "number", "value less that of the best", null="no result", low=0.0
+        ),
+        Column(
+            "worse_standard_error",
+            "number",
+            "standard error of worse_than_best, over the differences of the specimens",
+            null="the best itself, no result, or fewer than two specimens",
+            low=0.0,
+        ),
+        Column(
+            "p",
+            "number",
+            "Wilcoxon's signed rank test of the specimens' values against the best's, uncorrected",
+            null="the best itself, an information criterion, no result, or too few specimens",
+            low=0.0,
+            high=1.0,
+        ),
+        Column(
+            "specimens",
+            "integer",
+            "specimens with a result in every representation, which alone are compared",
+            low=0,
+        ),
+        MESSAGE,
+    ),
+)
+
+FINDINGS = Table(
+    "findings",
+    "What the study says to the findings of Gould et al. 2024b, and to those hoped for here, each "
+    "with its number. Decided test by test: p values are not corrected for their number.",
+    ("finding",),
+    (
+        Column("finding", "text", "short name"),
+        Column("statement", "text", "what is claimed, as a sentence"),
+        Column("quantity", "text", "what the value is, and what kind its interval is of"),
+        Column("value", "number", "value", null="there is no result"),
+        Column("low", "number", "lower end of its 95 % interval", null="there is none"),
+        Column("high", "number", "upper end of its 95 % interval", null="there is none"),
+        Column("unit", "text", "unit of the value; none for shares and ratios"),
+        Column(
+            "p",
+            "number",
+            "p value of the test that decides",
+            null="there is none",
+            low=0.0,
+            high=1.0,
+        ),
+        Column(
+            "holds",
+            "text",
+            "yes: p below the study's significance, on the claimed side; no: as sure, on the "
+            "other side, or surely too little to matter; undecided: this cohort cannot tell",
+            allowed=("yes", "no", "undecided"),
+        ),
+        MESSAGE,
+    ),
+)

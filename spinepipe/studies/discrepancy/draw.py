@@ -1,9 +1,10 @@
 """Job: one figure of a search for missing effects, as SVG and as PNG."""
 
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.report.discrepancy import DRAW, read_verdict
+from spinepipe.report.discrepancy import DRAW
 from spinepipe.report.style import save, style
-from spinepipe.studies import Discrepancy
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import read_verdict
 from spinepipe.tables import read_frames
 
 

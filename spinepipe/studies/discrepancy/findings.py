@@ -1,27 +1,246 @@
-"""What else a reader should know, in a few sentences."""
+"""What else a reader should know, in a few sentences.
+
+The verdict in one sentence, and how sure it is in another.
+
+What a search could not tell, or hardly: names alike, gaps too small, effects without a trace.
+"""
 
 from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.discrepancy.limits import (
-    confused,
-    imitating,
-    not_testable,
-    would_have_been_seen,
-)
-from spinepipe.report.discrepancy.verdict import Verdict
-from spinepipe.report.discrepancy.words import (
+from spinepipe.report.page.document import Results
+from spinepipe.report.words import count, fixed, number
+from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.words import (
     axis,
     called,
     capital,
     differing,
     estimate_of,
+    listed,
     plain,
     readable,
+    what_of,
+    where_of,
+    with_article,
 )
-from spinepipe.report.page.results import Results
-from spinepipe.report.words import count, fixed, number
+
+
+def headline(verdict: Verdict) -> str:
+    """What is missing and where, or that nothing is, or that nobody can tell."""
+    return {
+        Answer.NAMED: _named,
+        Answer.SET: _one_of,
+        Answer.NULL: _nothing,
+        Answer.UNKNOWN: _unknown,
+    }[verdict.answer](verdict)
+
+
+def _named(verdict: Verdict) -> str:
+    return f"The model lacks {_and(verdict.effects)}."
+
+
+def _and(effects: tuple[Missing, ...]) -> str:
+    return "; and ".join(what_of(effect) for effect in effects)
+
+
+def _one_of(verdict: Verdict) -> str:
+    names = listed([with_article(name) for name in verdict.in_set], 8, "or")
+    places = {where_of(one) for one in verdict.candidates}
+    where = f", {places.pop()}" if len(places) == 1 and places != {""} else ""
+    told = f"one of these is missing{where}, and these tests cannot tell which: {names}."
+    if verdict.effects:
+        return f"The model lacks {_and(verdict.effects)}. Besides, {told}"
+    return capital(told)
+
+
+def _nothing(verdict: Verdict) -> str:
+    gaps = [one.gap for one in verdict.smallest_detectable]
+    if not gaps:
+        return "Nothing is missing above the noise."
+    low, high = number(min(gaps), 2), number(max(gaps), 2)
+    most = "" if low == high else f" (the easiest to see) to {high} (the hardest)"
+    return (
+        "Nothing is missing above the noise. An effect would have been named from a gap of "
+        f"{low} noise SD{most}."
+    )
+
+
+def _unknown(verdict: Verdict) -> str:
+    if _no_base(verdict):
+        return "Nothing can be said of what is missing: the base model cannot be fitted."
+    if verdict.suspicions and verdict.why:
+        return f"{capital(readable(verdict.why)).rstrip('.')}."
+    told = "something is missing that is none of the known effects"
+    if not _of_unknown_shape(verdict):
+        told = "something is missing, but no name is believed"
+    if verdict.effects:
+        told = f"The model lacks {_and(verdict.effects)}. Beyond that, {told}"
+    first = readable(verdict.unknown_where).split(";")[0].partition(" (gap")[0]
+    place = ", ".join(axis(part.replace(" ", "_")) for part in first.split(", "))
+    where = f" It shows most at {place}." if first and not first.startswith(_NOWHERE) else ""
+    return f"{capital(told)}.{where}"
+
+
+_NOWHERE = "no single place"
+
+
+def _of_unknown_shape(verdict: Verdict) -> bool:
+    """Whether the reason for no name is what generic shapes explain and known effects do not."""
+    why = verdict.why
+    return not why or verdict.unknown_shape in why or " stays" in why
+
+
+def _no_base(verdict: Verdict) -> bool:
+    """Whether there is no motion of a base model that measured motion could be held against."""
+    return bool(verdict.why) and not verdict.effects and verdict.rms_residual.base is None
+
+
+def how_sure(verdict: Verdict) -> str:
+    """Evidence, margin to the runner-up, and what held-out motion says."""
+    parts = [
+        *(_evidence(effect, verdict) for effect in verdict.effects),
+        _why_unknown(verdict),
+        _shape(verdict),
+        _misfit(verdict),
+        _closed(verdict),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _evidence(effect: Missing, verdict: Verdict) -> str:
+    if effect.log_evidence is None:
+        return ""
+    told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
+    if verdict.threshold is not None:
+        told += f", {number(verdict.threshold, 2)} is needed"
+    rivals = [rival for rival in effect.rivals if rival.margin is not None]
+    if rivals:
+        first = min(rivals, key=lambda rival: rival.margin or 0.0)
+        told += f"; next best {plain(first.name)}, {number(first.margin or 0.0, 2)} behind"
+    return f"{told}."
+
+
+def _why_unknown(verdict: Verdict) -> str:
+    """Why no name is given, where that is more than the shape of what is missing."""
+    shape = verdict.unknown_shape
+    if verdict.answer is not Answer.UNKNOWN or not verdict.why or (shape and shape in verdict.why):
+        return ""
+    if verdict.suspicions and not _no_base(verdict):
+        return ""  # the headline says it
+    return f"Why no name: {readable(verdict.why).rstrip('.')}."
+
+
+def _shape(verdict: Verdict) -> str:
+    known = verdict.unknown_shape and not _no_base(verdict) and _of_unknown_shape(verdict)
+    if verdict.answer is not Answer.UNKNOWN or not known:
+        return ""
+    shape = readable(verdict.unknown_shape).rstrip(".")
+    for spread, words in _SPREADS.items():
+        shape = shape.removesuffix(spread) + words if shape.endswith(spread) else shape
+    return f"Its shape: {shape}."
+
+
+_SPREADS = {
+    ", each joint of each specimen": ", of its own in each joint of each specimen",
+    ", by joint": ", of its own in each joint",
+    ", shared": ", alike in all joints and specimens",
+}
+"""How a shape differs between places, in the words of results and of the page."""
+
+
+def _misfit(verdict: Verdict) -> str:
+    """Residuals in noise SD before and with the effects."""
+    rms = verdict.rms_residual
+    if rms.base is None:
+        return ""
+    told = f"Residuals of {fixed(rms.base)} noise SD"
+    if rms.with_effects is not None and rms.with_effects != rms.base:
+        told += f" become {fixed(rms.with_effects)}"
+    return f"{told} (1 is noise)."
+
+
+def _closed(verdict: Verdict) -> str:
+    closed = verdict.gap.held_out_closed
+    if closed is None or not (verdict.effects or verdict.candidates):
+        return ""
+    share = f"{100.0 * closed:.0f} %" if closed < 0.995 else ">99 %"
+    share = "100 %" if closed >= 1.0 else share
+    before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
+    sizes = "" if before is None or after is None else f", {fixed(before)} to {fixed(after)}"
+    return f"On motion held out of the fits {share} of the gap is closed{sizes}."
+
+
+_MOST_EASY, _MOST_HARD, _MOST_ALIKE, _MOST_TESTS = 4, 3, 2, 3
+_ALIKE = 0.3
+"""Share of an effect's gap from which another is said to be like it."""
+
+
+def would_have_been_seen(verdict: Verdict) -> str:
+    """Of a search that named nothing: the gaps from which effects would have been named."""
+    if verdict.answer is not Answer.NULL or not verdict.smallest_detectable:
+        return ""
+    ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
+    told = [f"{plain(one.name)} {number(one.gap, 2)}" for one in ordered]
+    if len(told) <= _MOST_EASY + _MOST_HARD:
+        return f"Smallest gap, in noise SD, that would have been named: {', '.join(told)}."
+    return (
+        f"Smallest gap, in noise SD, that would have been named: {', '.join(told[:_MOST_EASY])} "
+        f"are the easiest to see; {', '.join(told[-_MOST_HARD:])} the hardest. "
+        "A table below has all."
+    )
+
+
+def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
+    """What these tests could take each named effect for."""
+    told = []
+    for effect in verdict.effects if len(confusions) else ():
+        rows = confusions[(confusions["effect"] == effect.name) & (confusions["share"] >= _ALIKE)]
+        others = rows[rows["other"] != effect.name].sort_values("share", ascending=False)
+        alike = [
+            f"{with_article(row['other'])} would explain {100.0 * row['share']:.0f} %"
+            for row in others.head(_MOST_ALIKE).to_dict("records")
+        ]
+        if alike:
+            told.append(f"{listed(alike)} of the gap that {plain(effect.name)} makes")
+    return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
+
+
+def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
+    """Of what no known effect explains: the one that comes nearest, and why it is not named."""
+    unknown = verdict.answer is Answer.UNKNOWN and verdict.unknown_shape in verdict.why
+    if not unknown or not verdict.unknown_shape or verdict.effects or candidates.empty:
+        return ""
+    rows = candidates[candidates["stage"] == "refit 1"].dropna(subset="log_evidence")
+    if rows.empty or verdict.threshold is None:
+        return ""
+    best = max(rows.to_dict("records"), key=lambda row: row["log_evidence"])
+    if best["log_evidence"] <= verdict.threshold:
+        return ""
+    return (
+        f"Nearest known effect: {plain(best['effect'])}, log evidence "
+        f"{number(best['log_evidence'])}. Generic shapes without physics explain much more, so it "
+        "would only imitate what is missing."
+    )
+
+
+def not_testable(verdict: Verdict) -> str:
+    """Effects without a trace in these tests, and the tests that would show them."""
+    names = [plain(one.name) for one in verdict.not_testable]
+    if not names:
+        return ""
+    told = f"These tests cannot show {listed(names, 8, 'or')}"
+    if verdict.answer is Answer.NULL:
+        told += ", so nothing is said about them"
+    by_test: dict[str, list[str]] = {}
+    for one in verdict.not_testable:
+        by_test.setdefault(readable(one.test_that_would_tell), []).append(plain(one.name))
+    would = [
+        f"{listed(shown, 8)}: {test}" for test, shown in list(by_test.items())[:_MOST_TESTS] if test
+    ]
+    return f"{told}. What would show them: {'; '.join(would)}." if would else f"{told}."
+
 
 _MOST_PLACES, _MOST_SIZES = 3, 4
 _BY_CHANCE = 0.025

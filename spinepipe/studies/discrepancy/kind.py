@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
-from spinepipe.studies import Discrepancy
+from spinepipe.studies.discrepancy.settings import Discrepancy
 
 FOLDER = "discrepancy"
 """Folder of all results inside that of the study."""

@@ -1,17 +1,228 @@
-"""The report of a search for missing effects."""
+"""The report of a search for missing effects.
 
+Tables of the result files as the page of a search shows them: in plain words, and shorter.
+
+Which tables the page of a search shows: those of the verdict, then those of the files.
+"""
+
+import json
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.discrepancy.findings import findings, warnings
-from spinepipe.report.discrepancy.headline import headline, how_sure
-from spinepipe.report.discrepancy.tables import shown_tables
-from spinepipe.report.discrepancy.verdict import Answer, Verdict
-from spinepipe.report.page.document import Document, Headline, Picture
-from spinepipe.report.page.results import Results
-from spinepipe.studies import Discrepancy
+from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
+from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.words import (
+    axis,
+    called,
+    differing,
+    name_and_place,
+    plain,
+    readable,
+    unit_of,
+    value_of,
+    where_of,
+)
+from spinepipe.tables.schema import Column
+
+Parts = tuple[str, str, str, pd.DataFrame, tuple[Column, ...]]
+
+_TRIED = (
+    "stage",
+    "effect",
+    "variant",
+    "spread",
+    "scope",
+    "estimate",
+    "unit",
+    "log_evidence",
+    "delta_chi2",
+    "gap_share",
+    "message",
+)
+"""Columns of what was tried; the others are in the file."""
+
+_ONE_PLACE = "joint x coordinate x test"
+
+
+def file_tables(results: Results) -> Iterator[Parts]:
+    """File, title, what is said of it, rows and columns of each table."""
+    held_out, where = results.table("held_out"), results.table("where")
+    yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), HELD_OUT.columns
+    if len(where):
+        yield "where", "Where the models are off", _WHERE, _worded(_above(where)), WHERE.columns
+    candidates = results.table("candidates")
+    if len(candidates):
+        columns = tuple(column for column in CANDIDATES.columns if column.name in _TRIED)
+        yield "candidates", "What was tried", _CANDIDATES, _worded(_best(candidates)), columns
+
+
+_WHERE = (
+    f"{WHERE.about} Largest first; of single places those above the noise. All of them, and load "
+    "steps, are in where.parquet."
+)
+_CANDIDATES = (
+    f"{CANDIDATES.about} On each screen the best form of an effect; all forms are in "
+    "candidates.parquet."
+)
+
+
+def _above(where: pd.DataFrame) -> pd.DataFrame:
+    """Without load steps, and without single places where noise may be all."""
+    kept = (where["by"] != "step") & ((where["by"] != _ONE_PLACE) | (where["gap_low"] > 0.0))
+    return where[kept].sort_values("gap", ascending=False, kind="stable")
+
+
+def _best(candidates: pd.DataFrame) -> pd.DataFrame:
+    """Stages in their order, in each the best first; of the screens one form of each effect."""
+    rows = candidates[candidates["log_evidence"].notna()]
+    order = {stage: number for number, stage in enumerate(rows["stage"].unique())}
+    ordered = rows.assign(order=rows["stage"].map(order)).sort_values(
+        ["order", "log_evidence"], ascending=[True, False], kind="stable"
+    )
+    again = ordered.duplicated(["stage", "effect"]) & ordered["stage"].str.startswith("screen")
+    return ordered[~again]
+
+
+def _worded(frame: pd.DataFrame) -> pd.DataFrame:
+    """Effects, places and options in plain words."""
+    ways = {
+        "effect": plain,
+        "fold": plain,
+        "test": plain,
+        "model": plain,
+        "coordinate": axis,
+        "variant": _options,
+    }
+    return frame.assign(
+        **{name: frame[name].map(way) for name, way in ways.items() if name in frame}
+    )
+
+
+def _options(text: str) -> str:
+    """``flexion-extension, tangent`` of options as JSON."""
+    values = [
+        name
+        for value in json.loads(text).values()
+        for name in (value if isinstance(value, list) else [value])
+    ]
+    return ", ".join(axis(str(name)) for name in values)
+
+
+Records = list[dict[str, Any]]
+
+_EFFECT = Column("effect", "text", "effect")
+_COLUMNS: Mapping[str, tuple[Column, ...]] = {
+    "parameters": (
+        _EFFECT,
+        Column("parameter", "text", "parameter of the effect"),
+        Column("value [95 % interval]", "text", "estimate, and the interval if there is one"),
+        Column("unit", "text", "unit; none for a ratio"),
+        Column("place", "text", "joints, coordinates, specimens and tests it is of"),
+    ),
+    "rivals": (
+        _EFFECT,
+        Column("rival", "text", "another name for the same discrepancy"),
+        Column("margin", "number", "log evidence by which it is behind", null="not told"),
+    ),
+    "set": (
+        _EFFECT,
+        Column("kind", "text", "what it acts on"),
+        Column("where", "text", "joints, coordinates, specimens and tests"),
+        Column("log_evidence", "number", "log evidence against the model without it", null="none"),
+    ),
+    "not_testable": (
+        _EFFECT,
+        Column("why", "text", "why these tests cannot show it"),
+        Column("test_that_would_tell", "text", "what a test must have to show it"),
+    ),
+    "detectable": (
+        _EFFECT,
+        Column("gap", "number", "smallest gap at which it would be named", "noise SD"),
+    ),
+    "errors": (
+        Column("where", "text", "readings in question"),
+        Column("what", "text", "what it looks like"),
+        Column("evidence", "text", "why"),
+    ),
+}
+_TITLES = {
+    "errors": ("Suspected errors of the data", "Readings that no model should be bent to."),
+    "parameters": ("What is missing, and how large it is", "Parameters of the named effects."),
+    "set": ("One of these is missing", "Effects that these tests cannot tell apart."),
+    "rivals": ("Next best names", "Log evidence below a few units is too little to decide."),
+    "not_testable": ("What these tests cannot show", "Base or nuisance take it up."),
+    "detectable": ("What would have been seen", "A smaller gap may be there unseen."),
+}
+"""Tables from the verdict in their order: title, and what is said of each."""
+
+
+def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
+    """Tables with rows, those that say most first."""
+    made = _from_verdict(verdict)
+    found = [
+        sortable("verdict", *_TITLES[name], pd.DataFrame(made[name]), _COLUMNS[name])
+        for name in _TITLES
+        if made[name]
+    ]
+    found += [sortable(*parts) for parts in file_tables(results) if len(parts[3])]
+    return [table for table in found if table.rows]
+
+
+def _from_verdict(verdict: Verdict) -> dict[str, Records]:
+    return {
+        "errors": [
+            {key: readable(words) for key, words in vars(one).items()} for one in verdict.suspicions
+        ],
+        "parameters": [
+            {
+                "effect": called(effect),
+                "parameter": name_and_place(one)[0],
+                "value [95 % interval]": value_of(one),
+                "unit": unit_of(one.unit),
+                "place": _place(effect, name_and_place(one)[1]),
+            }
+            for effect in verdict.effects
+            for one in effect.parameters
+        ],
+        "set": [
+            {
+                "effect": plain(one.name),
+                "kind": one.kind,
+                "where": where_of(one),
+                "log_evidence": one.log_evidence,
+            }
+            for one in verdict.candidates
+        ],
+        "rivals": [
+            {"effect": plain(effect.name), "rival": plain(rival.name), "margin": rival.margin}
+            for effect in verdict.effects
+            for rival in effect.rivals
+        ],
+        "not_testable": [
+            {
+                "effect": plain(one.name),
+                "why": readable(one.why),
+                "test_that_would_tell": readable(one.test_that_would_tell),
+            }
+            for one in verdict.not_testable
+        ],
+        "detectable": [
+            {"effect": plain(one.name), "gap": one.gap}
+            for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
+        ],
+    }
+
+
+def _place(effect: Missing, own: str) -> str:
+    """Where a value holds: where the effect is, and the places of its own or how values differ."""
+    return "; ".join(part for part in (where_of(effect), own or differing(effect)) if part)
+
 
 QUESTION = (
     "Where do model and measurement disagree, which effect does the model lack, what happens when "

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from spinepipe.files import appearing
+from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.page_inputs import results_of
-from spinepipe.report.discrepancy import read_verdict
-from spinepipe.report.discrepancy.page import READ, discrepancy_page
-from spinepipe.studies import Discrepancy
+from spinepipe.studies.discrepancy.page import READ, discrepancy_page
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import read_verdict
 
 
 def run(

@@ -4,10 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
-from spinepipe.cohort.header import MeasurementSd
-from spinepipe.studies.coordinates import FORM
-from spinepipe.studies.lists import Coordinates, EachOnce, Tests
-from spinepipe.studies.published_stiffness import PublishedStiffness
+from spinepipe.cohort.cohort import MeasurementSd
+from spinepipe.studies.parts import FORM, Coordinates, EachOnce, PublishedStiffness, Tests
 from spinepipe.studies.study import Study
 
 __all__ = ["Discrepancy", "DiscrepancyBase", "HeldOut", "Nuisance"]

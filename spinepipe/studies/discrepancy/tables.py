@@ -1,9 +1,8 @@
 """Tables of studies of kind discrepancy: where a model is wrong, and what was tried to mend it."""
 
 from spinepipe.effects import Kind, Spread
-from spinepipe.statics.status import Status
-from spinepipe.tables.columns import JOINT, MESSAGE, SPECIMEN, status
-from spinepipe.tables.schema import Column, Table
+from spinepipe.status import Status
+from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.units import COORDINATES
 
 MODELS = ("base", "with_effects")
@@ -71,37 +70,57 @@ CANDIDATES = Table(
     "What was tried: one row per stage of the search and form of an effect.",
     ("stage", "effect", "variant", "spread", "scope", "shape"),
     (
-        Column("stage", "text",
-               "design: what the tests could tell, before residuals are looked at; screen N: all "
-               "candidates, linear at the model of round N; refit N: the leading few, by the full "
-               "simulator; screen, refit in place of X (N): X taken away, all others tried there"),
+        Column(
+            "stage",
+            "text",
+            "design: what the tests could tell, before residuals are looked at; screen N: all "
+            "candidates, linear at the model of round N; refit N: the leading few, by the full "
+            "simulator; screen, refit in place of X (N): X taken away, all others tried there",
+        ),
         Column("effect", "text", "effect, as in a model file"),
         Column("kind", "text", "what it acts on", allowed=tuple(Kind)),
         Column("variant", "text", "its options, as JSON"),
-        Column("spread", "text", "how its values may differ between places",
-               allowed=tuple(Spread)),
+        Column("spread", "text", "how its values may differ between places", allowed=tuple(Spread)),
         Column("scope", "text", "joints, specimens and tests it acts in, in words; * for all"),
         Column("shape", "text", "its parameters of shape in units of the parameter, as JSON"),
         Column("parameters", "integer", "parameters that are fitted", low=0),
-        Column("estimate", "number", "estimate of its strength", "see unit",
-               "not fitted, or several strengths"),
+        Column(
+            "estimate",
+            "number",
+            "estimate of its strength",
+            "see unit",
+            "not fitted, or several strengths",
+        ),
         Column("unit", "text", "unit of the estimate"),
-        Column("log_evidence", "number",
-               "natural logarithm of the evidence for the effect against the model without it",
-               null="not computed"),
+        Column(
+            "log_evidence",
+            "number",
+            "natural logarithm of the evidence for the effect against the model without it",
+            null="not computed",
+        ),
         Column("delta_chi2", "number", "by how much it lowers chi squared", null="not computed"),
-        Column("gap_share", "number", "share of the discrepancy that it closes",
-               null="not computed"),
-        Column("absorbed", "number",
-               "share of its signature that the base and the nuisance take up",
-               null="not computed", low=0.0, high=1.0),
+        Column(
+            "gap_share", "number", "share of the discrepancy that it closes", null="not computed"
+        ),
+        Column(
+            "absorbed",
+            "number",
+            "share of its signature that the base and the nuisance take up",
+            null="not computed",
+            low=0.0,
+            high=1.0,
+        ),
         _of_noise("detectable_gap", "smallest gap at which it would be named", "not computed"),
         Column("threshold", "number", "log evidence that it must exceed", null="not calibrated"),
-        Column("status", "text", "how its fit ended; not_testable: these tests cannot show it",
-               allowed=(*Status, NOT_TESTABLE)),
+        Column(
+            "status",
+            "text",
+            "how its fit ended; not_testable: these tests cannot show it",
+            allowed=(*Status, NOT_TESTABLE),
+        ),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 WHERE = Table(
     "where",
@@ -118,10 +137,11 @@ WHERE = Table(
         _of_noise("gap", "discrepancy above the noise", "no pose was found"),
         _of_noise("gap_low", "lower end of its 95 % interval", "no pose was found"),
         _of_noise("gap_high", "upper end of its 95 % interval", "no pose was found"),
-        _of_noise("rms_residual", "root of chi2 / dof: 1 where only noise is left",
-                  "no pose was found"),
+        _of_noise(
+            "rms_residual", "root of chi2 / dof: 1 where only noise is left", "no pose was found"
+        ),
     ),
-)  # fmt: skip
+)
 
 CONFUSIONS = Table(
     "confusions",
@@ -130,11 +150,16 @@ CONFUSIONS = Table(
     (
         Column("effect", "text", "effect that is there"),
         Column("other", "text", "effect that is taken for it"),
-        Column("share", "number",
-               "share of the discrepancy that `effect` would make which `other` can explain, "
-               "beyond base and nuisance; 1: they cannot be told apart", low=0.0, high=1.0),
+        Column(
+            "share",
+            "number",
+            "share of the discrepancy that `effect` would make which `other` can explain, "
+            "beyond base and nuisance; 1: they cannot be told apart",
+            low=0.0,
+            high=1.0,
+        ),
     ),
-)  # fmt: skip
+)
 
 
 def _rms(name: str, of: str, null: str) -> Column:
@@ -153,10 +178,14 @@ HELD_OUT = Table(
         _rms("rms_base", "the base model", "no result, see status"),
         _rms("rms_with_effects", "the model with the named effects", "no result, see status"),
         _rms("rms_surrogate", "a generic surrogate that knows no physics", "not computed"),
-        Column("closed", "number",
-               "share of the base's discrepancy that the effects close; negative: they widen it",
-               null="no result, or the base's discrepancy is not above the noise", high=1.0),
+        Column(
+            "closed",
+            "number",
+            "share of the base's discrepancy that the effects close; negative: they widen it",
+            null="no result, or the base's discrepancy is not above the noise",
+            high=1.0,
+        ),
         status("fits"),
         MESSAGE,
     ),
-)  # fmt: skip
+)

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Callable, Iterable
 
-from spinepipe.report.discrepancy.verdict import Estimate, Missing
 from spinepipe.report.words import AXIS, number
+from spinepipe.studies.discrepancy.verdict import Estimate, Missing
 
 ALL = "*"
 _UNCOUNTED = (

@@ -1,12 +1,21 @@
-"""Job: indices of all factors for all outputs of one specimen, and how they settle."""
+"""Job: indices of all factors for all outputs of one specimen, and how they settle.
+
+Outputs of a study as arrays: all samples of one test and step, joint by joint.
+"""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from spinepipe.jobs.global_sensitivity.drawn import design_of
-from spinepipe.jobs.global_sensitivity.outputs import Output, calibrated_outputs, response_outputs
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
 from spinepipe.sensitivity.global_indices import (
     Index,
     Settings,
@@ -15,8 +24,93 @@ from spinepipe.sensitivity.global_indices import (
     indices,
     noise_floor,
 )
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.tables import CONVERGENCE, INDICES, Table, to_arrow, write
+from spinepipe.status import Status
+from spinepipe.studies.global_sensitivity.batch import design_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.tables import CALIBRATED, CONVERGENCE, INDICES, RESPONSES
+from spinepipe.tables import Table, to_arrow, write
+
+Where = tuple[str, str, int, str, str]
+"""Output, test, step, joint, coordinate."""
+
+EVERY = "*"
+SETTLED = 1e-6
+"""Outputs (mm, deg, N, N m) that vary by less than a solver can tell are constant."""
+
+_MOTION = {
+    c.name.removeprefix("predicted_").rsplit("_", 1)[0]: c.name
+    for c in RESPONSES.columns
+    if c.name.startswith("predicted_")
+}
+_LOAD = {
+    c.name.removeprefix("load_").rsplit("_", 1)[0]: c.name
+    for c in RESPONSES.columns
+    if c.name.startswith("load_")
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """K outputs that succeed or fail together.
+
+    Attributes
+    ----------
+    where : (K,) what each is. values : (n, K) in units of the tables, 0 where a run failed.
+    ok : (n,) which runs succeeded. resolution : below which an output counts as constant.
+    """
+
+    where: tuple[Where, ...]
+    values: Array
+    ok: NDArray[np.bool_]
+    resolution: float
+
+
+def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+    """Outputs of each test and step from the blocks of a specimen's responses."""
+    if not (study.outputs.motion or study.outputs.joint_load):
+        return
+    kinds = {
+        "motion": {name: _MOTION[name] for name in study.outputs.motion},
+        "joint_load": {name: _LOAD[name] for name in study.outputs.joint_load},
+    }
+    columns = [column for kind in kinds.values() for column in kind.values()]
+    rows = _rows(blocks, ["sample", "test", "step", "joint", "status", *columns])
+    head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
+    per_sample = len(head)
+    good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)
+    numbers = {
+        name: np.nan_to_num(rows[name].to_numpy()).reshape(-1, per_sample) for name in columns
+    }
+    for test, step in dict.fromkeys((row["test"], row["step"]) for row in head):
+        at = [n for n, row in enumerate(head) if (row["test"], row["step"]) == (test, step)]
+        where = tuple(
+            (kind, test, step, head[n]["joint"], name)
+            for kind, names in kinds.items()
+            for name in names
+            for n in at
+        )
+        values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
+        ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
+        yield Output(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
+
+
+def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+    """Stiffness in each coordinate from the blocks of a specimen's fits."""
+    if not blocks:
+        return
+    free = study.calibration.free
+    names = {c.name.rsplit("_n", 1)[0]: c.name for c in CALIBRATED.columns if "_per_" in c.name}
+    rows = _rows(blocks, ["status", *(names[name] for name in free)])
+    ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
+    values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
+    where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
+    yield Output(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
+
+
+def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:
+    """Rows of all blocks; they come in the order of the samples."""
+    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])
+
 
 Rows = list[dict[str, Any]]
 

@@ -8,13 +8,15 @@ from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import in_frames, joint_frames, measured_motion
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.global_sensitivity.batch import Batch, batch_of
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Status, free_parameters, moved
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.tables import CALIBRATED, to_arrow, write
+from spinepipe.statics import free_parameters, moved
+from spinepipe.status import Status
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.tables import CALIBRATED
+from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 TABLE = CALIBRATED.without("specimen")

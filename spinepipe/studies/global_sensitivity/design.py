@@ -3,13 +3,13 @@
 import numpy as np
 import pyarrow as pa
 
-from spinepipe.jobs.global_sensitivity.drawn import design_of
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
 from spinepipe.sensitivity.global_indices import values_of
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.studies.drawn_from import spreads_of
-from spinepipe.tables import DESIGN, to_arrow, write
+from spinepipe.studies.global_sensitivity.batch import design_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.tables import DESIGN
+from spinepipe.tables import to_arrow, write
 
 
 def run(root: str, study: str, output: str) -> None:

@@ -5,9 +5,11 @@ from collections.abc import Callable
 from matplotlib.figure import Figure
 
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.report.global_sensitivity import convergence_figure, indices_figure, scatter_figure
 from spinepipe.report.style import save, style
-from spinepipe.studies import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.figures.convergence import convergence_figure
+from spinepipe.studies.global_sensitivity.figures.indices import indices_figure
+from spinepipe.studies.global_sensitivity.figures.scatter import scatter_figure
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.tables import read_frames
 
 DRAW: dict[str, Callable[..., Figure]] = {

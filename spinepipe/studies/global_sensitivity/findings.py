@@ -1,16 +1,306 @@
-"""What the page of a sensitivity study says first."""
+"""What the page of a sensitivity study says first.
 
-from collections.abc import Sequence
+Sentences: how many runs failed and what was done with them, and whether indices have settled.
+
+Indices as they are read in sentences.
+
+Sentences: which factors drive an output, and which of them do nothing that can be seen.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.global_sensitivity.drivers import driver, most
-from spinepipe.report.global_sensitivity.measures import Measures, measures_of
-from spinepipe.report.global_sensitivity.panels import Panel, outputs
-from spinepipe.report.global_sensitivity.sureness import pairs, runs, settled, without
-from spinepipe.report.page.document import Headline
-from spinepipe.report.page.results import Results
-from spinepipe.report.words import count
-from spinepipe.studies import GlobalSensitivity
+from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.words import count, fixed, number
+from spinepipe.studies.discrepancy.words import capital, listed
+from spinepipe.studies.global_sensitivity.figures.panels import (
+    DONE,
+    NAME,
+    OUTPUT,
+    Measures,
+    Panel,
+    above_floor,
+    by_joint,
+    factor_name,
+    leading,
+    measures_of,
+    outputs,
+    pooled,
+    unit_of,
+    what,
+    where,
+    whole,
+    with_results,
+)
+from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+
+LEFT_OUT = {
+    "sobol": "with a failed run its whole base sample is left out",
+    "morris": "with a failed run its whole trajectory is left out",
+    "latin_hypercube": "a failed run is left out by itself",
+    "fast": "with a failed run its factor has no index: a curve with a gap is no curve",
+}
+"""What is done with failed runs, by design."""
+
+_PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
+_LEADING = 3
+
+
+def runs(study: GlobalSensitivity, indices: pd.DataFrame) -> str:
+    """How many runs there are, how many failed, and what became of them."""
+    failed = int(indices["failed"].max()) if len(indices) else 0
+    every = count(study.n_runs, "run")
+    specimens = indices["specimen"].nunique()
+    whose = f"{every} of each of {specimens} specimens" if specimens > 1 else every
+    if not failed:
+        return f"{whose}, none failed."
+    least = int(indices["runs"].min())
+    return (
+        f"{whose}, of which at most {whole(failed)} failed: {LEFT_OUT[study.design.method]}, "
+        f"so that indices rest on {whole(least)} runs or more."
+    )
+
+
+def settled(
+    convergence: pd.DataFrame, panels: Sequence[Panel], measures: Measures, joints: Sequence[str]
+) -> str:
+    """How far the main indices of leading factors moved from the last part to all runs."""
+    rows = with_results(convergence, measures) if len(convergence) else convergence
+    if rows.empty or rows["runs"].nunique() < 2:
+        return ""
+    rows = rows[rows["index"] == measures.main]
+    before = sorted(rows["runs"].unique())[-2]
+    single = [one for panel in panels for one in by_joint(panel, joints)]
+    changes = [_change(one.of(rows).rows, leading([one], measures), measures) for one in single]
+    unit = " of the largest" if measures.in_units else ""
+    return (
+        f"From {whole(int(before))} runs to all of them, {NAME[measures.main]} of the leading "
+        f"factors changed by at most {fixed(max(changes))}{unit}."
+    )
+
+
+def _change(main: pd.DataFrame, factors: Sequence[str], measures: Measures) -> float:
+    """Largest change of the leading factors; of indices in units relative to the largest."""
+    rows = main[main["factor"].isin(list(factors[:_LEADING]))]
+    early, late = (
+        pooled(rows[rows["runs"] == runs], ["factor"]).set_index("factor")["estimate"]
+        for runs in sorted(rows["runs"].unique())[-2:]
+    )
+    scale = float(late.abs().max()) if measures.in_units else 1.0
+    return float((late - early).abs().max()) / (scale or 1.0)
+
+
+def without(indices: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Status and sentence of outputs that have no index."""
+    every = indices[_PLACE].drop_duplicates().shape[0]
+    lost = indices[indices["status"] != DONE]
+    for status, rows in lost.groupby("status", sort=False):
+        n = rows[_PLACE].drop_duplicates().shape[0]
+        why = listed([text for text in rows["message"].dropna().unique() if text], most=1)
+        reason = f" ({why})" if why else ""
+        meant = _STATUS.get(str(status), str(status).replace("_", " "))
+        yield str(status), f"{n} of {count(every, 'output')} {meant}{reason}."
+
+
+_STATUS = {
+    "constant": "vary with no factor and have no index",
+    "too_many_failed": "have no index, or not of every factor: too many runs failed",
+    "too_few": "have no index: too few runs are left",
+}
+
+
+def pairs(indices: pd.DataFrame, panels: Sequence[Panel]) -> str:
+    """The strongest interactions of two factors in these outputs that stand out of their noise."""
+    every = indices[(indices["index"] == "S2") & (indices["status"] == DONE)]
+    if every.empty:
+        return ""
+    rows = pd.concat([panel.of(every).rows for panel in panels])
+    clear = rows[rows["above_floor"].eq(True) | (rows["noise_floor"].isna() & (rows["ci_low"] > 0))]
+    best = clear.sort_values("estimate", ascending=False, kind="stable")
+    best = best.drop_duplicates(["factor", "other"]).head(_LEADING)
+    if best.empty:
+        return "In these outputs no interaction of two factors (S2) stands out of its noise."
+    told = [
+        f"{factor_name(row['factor'])} with {factor_name(row['other'])} {fixed(row['estimate'])} "
+        f"[{fixed(row['ci_low'])} to {fixed(row['ci_high'])}]"
+        for row in best.to_dict("records")
+    ]
+    return f"Strongest interactions of two factors in these outputs (S2): {listed(told)}."
+
+
+_SMALL = 0.01
+
+
+def value(size: float, panel: Panel, measures: Measures) -> str:
+    """A share as a percentage, an effect in its unit, any other index as a number."""
+    return _number(size, measures) + _unit(panel, measures)
+
+
+def with_ends(row: Mapping[str, Any], panel: Panel, measures: Measures) -> str:
+    """``71 % [66 to 76 %; at single places 55 to 80 %]``: a row of `pooled`."""
+    parts = [_range(row["low"], row["high"], panel, measures)]
+    if row["places"] > 1:
+        single = _range(row["lowest"], row["highest"], panel, measures)
+        parts.append(single and f"at single places {single}")
+    inside = "; ".join(part for part in parts if part)
+    size = value(row["estimate"], panel, measures)
+    return f"{size} [{inside}]" if inside else size
+
+
+def _range(low: float, high: float, panel: Panel, measures: Measures) -> str:
+    """Both ends; nothing where they are not known or read alike."""
+    if not np.isfinite([low, high]).all():
+        return ""
+    first, last = (_number(end, measures) for end in (low, high))
+    return f"{first} to {last}{_unit(panel, measures)}" if first != last else ""
+
+
+def _number(size: float, measures: Measures) -> str:
+    if measures.in_units:
+        return number(size)
+    if measures.of_variance:
+        return fixed(100.0 * size, 1 if 0.0 < abs(size) < _SMALL else 0)
+    return fixed(size)
+
+
+def _unit(panel: Panel, measures: Measures) -> str:
+    if measures.of_variance:
+        return " %"
+    unit = unit_of(panel.output, panel.coordinate) if measures.in_units else ""
+    return unit if unit in ("", "°") else f" {unit}"
+
+
+MOST_NAMED, MOST_JOINTS = 3, 6
+WORTH_NAMING = 0.1
+"""Part of the first factor's index from which on another is named beside it."""
+
+LITTLE = 0.01
+"""Share of the variance below which a factor counts for little."""
+
+HARDLY = 0.95
+"""Sum of first-order indices from which on there is hardly any interaction."""
+
+Record = dict[str, Any]
+
+
+def most(panels: Sequence[Panel], measures: Measures, joints: Sequence[str]) -> str:
+    """``Motion hangs most on stiffness, joint load on load size.``: over all tests and joints."""
+    parts: list[str] = []
+    for output in OUTPUT:
+        own = [panel for panel in panels if panel.output == output]
+        first = [_ordered(one, measures)[0] for panel in own for one in by_joint(panel, joints)]
+        names = list(dict.fromkeys(factor_name(row["factor"]) for row in first))
+        if names:
+            verb = "" if parts else " hangs most"
+            by = ", by test and joint" if len(names) > 1 else ""
+            parts.append(f"{OUTPUT[output]}{verb} on {listed(names, MOST_NAMED, 'or')}{by}")
+    return capital(f"{'; '.join(parts)}.") if parts else ""
+
+
+def driver(panel: Panel, measures: Measures, joints: Sequence[str]) -> str:
+    """Leading factors of one output with their intervals, how sure their order is, the rest."""
+    own = _ordered(panel, measures)
+    head = f"{where(panel.test, panel.joint)}, " if panel.test else ""
+    single = by_joint(panel, joints)
+    leaders = {_ordered(one, measures)[0]["factor"] for one in single}
+    told = [f"{head}{what(panel.output, panel.coordinate)} ({_MEANING[measures.main]}):"]
+    if len(leaders) == 1:
+        told += [_first(panel, own, measures), _order(own)]
+    else:
+        told.append(_each(single, measures))
+    told += [_alone(panel, measures), *_nothing(panel, own, measures)]
+    return capital(" ".join(part for part in told if part)).replace(" %", "\u00a0%")
+
+
+_MEANING = {
+    "ST": "share of the variance, alone and with other factors",
+    "mu_star": "mean change from a factor's lowest to its highest value",
+    "PAWN": "PAWN, how far a factor moves the distribution, 0 to 1",
+}
+
+
+def _main(panel: Panel, measures: Measures) -> pd.DataFrame:
+    return panel.rows[panel.rows["index"] == measures.main]
+
+
+def _ordered(panel: Panel, measures: Measures) -> list[Record]:
+    """Factors but for the dummy, the largest index first."""
+    rows = pooled(_main(panel, measures), ["factor"])
+    ordered = rows[rows["factor"] != DUMMY].sort_values("estimate", ascending=False, kind="stable")
+    return [{str(name): cell for name, cell in row.items()} for row in ordered.to_dict("records")]
+
+
+def _seen(panel: Panel, measures: Measures) -> set[str]:
+    """Factors above the noise floor, or all where there is none."""
+    main = _main(panel, measures)
+    return above_floor(main) if main["noise_floor"].notna().any() else set(main["factor"])
+
+
+def _first(panel: Panel, own: Sequence[Record], measures: Measures) -> str:
+    """The factors worth naming."""
+    seen = _seen(panel, measures)
+    named = [
+        row
+        for row in own[:MOST_NAMED]
+        if row["factor"] in seen and row["estimate"] >= WORTH_NAMING * own[0]["estimate"]
+    ]
+    if not named:
+        return "no factor is above the dummy."
+    parts = [f"{factor_name(row['factor'])} {with_ends(row, panel, measures)}" for row in named]
+    over = f"; means over {count(panel.places, 'place')}" if panel.places > 1 else ""
+    return f"{listed(parts)}{over}."
+
+
+def _each(single: Sequence[Panel], measures: Measures) -> str:
+    """The leading factor of each joint."""
+    parts = []
+    for one in single[:MOST_JOINTS]:
+        row = _ordered(one, measures)[0]
+        name = factor_name(row["factor"])
+        parts.append(f"at {one.joint} {name} {with_ends(row, one, measures)}")
+    more = len(single) - len(parts)
+    return f"{listed(parts, MOST_JOINTS)}{f'; {more} more joints' if more else ''}."
+
+
+def _order(own: Sequence[Record]) -> str:
+    """Whether the intervals of the first two are apart."""
+    if len(own) < 2 or pd.isna([own[0]["low"], own[1]["high"]]).any():
+        return ""
+    if own[0]["low"] > own[1]["high"]:
+        return ""
+    first, second = (factor_name(row["factor"]) for row in own[:2])
+    return f"The intervals of {first} and {second} overlap: their order is not sure."
+
+
+def _alone(panel: Panel, measures: Measures) -> str:
+    """How much is left to interactions."""
+    first = panel.rows[panel.rows["index"] == "S1"]
+    if not measures.of_variance or first.empty:
+        return ""
+    share = float(pooled(first, ["factor"])["estimate"].sum())
+    if share >= HARDLY:
+        return "There is hardly any interaction."
+    return f"Alone, the factors make up {value(share, panel, measures)}; the rest is interaction."
+
+
+def _nothing(panel: Panel, own: Sequence[Record], measures: Measures) -> Iterator[str]:
+    """Factors that do nothing that can be seen, and those that do little."""
+    seen = _seen(panel, measures)
+    hidden = [factor_name(row["factor"]) for row in own if row["factor"] not in seen]
+    if hidden:
+        yield f"Not above the dummy: {listed(hidden)}."
+    little = [
+        factor_name(row["factor"])
+        for row in own
+        if measures.of_variance and row["estimate"] < LITTLE and row["factor"] in seen
+    ]
+    if little:
+        yield f"{'Above it, but below' if hidden else 'Below'} 1 %: {listed(little)}."
+
 
 MOST_OUTPUTS = 12
 DOUBTFUL = ("too_many_failed", "too_few")

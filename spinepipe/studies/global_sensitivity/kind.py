@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
-from spinepipe.studies import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
 OF_JOBS = ("responses", "calibrated", "indices", "convergence")
 """Tables joined from job files: of batches of samples, the last two of whole specimens."""

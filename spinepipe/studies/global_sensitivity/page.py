@@ -1,13 +1,102 @@
-"""The report of a global sensitivity study."""
+"""The report of a global sensitivity study.
+
+Tables that the page of a sensitivity study shows.
+"""
+
+from collections.abc import Hashable, Iterator, Mapping
+from typing import Any
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.global_sensitivity.findings import findings, opening
-from spinepipe.report.global_sensitivity.tables import shown_tables
-from spinepipe.report.page.document import Document, Picture
-from spinepipe.report.page.results import Results
-from spinepipe.studies import GlobalSensitivity
+from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.report.words import fixed, number
+from spinepipe.studies.global_sensitivity.figures.panels import (
+    DONE,
+    NAME,
+    Measures,
+    factor_name,
+    leading,
+    measures_of,
+    outputs,
+)
+from spinepipe.studies.global_sensitivity.findings import findings, opening
+from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.tables import TABLES
+from spinepipe.tables.schema import Column
+
+_PLACE = ("specimen", "output", "test", "step", "joint", "coordinate")
+_RANKS = ("first", "second", "third")
+
+
+def shown_tables(cohort: Cohort, results: Results) -> list[Sortable]:
+    """Leading factors of every output, interactions, and the indices of what is drawn."""
+    indices = results.table("indices")
+    measures = measures_of(indices) if len(indices) else None
+    if measures is None:
+        return []
+    every = [_ranking(indices, measures), *_pairs(indices), _drawn(cohort, indices, measures)]
+    return [table for table in every if table.rows]
+
+
+def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
+    """One row for each output."""
+    rows = indices[(indices["index"] == measures.main) & (indices["status"] == DONE)]
+    made = [
+        dict(zip(_PLACE, place, strict=True)) | _first(part)
+        for place, part in rows.groupby(list(_PLACE), sort=False, dropna=False)
+    ]
+    columns = [
+        *(column for column in TABLES["indices"].columns if column.name in _PLACE),
+        *(
+            Column(name, "text", f"{name} factor, {NAME[measures.main]} [interval]")
+            for name in _RANKS
+        ),
+        Column("not above the dummy", "integer", "factors whose index is not above the floor"),
+    ]
+    about = f"By {NAME[measures.main]}; one row for each output."
+    return sortable(
+        "indices", "Leading factors of every output", about, pd.DataFrame(made), columns
+    )
+
+
+def _first(part: pd.DataFrame) -> dict[str, object]:
+    own = part[part["factor"] != DUMMY]
+    ordered = own.sort_values("estimate", ascending=False, kind="stable").to_dict("records")
+    told = dict.fromkeys(_RANKS, "") | {
+        name: _told(row) for name, row in zip(_RANKS, ordered, strict=False)
+    }
+    below = sum(row["above_floor"] is not None and not row["above_floor"] for row in ordered)
+    return {**told, "not above the dummy": below}
+
+
+def _told(row: Mapping[Hashable, Any]) -> str:
+    say = number if row["index"] == "mu_star" else fixed
+    told = f"{factor_name(str(row['factor']))} {say(row['estimate'])}"
+    if pd.isna(row["ci_low"]):
+        return told
+    return f"{told} [{say(row['ci_low'])}, {say(row['ci_high'])}]"
+
+
+def _pairs(indices: pd.DataFrame) -> Iterator[Sortable]:
+    rows = indices[(indices["index"] == "S2") & (indices["status"] == DONE)]
+    if len(rows):
+        clear = rows[rows["ci_low"] > 0.0].sort_values("estimate", ascending=False, kind="stable")
+        about = "S2 whose intervals lie above 0, the largest first; of many pairs chance alone "
+        about += "lifts 1 in 40."
+        columns = TABLES["indices"].columns
+        yield sortable("indices", "Interactions of two factors", about, clear, columns)
+
+
+def _drawn(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> Sortable:
+    """Indices of the outputs that the figures are about, factors in their order."""
+    found = outputs(cohort, indices, measures)
+    rows = pd.concat([panel.rows for panel in found])
+    order = {name: place for place, name in enumerate(leading(found, measures))}
+    ranked = rows.assign(rank=rows["factor"].map(order)).sort_values("rank", kind="stable")
+    title = "Indices of the outputs in the figures"
+    return sortable("indices", title, TABLES["indices"].about, ranked, TABLES["indices"].columns)
+
 
 QUESTION = (
     "Which uncertain inputs drive the results of this spine's simulations, how sure is that, and "
@@ -47,8 +136,11 @@ def left_out(study: GlobalSensitivity) -> tuple[str, ...]:
         ("joint loads", "outputs: joint_load: []", bool(study.outputs.joint_load)),
         ("calibrated stiffness", "outputs: stiffness: false", study.outputs.stiffness),
         ("noise floor", "dummy: false", study.dummy),
-        ("interactions of two factors", "design: second_order: false",
-         study.design.method != "sobol" or study.design.second_order),
+        (
+            "interactions of two factors",
+            "design: second_order: false",
+            study.design.method != "sobol" or study.design.second_order,
+        ),
         ("all load steps but the largest", "steps: peak", study.steps == "all"),
-    )  # fmt: skip
+    )
     return tuple(f"{part} ({setting})" for part, setting, done in parts if not done)

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from spinepipe.files import appearing
+from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.page_inputs import results_of
-from spinepipe.report.global_sensitivity.page import READ, sensitivity_page
-from spinepipe.studies import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.page import READ, sensitivity_page
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
 
 def run(

@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort.varied.asked_test import AskedTest
-from spinepipe.jobs.global_sensitivity.batch import Batch, batch_of
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
-from spinepipe.statics import Status
 from spinepipe.statics.many import ManySolved, solve_many
-from spinepipe.studies import GlobalSensitivity
-from spinepipe.tables import RESPONSES, to_arrow, write
+from spinepipe.status import Status
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.start import AskedTest
+from spinepipe.studies.global_sensitivity.tables import RESPONSES
+from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, from_si
 
 TABLE = RESPONSES.without("specimen")

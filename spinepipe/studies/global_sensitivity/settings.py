@@ -1,4 +1,11 @@
-"""The study kind that asks which uncertain inputs drive motion, joint loads and stiffness."""
+"""The study kind that asks which uncertain inputs drive motion, joint loads and stiffness.
+
+How stiffness is fitted to measured motion, once per sample of a design.
+
+Distributions of the factors of a global sensitivity study.
+
+Not part of the package's front: what it imports of the analysis is no business of other kinds.
+"""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
@@ -6,15 +13,51 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.varied.change import Change, Of
-from spinepipe.studies.coordinates import FORM, Coordinate, Damping
-from spinepipe.studies.factors import AnyFactor
-from spinepipe.studies.lists import EachOnce, Tests, distinct
-from spinepipe.studies.published_stiffness import LevelStiffness, PublishedStiffness
-from spinepipe.studies.sample_calibration import SampleCalibration
+from spinepipe.sensitivity.global_indices.spread import (
+    LogNormal,
+    LogUniform,
+    Normal,
+    Spread,
+    Uniform,
+)
+from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.factors import AnyFactor, AnySpread, Times
+from spinepipe.studies.parts import (
+    FORM,
+    Coordinate,
+    Coordinates,
+    Damping,
+    EachOnce,
+    LevelStiffness,
+    PublishedStiffness,
+    Tests,
+    Weights,
+    distinct,
+)
 from spinepipe.studies.study import Study
 
-__all__ = ["INDICES", "GlobalSensitivity", "Outputs", "SensitivityDesign"]
+
+class SampleCalibration(BaseModel):
+    """One stiffness for all joints of a specimen, from one starting point: the sample's own."""
+
+    model_config = FORM
+
+    free: Coordinates = Field(
+        default=("anterior", "superior", "extension"),
+        description="coordinates whose stiffness is fitted; the others keep the sample's",
+    )
+    weights: Weights = Field(default_factory=Weights, description="weights on mm and degrees")
+    bound_factor: float = Field(
+        default=1000.0, gt=1, le=1e9, description="bounds are start / factor and start x factor"
+    )
+    identifiable_below: float = Field(
+        default=1.0,
+        gt=0,
+        le=100,
+        description="a stiffness is identifiable when the standard error of its natural "
+        "logarithm is below this",
+    )
+
 
 DUMMY = "dummy"
 """Name of the factor that changes nothing."""
@@ -215,3 +258,20 @@ class GlobalSensitivity(Study):
     def chosen_tests(self, cohort: Cohort) -> tuple[str, ...]:
         """The study's tests."""
         return self.tests or cohort.tests
+
+
+def spreads_of(study: GlobalSensitivity) -> tuple[Spread, ...]:
+    """(D,) how each value is spread: m, rad, or a multiplier; the dummy's from 0 to 1."""
+    own = tuple(_in_si(factor.spread) for factor in study.factors)
+    return (*own, Uniform(0.0, 1.0)) if study.dummy else own
+
+
+def _in_si(spread: AnySpread) -> Spread:
+    found = {"low": spread.low, "high": spread.high}
+    ends = {name: end / spread.per_si for name, end in found.items() if end is not None}
+    times = isinstance(spread, Times)
+    if spread.sd is None:
+        return LogUniform(**ends) if times else Uniform(**ends)
+    if times:
+        return LogNormal(spread.middle, spread.sd, **ends)
+    return Normal(spread.middle / spread.per_si, spread.sd / spread.per_si, **ends)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.read_yaml import Document
-from spinepipe.cohort.varied.asked_test import asked_tests
+from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem
-from spinepipe.studies.global_sensitivity import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.start import asked_tests
 from spinepipe.studies.places import at
 
 __all__ = ["Size", "available_memory", "check_size_of_design", "free_disk", "size_of_design"]

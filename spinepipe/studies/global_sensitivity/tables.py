@@ -1,15 +1,16 @@
 """Tables of studies of kind global_sensitivity: the design, what it led to, and the indices."""
 
-from spinepipe.tables.columns import (
+from spinepipe.studies.joint_pose_sensitivity.tables import NO_EQUILIBRIUM
+from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
     SPECIMEN,
+    Column,
+    Table,
     coordinates,
     status,
     stiffness_unit,
 )
-from spinepipe.tables.joint_pose_sensitivity import NO_EQUILIBRIUM
-from spinepipe.tables.schema import Column, Table
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 INDEX_MEANINGS = {
@@ -46,12 +47,16 @@ DESIGN = Table(
     (
         _SAMPLE,
         _FACTOR,
-        Column("value", "number", "its value: an offset from the cohort's own, or a multiplier",
-               "see unit"),
+        Column(
+            "value",
+            "number",
+            "its value: an offset from the cohort's own, or a multiplier",
+            "see unit",
+        ),
         Column("group", "text", "group that gets an index; the factor's own name without one"),
         Column("unit", "text", "unit of the value; 1: a multiplier", allowed=("mm", "deg", "1")),
     ),
-)  # fmt: skip
+)
 
 
 def _load(coordinate: str) -> Column:
@@ -92,14 +97,20 @@ CALIBRATED = Table(
         SPECIMEN,
         _SAMPLE,
         *(
-            Column(f"{name}_{suffix}", "number", f"stiffness against {name.replace('_', ' ')}",
-                   unit, _NO_FIT, low=0.0)
+            Column(
+                f"{name}_{suffix}",
+                "number",
+                f"stiffness against {name.replace('_', ' ')}",
+                unit,
+                _NO_FIT,
+                low=0.0,
+            )
             for name, (suffix, unit) in ((name, stiffness_unit(name)) for name in COORDINATES)
         ),
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 _OUTPUT = (
     SPECIMEN,
@@ -108,22 +119,27 @@ _OUTPUT = (
     Column("step", "integer", f"load step; 0 {_OF_STIFFNESS}", low=0),
     Column("joint", "text", "joint; * for stiffness that all joints share"),
     Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
-    Column("index", "text",
-           "; ".join(f"{name}: {meaning}" for name, meaning in INDEX_MEANINGS.items()),
-           allowed=tuple(INDEX_MEANINGS)),
+    Column(
+        "index",
+        "text",
+        "; ".join(f"{name}: {meaning}" for name, meaning in INDEX_MEANINGS.items()),
+        allowed=tuple(INDEX_MEANINGS),
+    ),
     Column("factor", "text", "factor or group of factors; dummy: the one that changes nothing"),
-)  # fmt: skip
+)
 _OTHER = Column("other", "text", "second factor of S2; empty for every other index")
 
 
 def _numbers(no_interval: str) -> tuple[Column, ...]:
     return (
         Column("estimate", "number", "estimate of the index", "see index", _NO_INDEX),
-        Column("ci_low", "number", "lower end of its confidence interval", "see index",
-               no_interval),
-        Column("ci_high", "number", "upper end of its confidence interval", "see index",
-               no_interval),
-    )  # fmt: skip
+        Column(
+            "ci_low", "number", "lower end of its confidence interval", "see index", no_interval
+        ),
+        Column(
+            "ci_high", "number", "upper end of its confidence interval", "see index", no_interval
+        ),
+    )
 
 
 INDICES = Table(
@@ -135,21 +151,40 @@ INDICES = Table(
         *_OUTPUT,
         _OTHER,
         *_numbers("no index, or one without an interval"),
-        Column("mean", "number", "mean of the output over all runs that have it",
-               "of the output", "no run has it"),
-        Column("sd", "number", "standard deviation of the output over all runs that have it",
-               "of the output", "no run has it", low=0.0),
-        Column("noise_floor", "number",
-               "upper end of the interval of the same index of the factor that changes nothing",
-               "see index", "no such factor, index or interval"),
-        Column("above_floor", "flag", "whether the lower end of the interval is above that floor",
-               null="no floor, or no interval"),
+        Column(
+            "mean",
+            "number",
+            "mean of the output over all runs that have it",
+            "of the output",
+            "no run has it",
+        ),
+        Column(
+            "sd",
+            "number",
+            "standard deviation of the output over all runs that have it",
+            "of the output",
+            "no run has it",
+            low=0.0,
+        ),
+        Column(
+            "noise_floor",
+            "number",
+            "upper end of the interval of the same index of the factor that changes nothing",
+            "see index",
+            "no such factor, index or interval",
+        ),
+        Column(
+            "above_floor",
+            "flag",
+            "whether the lower end of the interval is above that floor",
+            null="no floor, or no interval",
+        ),
         Column("runs", "integer", "runs that the index rests on", low=0),
         Column("failed", "integer", "runs of the design that failed", low=0),
         Column("status", "text", "whether there is an index", allowed=INDEX_STATUS),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 CONVERGENCE = Table(
     "convergence",

@@ -10,13 +10,15 @@ from spinepipe.calibrate import Evaluator, Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import specimen_inputs, start_stiffness, study_and_cohort
-from spinepipe.jobs.problem import absolute_errors, calibration_problem
-from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Course, Status, moved
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import BOOTSTRAP, from_rows, write
+from spinepipe.statics import Course, moved
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP
+from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
 _START = [f"start_{name}" for name in STIFFNESS_COLUMNS]

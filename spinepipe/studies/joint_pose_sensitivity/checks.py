@@ -8,10 +8,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.check_geometry import landmark_problems
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.read_yaml import Document
+from spinepipe.cohort.text import Document
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import Problem, one_of
-from spinepipe.studies.joint_pose_sensitivity import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.places import at, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS
 

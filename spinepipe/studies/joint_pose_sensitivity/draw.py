@@ -7,16 +7,20 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.report.agreement import agreement_figure
-from spinepipe.report.bootstrap import bootstrap_figure
-from spinepipe.report.errors import errors_figure
-from spinepipe.report.joint_pose import joint_pose_figure
-from spinepipe.report.landmark_precision import landmark_precision_figure
-from spinepipe.report.pose_against_stiffness import pose_against_stiffness_figure
-from spinepipe.report.stiffness import stiffness_figure
 from spinepipe.report.style import save, style
-from spinepipe.report.success import success_figure
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.figures.agreement import agreement_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.errors import errors_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.joint_pose import joint_pose_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
+    landmark_precision_figure,
+)
+from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
+    pose_against_stiffness_figure,
+)
+from spinepipe.studies.joint_pose_sensitivity.figures.stiffness import stiffness_figure
+from spinepipe.studies.joint_pose_sensitivity.figures.success import success_figure
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frames
 
 Tables = Mapping[str, pd.DataFrame]

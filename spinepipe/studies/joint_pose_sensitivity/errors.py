@@ -1,10 +1,21 @@
-"""Absolute errors of simulations, one number per run, joint and coordinate: what is tested."""
+"""Absolute errors of simulations, one number per run, joint and coordinate: what is tested.
 
-from collections.abc import Sequence
+Job: agreement of predicted with measured motion after Bland and Altman.
+
+The two-factor grid: one error for every joint pose (rows) and best stiffness set (columns).
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.statistics import Agreement, bland_altman
+from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 UNITS = {
@@ -54,3 +65,61 @@ def measured_coordinates(errors: pd.DataFrame) -> list[tuple[str, str]]:
         for name in COORDINATES
         if np.isfinite(errors.loc[errors["joint"] == joint, name].to_numpy(float)).any()
     ]
+
+
+_NUMBERS = (
+    *("n", "bias", "bias_low", "bias_high", "sd", "lower_limit", "upper_limit"),
+    *("lower_limit_low", "upper_limit_high", "message"),
+)
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``agreement.parquet`` from the poses' own fits."""
+    settings, cohort = study_and_cohort(root, study)
+    frames = read_frames(tables)
+    simulations = frames["simulations"]
+    own = readings(simulations[simulations["stiffness"] == "calibrated"], cohort.zeroed_at_step_0)
+    kept = frames["success"].loc[frames["success"]["reduced"], ["specimen", "pose"]]
+    datasets = {"all": own, "reduced": own.merge(kept, on=["specimen", "pose"])}
+    rows = [
+        {"dataset": dataset, "specimen": specimen, "joint": joint, **row}
+        for dataset, chosen in datasets.items()
+        for (specimen, joint), part in chosen.groupby(["specimen", "joint"], sort=False)
+        for row in _coordinates(part)
+    ]
+    write(from_rows(AGREEMENT, rows), output, provenance("agreement", settings, cohort))
+
+
+def _coordinates(part: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """One row per measured coordinate of a joint; runs without a pose are left out."""
+    for name, unit in UNITS.items():
+        pair = part[[f"measured_{name}_{unit}", f"predicted_{name}_{unit}"]]
+        if not pair.iloc[:, 0].notna().any():
+            continue
+        known = pair.dropna().to_numpy(float)
+        found = bland_altman(known[:, 0], known[:, 1])
+        yield {"coordinate": name, "unit": unit, **_row(found)}
+
+
+def _row(found: Agreement) -> dict[str, Any]:
+    return {
+        **{name: getattr(found, name) for name in _NUMBERS},
+        "proportional_rho": found.proportional.effect,
+        "proportional_p": found.proportional.p,
+        "status": found.status.value,
+    }
+
+
+def complete_grid(errors: pd.DataFrame, joint: str, coordinate: str) -> pd.DataFrame:
+    """Errors of one specimen, joint and coordinate; rows by pose, columns by stiffness set.
+
+    Stiffness sets without any result and poses that lack a run are left out: what is compared
+    must be complete.
+
+    Parameters
+    ----------
+    errors : as `spinepipe.jobs.errors.absolute_error` gives them.
+    """
+    rows = errors[(errors["joint"] == joint) & (errors["stiffness"] != "calibrated")]
+    grid = rows.pivot(index="pose", columns="stiffness", values=coordinate)
+    return grid.dropna(axis="columns", how="all").dropna(axis="index")

@@ -1,15 +1,335 @@
-"""Key findings of a study as sentences, their numbers computed from its tables."""
+"""Key findings of a study as sentences, their numbers computed from its tables.
 
-from collections.abc import Callable
+Finding about bootstraps: how far fitted stiffness spreads, and how many fits were lost.
 
-from spinepipe.report.page.bootstrap_findings import bootstraps
-from spinepipe.report.page.fit_findings import fits, settled, stiffness
-from spinepipe.report.page.method_findings import methods
-from spinepipe.report.page.paper_findings import paper
-from spinepipe.report.page.precision_findings import precision
-from spinepipe.report.page.results import Results
-from spinepipe.report.page.variance_findings import dominant
-from spinepipe.studies import JointPoseSensitivity
+Finding about ways of fitting: how many fits of the same poses each brings to an end.
+
+Finding about landmarks: how precise they must be, and what so many poses can tell of it.
+
+Finding about variance: which of joint pose and stiffness takes more, where that is known.
+
+What is to be said where motion was not simulated at rest.
+
+Findings about the fits of sampled poses: how many count, and the stiffness they gave.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pandas as pd
+from statsmodels.stats.proportion import proportion_confint
+
+from spinepipe.report.page.document import Results, paper
+from spinepipe.report.panels import EVERY_JOINT
+from spinepipe.report.words import AXIS, count, fixed, number, percent, tick
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
+from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
+    WHOSE,
+    required_words,
+)
+from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+
+FEWEST_FOR_SPREAD = 3
+"""Quartiles of fewer fits say nothing of a spread: those of a single one never differ."""
+
+_WHAT = {"start_bootstrap": "over start values", "damping_bootstrap": "over damping"}
+
+
+def bootstraps(study: JointPoseSensitivity, results: Results) -> str:
+    """Spread of the widest direction by part and loading, then the fits without a stiffness."""
+    rows, counts = results.table("summary"), results.table("counts")
+    if rows.empty:
+        return ""
+    chosen = rows[
+        rows["part"].isin(_WHAT)
+        & (rows["dataset"] == "all")
+        & (rows["quantity"] == "stiffness")
+        & rows["coordinate"].isin(study.calibration.free)
+    ].dropna(subset=["median"])
+    parts = list(_widest(chosen))
+    lead = "Middle half (IQR) of the fitted stiffness as a share of its median, widest direction"
+    told = f"{lead}: {'; '.join(parts)}." if parts else ""
+    return " ".join(words for words in (told, _lost(counts)) if words)
+
+
+def _widest(chosen: pd.DataFrame) -> Iterator[str]:
+    for part, rows in chosen.groupby("part", sort=False):
+        if (rows["n"] < FEWEST_FOR_SPREAD).all():
+            yield f"{_WHAT[str(part)]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
+            continue
+        told = [
+            f"{_spread(fits)} {LOADING_NAMES[str(loading)]}"
+            for loading, fits in rows.groupby("loading", sort=False)
+        ]
+        yield f"{_WHAT[str(part)]} {', '.join(told)}"
+
+
+def _spread(fits: pd.DataFrame) -> str:
+    enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
+    if enough.empty:
+        return f"fewer than {FEWEST_FOR_SPREAD} fits"
+    share = 100.0 * float((enough["iqr"] / enough["median"]).max())
+    return f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
+
+
+def _lost(counts: pd.DataFrame) -> str:
+    """How many of how many fits ended without a stiffness."""
+    if counts.empty:
+        return ""
+    parts = []
+    for part, what in _WHAT.items():
+        rows = counts[counts["part"] == part]
+        fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
+        if fits:
+            told = f" ({', '.join(_where(rows))})" if lost else ""
+            parts.append(f"{what} {lost} of {fits}{told}")
+    return f"Fits lost, without a stiffness: {'; '.join(parts)}." if parts else ""
+
+
+def _where(rows: pd.DataFrame) -> Iterator[str]:
+    for loading, part in rows.groupby("loading", sort=False):
+        lost = int((part["fits"] - part["solved"]).sum())
+        if lost:
+            yield f"{LOADING_NAMES[str(loading)]} {lost} of {int(part['fits'].sum())}"
+
+
+def methods(study: JointPoseSensitivity, results: Results) -> str:
+    """Successful fits of each method, or why methods were not compared."""
+    rows = results.table("success_by_method")
+    if rows.empty:
+        return ""
+    why = refused(results.table("method_fits"))
+    sums = rows.groupby("method", sort=False)[["successful", "fits", "arrived"]].sum()
+    parts = [
+        f"{str(method).replace('_', ' ')} not compared ({why[str(method)]})"
+        if method in why
+        else f"{str(method).replace('_', ' ')} {row['successful']} of {row['fits']} "
+        f"(least cost reached: {row['arrived']})"
+        for method, row in sums.iterrows()
+    ]
+    if set(sums.index) <= set(why):
+        return f"Methods of fitting were not compared: {'; '.join(dict.fromkeys(why.values()))}."
+    return f"Successful fits of the same poses by method: {'; '.join(parts)}."
+
+
+def precision(study: JointPoseSensitivity, results: Results) -> str:
+    """The largest landmark SD that will do, with each stiffness."""
+    rows = results.table("required_precision")
+    if rows.empty:
+        return ""
+    asked = study.landmark_precision
+    limits = {
+        "translation": f"{tick(asked.translation_limit_mm)} mm",
+        "rotation": f"{tick(asked.rotation_limit_deg)}°",
+    }
+    limits = {"both": " and ".join(limits.values()), **limits}
+    # where there is no row of both, one kind of motion alone was measured
+    motion = next(name for name in limits if (rows["motion"] == name).any())
+    goal = f"For {tick(100 * asked.share)} % of poses to stay below {limits[motion]}"
+    chosen = rows[rows["motion"] == motion]
+    parts = [
+        f"with {WHOSE[str(whose)]} {_required(part, asked.sd_mm)}"
+        for whose, part in chosen.groupby("stiffness")
+    ]
+    told = f"{goal}, the SD of a landmark per axis may be at most: {'; '.join(parts)}"
+    return f"{told} ({_poses(chosen)} per SD). {_too_few(chosen, asked.share)}".strip()
+
+
+def _required(part: pd.DataFrame, sampled: tuple[float, ...]) -> str:
+    if len(part) == 1:
+        return required_words(part.iloc[0], sampled)
+    known = part[np.isfinite(part["sd_mm"])]
+    others = part.drop(known.index)
+    why = [
+        f"{message} in {', '.join(rows['specimen'])}"
+        for message, rows in others.groupby("message", sort=False)
+    ]
+    if known.empty:
+        return "; ".join(why)
+    least = known.loc[known["sd_mm"].idxmin()]
+    which = f"smallest of {count(len(known), 'specimen')}, {least['specimen']}"
+    return ", but ".join([f"{fixed(least['sd_mm'])} mm ({which})", *why])
+
+
+def _poses(chosen: pd.DataFrame) -> str:
+    low, high = int(chosen["n"].min()), int(chosen["n"].max())
+    return count(high, "pose") if low == high else f"{low} to {count(high, 'pose')}"
+
+
+def _too_few(chosen: pd.DataFrame, share: float) -> str:
+    """That so few poses cannot show the share, even if all of them were below the limits."""
+    n = int(chosen["n"].min())
+    low = float(proportion_confint(n, n, method="wilson")[0]) if n else 0.0
+    if low >= share:
+        return ""
+    asked = tick(100 * share)
+    return (
+        f"{count(n, 'pose')} cannot show {asked} %: even with all of them below, the 95 % "
+        f"interval of the share begins at {fixed(100 * low, 0)} %."
+    )
+
+
+def dominant(study: JointPoseSensitivity, results: Results) -> str:
+    """In how many errors pose or stiffness takes more, their 95 % intervals apart."""
+    rows = results.table("variance_shares")
+    if rows.empty:
+        return ""
+    done = rows[rows["status"] == "done"]
+    keys = ["specimen", "joint", "coordinate"]
+    pose, stiffness = (
+        done[done["factor"] == factor].set_index(keys) for factor in ("pose", "stiffness")
+    )
+    if pose.empty:
+        return ""
+    stiffness = stiffness.reindex(pose.index)
+    by_pose = int((pose["share_low"] > stiffness["share_high"]).sum())
+    by_stiffness = int((stiffness["share_low"] > pose["share_high"]).sum())
+    unknown = len(pose) - by_pose - by_stiffness
+    overlap = "cannot be told apart: the 95 % intervals of their shares of the variance overlap."
+    errors = f"{count(len(pose), 'error')} (one per joint and direction)"
+    if unknown == len(pose):
+        return (
+            f"In none of {errors} is it clear which counts more: joint pose and stiffness {overlap}"
+        )
+    told = (
+        f"Of {errors}, joint pose takes more of the variance than stiffness in {by_pose} and "
+        f"stiffness more in {by_stiffness}."
+    )
+    return f"{told} In the other {unknown} they {overlap}" if unknown else told
+
+
+def settling(study: JointPoseSensitivity) -> str:
+    """A sentence where simulations show another time than the fits do, else nothing."""
+    if study.loading != "settle":
+        return ""
+    return (
+        f"Motion was simulated {tick(study.settle_time_s)} s after loading, while stiffness was "
+        "fitted at rest: errors hold what had not settled."
+    )
+
+
+_COUNTS = ("fits", "solved", "near_start_any", "near_start_all", "outliers", "reduced")
+
+
+def fits(study: JointPoseSensitivity, results: Results) -> str:
+    """How many fits are in the reduced dataset, and why the others are not."""
+    rows = results.table("counts")
+    if rows.empty or not (rows["part"] == "poses").any():
+        return ""
+    poses = rows[rows["part"] == "poses"]
+    sums = {name: int(poses[name].sum()) for name in _COUNTS}
+    near = "near_start_all" if study.success.failed_when == "all" else "near_start_any"
+    which = "all free stiffnesses" if near.endswith("all") else "a free stiffness"
+    percents = tick(study.success.near_start_percent)
+    lost = (
+        f"{sums[near]} had not moved ({which} within {percents} % of the start) and "
+        f"{sums['outliers']} {'was an outlier' if sums['outliers'] == 1 else 'were outliers'}"
+    )
+    share = percent(sums["reduced"], sums["fits"])
+    kept = f"{count(sums['reduced'], 'fit')} of {sums['fits']} ({share})"
+    return f"{kept} are in the reduced dataset: {sums['solved']} ended with a stiffness, {lost}."
+
+
+def settled(study: JointPoseSensitivity, results: Results) -> str:
+    """That motion and stiffness belong to different times after loading, where they do."""
+    return settling(study)
+
+
+def stiffness(study: JointPoseSensitivity, results: Results) -> str:
+    """Median stiffness, with a warning where the data do not hold it."""
+    rows = results.table("summary")
+    if rows.empty:
+        return ""
+    chosen = rows[
+        (rows["part"] == "poses")
+        & (rows["dataset"] == "reduced")
+        & (rows["quantity"] == "stiffness")
+        & rows["coordinate"].isin(study.calibration.free)
+    ].dropna(subset=["median"])
+    solved = _reduced(results)
+    parts = [
+        _medians(part) + _doubt(solved, str(name))
+        for name, part in chosen.groupby("coordinate", sort=False)
+    ]
+    if not parts:
+        return ""
+    told = f"Median stiffness over the reduced poses: {'; '.join(parts)}."
+    return " ".join(words for words in (told, _exact(solved)) if words)
+
+
+def _reduced(results: Results) -> pd.DataFrame:
+    """Solved fits of the reduced poses."""
+    fitted, success = results.table("calibrations"), results.table("success")
+    if fitted.empty:
+        return fitted
+    usable = [status.value for status in Status if status.usable]
+    solved = fitted[fitted["status"].isin(usable)]
+    if success.empty:
+        return solved
+    kept = success.loc[success["reduced"], ["specimen", "pose"]]
+    return solved.merge(kept, on=["specimen", "pose"])
+
+
+def _medians(part: pd.DataFrame) -> str:
+    """Median and IQR, or the lowest and highest median of several specimens or joints."""
+    first = part.iloc[0]
+    title = AXIS[first["coordinate"]].lower()
+    if len(part) == 1:
+        iqr = f"{number(first['low_quartile'])} to {number(first['high_quartile'])}"
+        return f"{title} {number(first['median'])} {first['unit']} (IQR {iqr})"
+    ordered = part.sort_values("median", kind="stable")
+    low, high = ordered.iloc[0], ordered.iloc[-1]
+    if number(low["median"]) == number(high["median"]):
+        return f"{title} {number(low['median'])} {first['unit']} in all {_all(part)}"
+    names = [_place(row, part) for row in (low, high)]
+    return (
+        f"{title} {number(low['median'])} ({names[0]}) to {number(high['median'])} {first['unit']} "
+        f"({names[1]}), medians of {_all(part)}"
+    )
+
+
+def _all(part: pd.DataFrame) -> str:
+    """``2 specimens``, ``3 joints`` or ``6 joints of 2 specimens``."""
+    specimens = count(part["specimen"].nunique(), "specimen")
+    if (part["joint"] == EVERY_JOINT).all():
+        return specimens
+    joints = count(len(part), "joint")
+    return joints if part["specimen"].nunique() == 1 else f"{joints} of {specimens}"
+
+
+def _place(row: pd.Series, part: pd.DataFrame) -> str:
+    words = [row["specimen"]] if part["specimen"].nunique() > 1 else []
+    words += [row["joint"]] if row["joint"] != EVERY_JOINT else []
+    return " ".join(words)
+
+
+def _doubt(solved: pd.DataFrame, name: str) -> str:
+    """The share of fitted values that the data do not hold, where there are any."""
+    if solved.empty:
+        return ""
+    flags = solved[f"{name}_identifiable"].dropna()
+    lost = int((~flags.astype(bool)).sum())
+    if not lost:
+        return ""
+    share = percent(lost, len(flags))
+    return f", but not identifiable in {lost} of {len(flags)} fitted ({share})"
+
+
+def _exact(solved: pd.DataFrame) -> str:
+    """What too few readings mean, where there are too few."""
+    if solved.empty:
+        return ""
+    each = solved.drop_duplicates(["specimen", "pose"])["degrees_of_freedom"]
+    few = int((each <= 0).sum())
+    if not few:
+        return ""
+    if (each == 0).all():
+        return "All fits are exact: as many readings as unknowns, so no misfit can show."
+    which = f"All {len(each)} fits" if few == len(each) else f"{few} of {len(each)} fits"
+    return f"{which} have no more readings than unknowns: such fits are exact or undetermined."
+
 
 _PERCENT = "\u00a0%"
 """No line ends between a number and its percent sign."""
@@ -20,7 +340,14 @@ Finding = Callable[[JointPoseSensitivity, Results], str]
 def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
     """The sentences, without those that the study has no table for."""
     makers: tuple[Finding, ...] = (
-        fits, stiffness, settled, dominant, precision, methods, bootstraps, paper,
-    )  # fmt: skip
+        fits,
+        stiffness,
+        settled,
+        dominant,
+        precision,
+        methods,
+        bootstraps,
+        paper,
+    )
     told = [make(study, results) for make in makers]
     return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]

@@ -5,17 +5,24 @@ from typing import Any
 import numpy as np
 
 from spinepipe.calibrate import Problem, fit
-from spinepipe.calibrate.forward_runs import DEFAULT_STEP, fit_by_forward_runs
-from spinepipe.calibrate.gradients import differenced_gradient, exact_gradient, relative_error
+from spinepipe.calibrate.forward_runs import (
+    DEFAULT_STEP,
+    differenced_gradient,
+    exact_gradient,
+    fit_by_forward_runs,
+    relative_error,
+)
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import sampled_poses, start_stiffness, study_and_cohort
-from spinepipe.jobs.problem import calibration_problem
-from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.sensitivity.success import near_start
-from spinepipe.statics import Course, Status, moved
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import METHOD_FITS, from_rows, write
+from spinepipe.statics import Course, moved
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.success import near_start
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import METHOD_FITS
+from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 EXACT = "exact"

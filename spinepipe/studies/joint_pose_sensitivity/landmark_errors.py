@@ -11,13 +11,15 @@ from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.designs import sample_landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import specimen_inputs, study_and_cohort
-from spinepipe.jobs.problem import absolute_errors, calibration_problem
-from spinepipe.jobs.provenance import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Status, moved
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import PRECISION_ERRORS, from_rows, write
+from spinepipe.statics import moved
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import PRECISION_ERRORS
+from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 
 

@@ -1,13 +1,205 @@
-"""The report of a joint-pose study."""
+"""The report of a joint-pose study.
+
+What is said below a figure on the page: its caption, without what does not hold here.
+
+Tests of significance as the page shows them: each, or folded where they are repeated.
+
+Which tables the page shows, and in what order.
+"""
+
+import re
+from collections.abc import Iterator
+
+import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.captions import caption
-from spinepipe.report.page.document import Document, Picture
-from spinepipe.report.page.findings import findings
-from spinepipe.report.page.origin import left_out
-from spinepipe.report.page.results import Results
-from spinepipe.report.page.tables import SHOWN, shown_tables
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.report.page.document import Document, Picture, Results, Sortable, left_out, sortable
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
+from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
+from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
+    TREE,
+    importance_by_factor,
+)
+from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, STATISTICS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
+from spinepipe.tables import TABLES
+from spinepipe.tables.schema import Column
+
+_SENTENCE_END = re.compile(r"(?<=[.])(?<!et al[.])\s+(?=[A-Z])")
+SIMULATED = ("errors", "agreement")
+"""Figures of simulated motion."""
+
+
+def caption(
+    name: str, text: str, study: JointPoseSensitivity, cohort: Cohort, results: Results
+) -> str:
+    """A figure's caption for this study and cohort."""
+    false = tuple(_false(cohort, results))
+    sentences = _SENTENCE_END.split(" ".join(text.split()))
+    kept = [sentence for sentence in sentences if not sentence.startswith(false)]
+    if name in SIMULATED and settling(study):
+        kept.append(settling(study))
+    return " ".join(kept)
+
+
+def _false(cohort: Cohort, results: Results) -> Iterator[str]:
+    """How the sentences begin that speak of something else than this study shows."""
+    if paper_of(cohort.name, OF_JOINT_POSE) is None:
+        yield "For the cohort rebuilt from"
+    several = len(cohort.specimen_names) > 1
+    yield "With one specimen," if several else "With several specimens,"
+    agreement = results.table("agreement")
+    if not agreement.empty:
+        rows = in_rows(agreement, cohort)
+        yield "With few joints and directions," if rows else "With many joints and directions,"
+
+
+_FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
+_NO_EFFECT = "no test is significant after Bonferroni's correction"
+
+FOLDED = (
+    Column("specimen", "text", "name of the specimen"),
+    Column("test", "text", "name of the test"),
+    Column("joint", "text", "joint, or * for all joints together"),
+    Column("response", "text", "what is tested"),
+    Column("factor", "text", "what it is tested against"),
+    Column("family_size", "integer", "tests that are corrected together and have a p-value"),
+    Column("tests", "integer", "tests folded into this row, one per stratum"),
+    Column("with_result", "integer", "of these: tests that could be done"),
+    Column("significant", "integer", "significant without correction"),
+    Column("bonferroni", "integer", "significant after Bonferroni's correction"),
+    Column("holm", "integer", "significant after Holm's correction"),
+    Column("effect_name", "text", "what the effect size is called"),
+    Column(
+        "effect_lowest", "number", "smallest effect significant after Bonferroni", "", _NO_EFFECT
+    ),
+    Column(
+        "effect_highest", "number", "largest effect significant after Bonferroni", "", _NO_EFFECT
+    ),
+)
+
+
+def in_full(statistics: pd.DataFrame) -> pd.DataFrame:
+    """The tests of families without repeats."""
+    return statistics[~_repeated(statistics)]
+
+
+def folded(statistics: pd.DataFrame, alpha: float) -> pd.DataFrame:
+    """One row per test, joint, response and factor of the other families, as in `FOLDED`."""
+    repeated = statistics[_repeated(statistics)]
+    rows = [
+        dict(zip(_FOLD, key, strict=True)) | _fold(part, alpha)
+        for key, part in repeated.groupby(_FOLD, sort=False, dropna=False)
+    ]
+    return pd.DataFrame(rows, columns=[column.name for column in FOLDED])
+
+
+def _repeated(statistics: pd.DataFrame) -> pd.Series:
+    """Whether a row's family does a test again and again, with something else held fixed."""
+    again = statistics.duplicated(_FOLD, keep=False)
+    families = [statistics["specimen"], statistics["family"]]
+    return again.groupby(families).transform("any")
+
+
+def _fold(part: pd.DataFrame, alpha: float) -> dict[str, object]:
+    kept = part.loc[part["p_bonferroni"] < alpha, "effect"]
+    return {
+        "family_size": part["family_size"].max(),
+        "tests": len(part),
+        "with_result": int(part["p"].notna().sum()),
+        "significant": int((part["p"] < alpha).sum()),
+        "bonferroni": len(kept),
+        "holm": int((part["p_holm"] < alpha).sum()),
+        "effect_name": part["effect_name"].iloc[0],
+        "effect_lowest": kept.min(),
+        "effect_highest": kept.max(),
+    }
+
+
+SHOWN = {
+    "counts": "Fits and filters",
+    "summary": "Medians and spreads",
+    "against_gould_2024a": "Beside Gould et al. 2024",
+    "success_by_method": "Success by method",
+    "variance_shares": "Variance shares of joint pose and stiffness",
+    "importance": "Importance in the regression tree, by factor",
+    "required_precision": "Landmark precision needed",
+    "agreement": "Agreement of predicted and measured motion",
+    "statistics": "Tests of significance",
+}
+"""Tables of the page in their order, with their titles."""
+
+_BY_FACTOR = tuple(
+    column
+    for column in IMPORTANCE.columns
+    if column.name in ("specimen", "joint", "coordinate", "factor", "leaves", "r2", "n")
+)
+_IMPORTANCE = (
+    *_BY_FACTOR[:4],
+    Column("importance", "number", "share of all predictors of this factor among all splits"),
+    Column("predictors", "integer", "predictors of this factor"),
+    *_BY_FACTOR[4:],
+    Column("message", "text", "why there is no tree"),
+)
+
+
+_AGAINST_ORDER = (
+    *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
+    *("verdict", "reason", "where"),
+)
+AGAINST_COLUMNS = tuple(
+    column
+    for name in _AGAINST_ORDER
+    for column in AGAINST_GOULD_2024A.columns
+    if column.name == name
+)
+"""What a reader compares stands first; the short name is left to the file."""
+
+
+def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
+    """Tables that the study has, as the page shows them; those without rows are left out."""
+    found = [
+        table
+        for name, title in SHOWN.items()
+        if len(results.table(name))
+        for table in _of(name, title, results.table(name), study)
+    ]
+    return [table for table in found if table.rows]
+
+
+def _of(
+    name: str, title: str, frame: pd.DataFrame, study: JointPoseSensitivity
+) -> Iterator[Sortable]:
+    about = TABLES[name].about
+    if name == "statistics":
+        yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
+        yield _folded(frame, study.significance)
+    elif name == "importance":
+        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
+    elif name == AGAINST_GOULD_2024A.name:
+        yield sortable(name, title, about, frame, AGAINST_COLUMNS)
+    else:
+        yield sortable(name, title, about, frame, TABLES[name].columns)
+
+
+def _trees(importance: pd.DataFrame) -> pd.DataFrame:
+    """Importance by factor, and one row with its message for each tree that could not be grown."""
+    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
+    told = none[[*TREE, "n", "message"]]
+    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
+
+
+def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:
+    about = (
+        "Tests done again and again with a stiffness set or a pose held fixed: how many are "
+        f"significant at {alpha:g}, and how large the effects of these are. One row per test, "
+        "joint, response and factor; every single test is in statistics.parquet."
+    )
+    title = "Tests of significance, two factors"
+    return sortable("statistics", title, about, folded(frame, alpha), FOLDED)
+
 
 QUESTION = (
     "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "

@@ -15,7 +15,7 @@ from spinepipe.jobs.inputs import (
     study_and_cohort,
 )
 from spinepipe.statics import free_parameters
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import BORDER_PER_SI, COORDINATES, STIFFNESS_COLUMNS
 
 

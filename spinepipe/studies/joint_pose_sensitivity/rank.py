@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.files import appearing
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from spinepipe.files import appearing
+from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.jobs.page_inputs import results_of
-from spinepipe.report.page import READ, study_page
+from spinepipe.studies.joint_pose_sensitivity.page import READ, study_page
 
 
 def run(

@@ -10,11 +10,8 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.jobs.errors import absolute_error, measured_coordinates, readings
-from spinepipe.jobs.grid import complete_grid
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.jobs.pose_factors import pose_factors, pose_parameters
-from spinepipe.jobs.provenance import provenance
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import (
     chi_squared_normality,
@@ -24,8 +21,16 @@ from spinepipe.statistics import (
     lilliefors_normality,
     spearman,
 )
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import STATISTICS, from_rows, read_frames, write
+from spinepipe.studies.joint_pose_sensitivity.errors import (
+    absolute_error,
+    complete_grid,
+    measured_coordinates,
+    readings,
+)
+from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 NORMALITY = (chi_squared_normality, kolmogorov_smirnov_normality, lilliefors_normality)

@@ -11,6 +11,7 @@ import numpy as np
 
 from spinepipe.cohort.specimen import MeasuredMotion, in_frames
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import (
     SpecimenInputs,
     Stamp,
@@ -20,12 +21,14 @@ from spinepipe.jobs.inputs import (
     stamp,
     study_and_cohort,
 )
-from spinepipe.jobs.provenance import provenance
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.statics import Chain, Program, Status, System, follow, settle
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import SIMULATIONS, read_frame, to_arrow, write
+from spinepipe.statics import Program, System, follow, settle
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
+from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS, from_si
+from spinepipe.world import Chain
 
 TABLE = SIMULATIONS.without("specimen", "pose")
 """A job file: specimen and pose are in its folders' names."""

@@ -10,12 +10,18 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.errors import UNITS, absolute_error, measured_size, readings
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.jobs.provenance import provenance
-from spinepipe.jobs.success import judge_bootstrap
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import SUMMARY, from_rows, read_frames, write
+from spinepipe.studies.joint_pose_sensitivity.errors import (
+    UNITS,
+    absolute_error,
+    measured_size,
+    readings,
+)
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.success import judge_bootstrap
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import SUMMARY
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import (
     COORDINATE_COLUMNS,
     COORDINATES,

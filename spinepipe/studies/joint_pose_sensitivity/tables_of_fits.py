@@ -2,16 +2,17 @@
 
 from dataclasses import replace
 
-from spinepipe.tables.columns import (
+from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
     POSE,
     SPECIMEN,
+    Column,
+    Table,
     length_or_angle,
     status,
     stiffness_unit,
 )
-from spinepipe.tables.schema import Column, Table
 from spinepipe.units import COORDINATES
 
 NO_FIT = "no stiffness was found"
@@ -36,10 +37,16 @@ def _stiffness(prefix: str, meaning: str, null: str | None) -> tuple[Column, ...
 
 def _errors(meaning: str) -> tuple[Column, ...]:
     return tuple(
-        Column(f"{name}_error_{length_or_angle(name)}", "number", meaning, length_or_angle(name),
-               null=f"not measured, or {NO_FIT}", low=0.0)
+        Column(
+            f"{name}_error_{length_or_angle(name)}",
+            "number",
+            meaning,
+            length_or_angle(name),
+            null=f"not measured, or {NO_FIT}",
+            low=0.0,
+        )
         for name in COORDINATES
-    )  # fmt: skip
+    )
 
 
 BOOTSTRAP = Table(
@@ -54,20 +61,25 @@ BOOTSTRAP = Table(
         Column("set", "integer", "number of the sampled set, from 0", low=0),
         JOINT,
         *_stiffness("start_", "stiffness the fit started from", None),
-        Column("damping_translation_n_s_per_m", "number", "damping of translations", "N s/m",
-               low=0.0),
-        Column("damping_rotation_nm_s_per_rad", "number", "damping of rotations", "N m s/rad",
-               low=0.0),
+        Column(
+            "damping_translation_n_s_per_m", "number", "damping of translations", "N s/m", low=0.0
+        ),
+        Column(
+            "damping_rotation_nm_s_per_rad", "number", "damping of rotations", "N m s/rad", low=0.0
+        ),
         *_stiffness("", "stiffness of this joint", NO_FIT),
-        *_errors("mean absolute error of this joint's motion over the readings of steps that enter "
-                 "the cost"),
-        Column("cost", "number", "sum of weight times squared error", "mm2, deg2", null=NO_FIT,
-               low=0.0),
+        *_errors(
+            "mean absolute error of this joint's motion over the readings of steps that enter "
+            "the cost"
+        ),
+        Column(
+            "cost", "number", "sum of weight times squared error", "mm2, deg2", null=NO_FIT, low=0.0
+        ),
         Column("evaluations", "integer", "evaluations of the fit", low=0),
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 SUCCESS = Table(
     "success",
@@ -77,16 +89,23 @@ SUCCESS = Table(
         SPECIMEN,
         POSE,
         Column("solved", "flag", "the fit ended with a stiffness"),
-        Column("near_start_any", "flag",
-               "one free stiffness at least ended near its start (success.near_start_percent)"),
+        Column(
+            "near_start_any",
+            "flag",
+            "one free stiffness at least ended near its start (success.near_start_percent)",
+        ),
         Column("near_start_all", "flag", "all free stiffnesses ended near their start"),
-        Column("failed", "flag",
-               "solved, but near its start by the study's rule (success.failed_when)"),
-        Column("outlier", "flag",
-               "a free stiffness ended far above its start (success.outlier_times_start)"),
+        Column(
+            "failed", "flag", "solved, but near its start by the study's rule (success.failed_when)"
+        ),
+        Column(
+            "outlier",
+            "flag",
+            "a free stiffness ended far above its start (success.outlier_times_start)",
+        ),
         Column("reduced", "flag", "kept in the reduced dataset: solved, not failed, no outlier"),
     ),
-)  # fmt: skip
+)
 
 COUNTS = Table(
     "counts",
@@ -94,8 +113,12 @@ COUNTS = Table(
     ("specimen", "part", "loading"),
     (
         SPECIMEN,
-        Column("part", "text", "part of the study",
-               allowed=("poses", "start_bootstrap", "damping_bootstrap")),
+        Column(
+            "part",
+            "text",
+            "part of the study",
+            allowed=("poses", "start_bootstrap", "damping_bootstrap"),
+        ),
         LOADING,
         *(
             Column(name, "integer", meaning, low=0)
@@ -109,7 +132,7 @@ COUNTS = Table(
             )
         ),
     ),
-)  # fmt: skip
+)
 
 NO_VALUE = "nothing is in this dataset"
 
@@ -125,16 +148,27 @@ SUMMARY = Table(
     ("specimen", "part", "loading", "dataset", "quantity", "joint", "coordinate"),
     (
         SPECIMEN,
-        Column("part", "text", "part of the study",
-               allowed=("poses", "start_bootstrap", "damping_bootstrap")),
+        Column(
+            "part",
+            "text",
+            "part of the study",
+            allowed=("poses", "start_bootstrap", "damping_bootstrap"),
+        ),
         LOADING,
-        Column("dataset", "text",
-               "all: with a result; reduced: kept by the filters; best: the best stiffness sets' "
-               "own poses", allowed=("all", "reduced", "best")),
-        Column("quantity", "text",
-               "stiffness; error: absolute error of predicted motion, mean over readings; origin, "
-               "orientation: of the joint frame in ground",
-               allowed=("stiffness", "error", "origin", "orientation")),
+        Column(
+            "dataset",
+            "text",
+            "all: with a result; reduced: kept by the filters; best: the best stiffness sets' "
+            "own poses",
+            allowed=("all", "reduced", "best"),
+        ),
+        Column(
+            "quantity",
+            "text",
+            "stiffness; error: absolute error of predicted motion, mean over readings; origin, "
+            "orientation: of the joint frame in ground",
+            allowed=("stiffness", "error", "origin", "orientation"),
+        ),
         Column("joint", "text", "joint, or * where all joints share the value"),
         Column("coordinate", "text", "coordinate or axis", allowed=COORDINATES),
         Column("unit", "text", "unit of the values"),
@@ -146,11 +180,16 @@ SUMMARY = Table(
         _value("minimum", "smallest"),
         _value("maximum", "largest"),
         _value("range", "largest less smallest"),
-        Column("percent_of_measured", "number",
-               "median error as a share of the median size of the measured motion", "%",
-               null="not an error, or nothing was measured", low=0.0),
+        Column(
+            "percent_of_measured",
+            "number",
+            "median error as a share of the median size of the measured motion",
+            "%",
+            null="not an error, or nothing was measured",
+            low=0.0,
+        ),
     ),
-)  # fmt: skip
+)
 
 METHOD_FITS = Table(
     "method_fits",
@@ -161,21 +200,31 @@ METHOD_FITS = Table(
         POSE,
         Column("method", "text", "way of fitting, see the study's page"),
         *_stiffness("", "stiffness shared by all joints", NO_FIT),
-        Column("cost", "number", "sum of weight times squared error", "mm2, deg2", null=NO_FIT,
-               low=0.0),
+        Column(
+            "cost", "number", "sum of weight times squared error", "mm2, deg2", null=NO_FIT, low=0.0
+        ),
         Column("evaluations", "integer", "runs of the model", low=0),
-        Column("derivative_error", "number",
-               "error of the cost's derivative at the start, relative to its size",
-               null="it could not be compared", low=0.0),
-        Column("near_start_any", "flag",
-               "one free stiffness at least ended near its start", null=NO_FIT),
-        Column("near_start_all", "flag", "all free stiffnesses ended near their start",
-               null=NO_FIT),
+        Column(
+            "derivative_error",
+            "number",
+            "error of the cost's derivative at the start, relative to its size",
+            null="it could not be compared",
+            low=0.0,
+        ),
+        Column(
+            "near_start_any",
+            "flag",
+            "one free stiffness at least ended near its start",
+            null=NO_FIT,
+        ),
+        Column(
+            "near_start_all", "flag", "all free stiffnesses ended near their start", null=NO_FIT
+        ),
         Column("claims_success", "flag", "the optimiser itself says that it found an optimum"),
         status("fit"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 SUCCESS_BY_METHOD = Table(
     "success_by_method",
@@ -187,30 +236,48 @@ SUCCESS_BY_METHOD = Table(
         Column("method", "text", "way of fitting, see the study's page"),
         Column("fits", "integer", "fits tried", low=0),
         Column("solved", "integer", "fits that ended with a usable status", low=0),
-        Column("near_start_any", "integer", "of these: one free stiffness or more near its start",
-               low=0),
+        Column(
+            "near_start_any",
+            "integer",
+            "of these: one free stiffness or more near its start",
+            low=0,
+        ),
         Column("near_start_all", "integer", "of these: all near their start", low=0),
         Column("claimed", "integer", "fits whose optimiser says that it found an optimum", low=0),
-        Column("successful", "integer", "solved fits not near the start by the study's rule",
-               low=0),
+        Column(
+            "successful", "integer", "solved fits not near the start by the study's rule", low=0
+        ),
         Column("success", "number", "share of successful fits", low=0.0, high=1.0),
-        Column("success_low", "number", "lower end of its 95 % interval (Wilson)", low=0.0,
-               high=1.0),
-        Column("success_high", "number", "upper end of its 95 % interval (Wilson)", low=0.0,
-               high=1.0),
-        Column("arrived", "integer",
-               "fits whose cost is within 1 % of the least that any method found for the pose",
-               low=0),
+        Column(
+            "success_low", "number", "lower end of its 95 % interval (Wilson)", low=0.0, high=1.0
+        ),
+        Column(
+            "success_high", "number", "upper end of its 95 % interval (Wilson)", low=0.0, high=1.0
+        ),
+        Column(
+            "arrived",
+            "integer",
+            "fits whose cost is within 1 % of the least that any method found for the pose",
+            low=0,
+        ),
         Column("evaluations_median", "number", "runs of the model per fit, median", low=0.0),
         Column("evaluations_largest", "integer", "runs of the model per fit, most", low=0),
-        Column("derivative_error_median", "number",
-               "error of the cost's derivative at the start, relative, median",
-               null="it could not be compared", low=0.0),
-        Column("derivative_error_largest", "number",
-               "error of the cost's derivative at the start, relative, largest",
-               null="it could not be compared", low=0.0),
+        Column(
+            "derivative_error_median",
+            "number",
+            "error of the cost's derivative at the start, relative, median",
+            null="it could not be compared",
+            low=0.0,
+        ),
+        Column(
+            "derivative_error_largest",
+            "number",
+            "error of the cost's derivative at the start, relative, largest",
+            null="it could not be compared",
+            low=0.0,
+        ),
     ),
-)  # fmt: skip
+)
 
 _WHOSE = Column(
     "stiffness",
@@ -229,14 +296,26 @@ PRECISION_ERRORS = Table(
         _SD,
         POSE,
         _WHOSE,
-        Column("translation_error_mm", "number", "largest absolute error of a translation", "mm",
-               null="not measured, or no pose was found", low=0.0),
-        Column("rotation_error_deg", "number", "largest absolute error of a rotation", "deg",
-               null="not measured, or no pose was found", low=0.0),
+        Column(
+            "translation_error_mm",
+            "number",
+            "largest absolute error of a translation",
+            "mm",
+            null="not measured, or no pose was found",
+            low=0.0,
+        ),
+        Column(
+            "rotation_error_deg",
+            "number",
+            "largest absolute error of a rotation",
+            "deg",
+            null="not measured, or no pose was found",
+            low=0.0,
+        ),
         status("solve"),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 LANDMARK_PRECISION = Table(
     "landmark_precision",
@@ -258,10 +337,11 @@ LANDMARK_PRECISION = Table(
         Column("limit", "number", "limit asked for (landmark_precision of the study)", "see unit"),
         Column("below", "number", "share of poses below the limit", low=0.0, high=1.0),
         Column("below_low", "number", "lower end of its 95 % interval (Wilson)", low=0.0, high=1.0),
-        Column("below_high", "number", "upper end of its 95 % interval (Wilson)", low=0.0,
-               high=1.0),
+        Column(
+            "below_high", "number", "upper end of its 95 % interval (Wilson)", low=0.0, high=1.0
+        ),
     ),
-)  # fmt: skip
+)
 
 REQUIRED_PRECISION = Table(
     "required_precision",
@@ -271,13 +351,18 @@ REQUIRED_PRECISION = Table(
     (
         SPECIMEN,
         _WHOSE,
-        Column("motion", "text", "kind of motion; both: below both limits",
-               allowed=("translation", "rotation", "both")),
+        Column(
+            "motion",
+            "text",
+            "kind of motion; both: below both limits",
+            allowed=("translation", "rotation", "both"),
+        ),
         Column("share", "number", "share of poses asked for", low=0.0, high=1.0),
         Column("n", "integer", "poses per SD", low=0),
         *(
-            Column(name, "number", meaning, "mm", low=0.0,
-                   null="outside the sampled SDs, see message")
+            Column(
+                name, "number", meaning, "mm", low=0.0, null="outside the sampled SDs, see message"
+            )
             for name, meaning in (
                 ("sd_mm", "largest SD that will do"),
                 ("sd_low_mm", "lower end of its 95 % interval (bootstrap over poses)"),
@@ -286,7 +371,7 @@ REQUIRED_PRECISION = Table(
         ),
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 AGAINST_GOULD_2024A = Table(
     "against_gould_2024a",
@@ -308,15 +393,17 @@ AGAINST_GOULD_2024A = Table(
                 ("ours_high", "upper end of our range"),
             )
         ),
-        Column("verdict", "text",
-               "inside, outside: our value and the paper's range; circular: inside, but the cohort "
-               "was built to have it; recomputed: the paper's number from its other numbers; "
-               "contradicted: the paper's own numbers exclude each other; not_computed: this run "
-               "has no such value",
-               allowed=("inside", "outside", "circular", "recomputed", "contradicted",
-                        "not_computed")),
+        Column(
+            "verdict",
+            "text",
+            "inside, outside: our value and the paper's range; circular: inside, but the cohort "
+            "was built to have it; recomputed: the paper's number from its other numbers; "
+            "contradicted: the paper's own numbers exclude each other; not_computed: this run "
+            "has no such value",
+            allowed=("inside", "outside", "circular", "recomputed", "contradicted", "not_computed"),
+        ),
         Column("reason", "text", "what the range is, and why ours is outside it"),
     ),
-)  # fmt: skip
+)
 
 AGAINST_GOULD_2024B = replace(AGAINST_GOULD_2024A, name="against_gould_2024b")

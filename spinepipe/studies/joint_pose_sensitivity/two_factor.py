@@ -11,14 +11,19 @@ import pandas as pd
 
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.errors import absolute_error, measured_coordinates, readings
-from spinepipe.jobs.grid import complete_grid
+from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_and_cohort
-from spinepipe.jobs.pose_factors import pose_parameters
-from spinepipe.jobs.provenance import provenance
 from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.tables import IMPORTANCE, VARIANCE_SHARES, from_rows, read_frames, write
+from spinepipe.studies.joint_pose_sensitivity.errors import (
+    absolute_error,
+    complete_grid,
+    measured_coordinates,
+    readings,
+)
+from spinepipe.studies.joint_pose_sensitivity.poses import pose_parameters
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, VARIANCE_SHARES
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES
 
 

@@ -1,21 +1,43 @@
-"""Job: joint frames of all specimens, the cohort's own and those sampled around them."""
+"""Job: joint frames of all specimens, the cohort's own and those sampled around them.
+
+Job: the stiffness sets that all specimens are moved with.
+"""
+
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
-from spinepipe.designs import sample_joint_frames
+from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, zxy_angles
-from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.provenance import provenance
-from spinepipe.statics.status import Status
-from spinepipe.studies import RangeOfMotion
-from spinepipe.tables import FRAMES, to_arrow, write
-from spinepipe.units import MM_PER_M, ROTATIONS
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import stiffness_of_joints, study_of_kind
+from spinepipe.status import Status
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.tables import FRAMES, STIFFNESS_SETS
+from spinepipe.tables import to_arrow, write
+from spinepipe.units import MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS
 
 
-def run(root: str, study: str, output: str) -> None:
+def draw_stiffness(root: str, study: str, output: str) -> None:
+    """Write ``stiffness_sets.parquet``."""
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    joints = cohort.joint_names
+    factors = sample_factors(settings.stiffness_spread, 6, settings.stiffness_sets, settings.seed)
+    own = stiffness_of_joints(cohort, settings.stiffness, settings.level_stiffness)
+    values = (factors[:, None, :] * own).reshape(-1, 6)
+    columns: dict[str, list[Any]] = {
+        "stiffness": np.repeat(np.arange(len(factors)), len(joints)).tolist(),
+        "joint": list(joints) * len(factors),
+        **dict(zip(STIFFNESS_COLUMNS, values.T.tolist(), strict=True)),
+    }
+    made_by = provenance("range_of_motion.draw_stiffness", settings, cohort)
+    write(to_arrow(STIFFNESS_SETS, columns), output, made_by)
+
+
+def sample_frames(root: str, study: str, output: str) -> None:
     """Write ``frames.parquet``."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     parts = [_specimen(settings, cohort, specimen) for specimen in cohort.specimen_names]

@@ -1,9 +1,9 @@
 """Job: one figure of a range-of-motion study, as SVG and as PNG."""
 
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.report.range_of_motion import levels_figure, variance_figure
 from spinepipe.report.style import save, style
-from spinepipe.studies import RangeOfMotion
+from spinepipe.studies.range_of_motion.figures import levels_figure, variance_figure
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.tables import read_frames
 
 DRAW = {"range_of_motion": levels_figure, "rom_variance": variance_figure}

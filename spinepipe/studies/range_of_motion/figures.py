@@ -1,5 +1,12 @@
-"""Figure: how far every joint moves in every test, and how far specimens differ."""
+"""Figure: how far every joint moves in every test, and how far specimens differ.
 
+Panels of range-of-motion figures: one for each test, a row for each joint.
+
+Figure: what the motion of every joint hangs on.
+"""
+
+import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,13 +16,50 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.range_of_motion.panels import EVERY, key, panels
-from spinepipe.report.spread import BAR_PT, KEY, THIN_BAR_PT, draw_bar
-from spinepipe.report.style import BEST, BLACK, GREY, OURS, saying
+from spinepipe.report.marks import BAR_PT, KEY, THIN_BAR_PT, draw_bar
+from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, count
 from spinepipe.units import COORDINATES
 
-_ROW_MM, _ROW_MM_OF_MANY = 7.0, 4.6
+EVERY = "*"
+_MOST_ACROSS = 3
+_ABOVE_AND_BELOW_MM, _KEY_MM = 14.0, 17.0
+_LINE_LENGTH = 150
+
+
+def panels(tests: Sequence[str], joints: Sequence[str], row_mm: float) -> tuple[list[Axes], Figure]:
+    """A panel for each test with names of joints, caudal to cranial from the bottom up."""
+    down = -(-len(tests) // _MOST_ACROSS)
+    across = -(-len(tests) // down)
+    figure = blank(down * (len(joints) * row_mm + _ABOVE_AND_BELOW_MM) + _KEY_MM)
+    axes = figure.subplots(down, across, squeeze=False, sharey=True)
+    found = list(axes.ravel())
+    for spare in found[len(tests) :]:
+        spare.set_visible(False)
+    for number, (axis, test) in enumerate(zip(found, tests, strict=False)):
+        axis.set_title(f"{chr(ord('a') + number)}   {test.replace('_', ' ').capitalize()}")
+        axis.set_ylim(-0.7, len(joints) - 0.3)
+        axis.set_yticks(range(len(joints)), joints)
+        axis.spines["left"].set_visible(False)
+    return found[: len(tests)], figure
+
+
+def key(figure: Figure, handles: Sequence[Line2D], words: str) -> None:
+    """Below the panels: what is what, and a few words more."""
+    legend = figure.legend(
+        handles=list(handles),
+        title=textwrap.fill(words, _LINE_LENGTH),
+        loc="outside lower center",
+        ncols=len(handles),
+        fontsize=6.5,
+        title_fontsize=6.0,
+        columnspacing=2.0,
+        borderaxespad=0.2,
+    )
+    legend.get_title().set_multialignment("center")
+
+
+_LEVEL_MM, _ROW_MM_OF_MANY = 7.0, 4.6
 _FEW_ROWS = 8
 
 
@@ -27,15 +71,15 @@ def levels_figure(cohort: Cohort, summary: pd.DataFrame) -> Figure:
     tests = list(dict.fromkeys(loaded["test"]))
     several = len(cohort.specimen_names) > 1
     joints = cohort.joint_names
-    height = _ROW_MM if len(joints) <= _FEW_ROWS else _ROW_MM_OF_MANY
+    height = _LEVEL_MM if len(joints) <= _FEW_ROWS else _ROW_MM_OF_MANY
     axes, figure = panels(tests, joints, height)
     for axis, test in zip(axes, tests, strict=True):
-        _draw(axis, loaded[loaded["test"] == test], joints, several)
-    key(figure, _handles(several), _words(summary, several))
+        _draw_levels(axis, loaded[loaded["test"] == test], joints, several)
+    key(figure, _handles(several), _words_of_levels(summary, several))
     return figure
 
 
-def _draw(axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], several: bool) -> None:
+def _draw_levels(axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], several: bool) -> None:
     """One test: a bar of all runs and, below it, one of the specimens' medians."""
     thick = BAR_PT if len(joints) <= _FEW_ROWS else THIN_BAR_PT
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
@@ -69,9 +113,89 @@ def _handles(several: bool) -> list[Line2D]:
     ]
 
 
-def _words(summary: pd.DataFrame, several: bool) -> str:
+def _words_of_levels(summary: pd.DataFrame, several: bool) -> str:
     rows = summary[summary["specimen"] == EVERY] if several else summary
     one = rows[(rows["coordinate"] == COORDINATES[0])].drop_duplicates("test")
     runs, without = int(np.sum(one["n"] + one["n_without"])), int(np.sum(one["n_without"]))
     total = f"{count(runs, 'run')} of {count(len(one), 'test')}"
     return f"{KEY}; {total}, {without or 'none'} without an equilibrium"
+
+
+_FACTOR_MM = 6.5
+_MARKS: dict[str, tuple[str, str, str]] = {
+    "specimen": (BLUE, "o", "specimen"),
+    "pose": (GREEN, "s", "joint frames"),
+    "stiffness": (VERMILLION, "D", "stiffness"),
+    "rest": (GREY, "^", "rest"),
+}
+"""Colour, shape and name of each factor: shapes tell them apart without colours."""
+
+
+def variance_figure(cohort: Cohort, variance: pd.DataFrame) -> Figure:
+    """Shares with intervals per joint and test, from ``rom_variance``.
+
+    Of several specimens those of the cohort, or of the first where the cohort has none.
+    """
+    done = variance[variance["status"] == "done"]
+    whole = done[done["specimen"] == EVERY]
+    shown = whole if len(whole) else done[done["specimen"] == done["specimen"].min()]
+    if shown.empty:
+        why = "; ".join(dict.fromkeys(variance["message"].iloc[:1]))
+        return saying(f"No shares of variance can be shown: {why}.")
+    tests = list(dict.fromkeys(shown["test"]))
+    axes, figure = panels(tests, cohort.joint_names, _FACTOR_MM)
+    factors = [name for name in _MARKS if shown[f"{name}_share"].notna().any()]
+    for axis, test in zip(axes, tests, strict=True):
+        _draw_shares(axis, shown[shown["test"] == test], cohort.joint_names, factors)
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=_MARKS[name][0],
+            marker=_MARKS[name][1],
+            ms=3.5,
+            lw=0.8,
+            label=_MARKS[name][2],
+        )
+        for name in factors
+    ]
+    key(figure, handles, _words_of_shares(shown))
+    return figure
+
+
+def _draw_shares(
+    axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], factors: list[str]
+) -> None:
+    """One test: the factors of a joint one below the other."""
+    for y, joint in enumerate(joints):
+        axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=1)
+        for row in rows[rows["joint"] == joint].to_dict("records"):
+            for number, name in enumerate(factors):
+                color, shape, _ = _MARKS[name]
+                at = y + 0.3 - 0.6 * number / (len(factors) - 1)
+                ends = [100.0 * row[f"{name}_low"], 100.0 * row[f"{name}_high"]]
+                axis.plot(ends, [at, at], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
+                axis.plot(
+                    [100.0 * row[f"{name}_share"]],
+                    [at],
+                    shape,
+                    color=color,
+                    ms=2.6,
+                    mew=0.0,
+                    clip_on=False,
+                    zorder=4,
+                )
+    axis.set_xlim(0.0, 100.0)
+    axis.set_xlabel("share of variance (%)")
+
+
+def _words_of_shares(shown: pd.DataFrame) -> str:
+    first = shown.iloc[0]
+    poses = (
+        f"{count(int(first['n_poses']), 'drawn pose')} each"
+        if first["specimen"] == EVERY
+        else (f"{count(int(first['n_poses']), 'drawn pose')} of {first['specimen']}")
+    )
+    sets = count(int(first["n_stiffness"]), "drawn stiffness set")
+    specimens = count(int(first["n_specimens"]), "specimen")
+    return f"symbol: estimate, line: 95 % interval; {specimens}, {poses}, {sets}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.study_files import StudyFiles
-from spinepipe.studies import RangeOfMotion
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
 OF_JOBS = ("range_of_motion",)
 """Tables joined from job files, one for each specimen, pose and stiffness set."""

@@ -6,12 +6,11 @@ from functools import lru_cache
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.main_moment import peak_step
+from spinepipe.cohort.load_tests import peak_step, virtual_load_cases
 from spinepipe.cohort.specimen import load_cases
-from spinepipe.cohort.virtual_tests import virtual_load_cases
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import LoadCase, LoadStep
-from spinepipe.studies import RangeOfMotion
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
 
 @dataclass(frozen=True)

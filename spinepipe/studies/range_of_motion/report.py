@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from spinepipe.files import appearing
+from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.page_inputs import results_of
-from spinepipe.report.range_of_motion.page import READ, range_of_motion_page
-from spinepipe.studies import RangeOfMotion
+from spinepipe.studies.range_of_motion.page import READ, range_of_motion_page
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
 
 def run(

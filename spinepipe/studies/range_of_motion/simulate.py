@@ -1,20 +1,84 @@
-"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
+"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests.
+
+Drawn frames and stiffness sets, read once per worker and state of their files.
+"""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.inputs import on_bushings, study_of_kind
-from spinepipe.jobs.provenance import provenance
-from spinepipe.jobs.range_of_motion.drawn import drawn_frames, drawn_stiffness
-from spinepipe.jobs.range_of_motion.load_steps import AskedTest, asked_tests
+from spinepipe.frames import Pose
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import Stamp, on_bushings, stamp, study_of_kind
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Chain, Status, System, follow
-from spinepipe.studies import RangeOfMotion
-from spinepipe.tables import RANGE_OF_MOTION, to_arrow, write
-from spinepipe.units import COORDINATE_COLUMNS, from_si
+from spinepipe.statics import System, follow
+from spinepipe.status import Status
+from spinepipe.studies.range_of_motion.load_steps import AskedTest, asked_tests
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
+from spinepipe.tables import read_frame, to_arrow, write
+from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
+from spinepipe.world import Chain
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnFrames:
+    """Joint frames of all specimens and poses.
+
+    Attributes
+    ----------
+    rows : (specimen, pose) to the first row of its frames.
+    n_joints : rows of one pose.
+    origins, rotations : (rows, 3) m and (rows, 3, 3).
+    """
+
+    rows: dict[tuple[str, int], int]
+    n_joints: int
+    origins: Array
+    rotations: Array
+
+    def of(self, specimen: str, pose: int) -> tuple[Pose, ...]:
+        """Frames of one pose, caudal to cranial."""
+        first = self.rows[specimen, pose]
+        at = range(first, first + self.n_joints)
+        return tuple(Pose(self.rotations[row], self.origins[row]) for row in at)
+
+
+def drawn_frames(path: str) -> DrawnFrames:
+    """Frames of ``frames.parquet``."""
+    return _frames(stamp(path))
+
+
+@lru_cache(maxsize=2)
+def _frames(where: Stamp) -> DrawnFrames:
+    table = read_frame(where[0])
+    n = table["joint"].nunique()
+    keys = zip(table["specimen"][::n], table["pose"][::n].astype(int), strict=True)
+    angles = np.deg2rad(table[[f"{name}_deg" for name in ROTATIONS]].to_numpy(float))
+    return DrawnFrames(
+        {key: n * index for index, key in enumerate(keys)},
+        n,
+        table[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M,
+        Rotation.from_euler("ZXY", angles).as_matrix(),
+    )
+
+
+def drawn_stiffness(path: str) -> Array:
+    """(sets, J, 6) stiffness of ``stiffness_sets.parquet``, SI."""
+    return _stiffness(stamp(path))
+
+
+@lru_cache(maxsize=2)
+def _stiffness(where: Stamp) -> Array:
+    table = read_frame(where[0])
+    values: Array = table[list(STIFFNESS_COLUMNS)].to_numpy(float)
+    return values.reshape(table["stiffness"].nunique(), -1, 6)
+
 
 TABLE = RANGE_OF_MOTION.without("specimen", "pose")
 """A job file: specimen and pose are in its folders' names."""

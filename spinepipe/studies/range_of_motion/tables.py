@@ -1,17 +1,17 @@
 """Tables of studies of kind range_of_motion."""
 
-from spinepipe.tables.columns import (
+from spinepipe.studies.joint_pose_sensitivity.tables import ENDED, NO_EQUILIBRIUM, NO_RESULT, POSES
+from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
     POSE,
     SPECIMEN,
+    Column,
+    Table,
     coordinates,
     status,
     stiffness_unit,
 )
-from spinepipe.tables.joint_pose_sensitivity import NO_EQUILIBRIUM, POSES
-from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.statistics import ENDED, NO_RESULT
 from spinepipe.units import COORDINATES, ROTATIONS
 
 STIFFNESS_SET = Column(
@@ -37,12 +37,17 @@ STIFFNESS_SETS = Table(
         STIFFNESS_SET,
         JOINT,
         *(
-            Column(f"{name}_{suffix}", "number", f"stiffness against {name.replace('_', ' ')}",
-                   unit, low=0.0)
+            Column(
+                f"{name}_{suffix}",
+                "number",
+                f"stiffness against {name.replace('_', ' ')}",
+                unit,
+                low=0.0,
+            )
             for name, (suffix, unit) in ((name, stiffness_unit(name)) for name in COORDINATES)
         ),
     ),
-)  # fmt: skip
+)
 
 RANGE_OF_MOTION = Table(
     "range_of_motion",
@@ -78,8 +83,12 @@ ROM_SUMMARY = Table(
         _TEST,
         JOINT,
         Column("coordinate", "text", "coordinate", allowed=COORDINATES),
-        Column("role", "text", "loaded: the coordinate that the test turns; coupled: any other",
-               allowed=("loaded", "coupled")),
+        Column(
+            "role",
+            "text",
+            "loaded: the coordinate that the test turns; coupled: any other",
+            allowed=("loaded", "coupled"),
+        ),
         Column("unit", "text", "unit of the motion", allowed=("mm", "deg")),
         Column("n", "integer", "runs with an equilibrium", low=0),
         Column("n_without", "integer", "runs without an equilibrium; they are in no number", low=0),
@@ -91,7 +100,7 @@ ROM_SUMMARY = Table(
         ENDED,
         MESSAGE,
     ),
-)  # fmt: skip
+)
 
 FACTORS = {
     "specimen": "differences between specimens",
@@ -106,11 +115,13 @@ def _share(name: str, meaning: str) -> tuple[Column, ...]:
     null = f"{NO_RESULT}; for a single specimen also: no share of specimens is defined"
     return (
         Column(f"{name}_share", "number", f"share due to {meaning}", null=null, low=0.0, high=1.0),
-        Column(f"{name}_low", "number", "lower end of its 95 % interval", null=null,
-               low=0.0, high=1.0),
-        Column(f"{name}_high", "number", "upper end of its 95 % interval", null=null,
-               low=0.0, high=1.0),
-    )  # fmt: skip
+        Column(
+            f"{name}_low", "number", "lower end of its 95 % interval", null=null, low=0.0, high=1.0
+        ),
+        Column(
+            f"{name}_high", "number", "upper end of its 95 % interval", null=null, low=0.0, high=1.0
+        ),
+    )
 
 
 ROM_VARIANCE = Table(
@@ -127,10 +138,16 @@ ROM_VARIANCE = Table(
         Column("n_specimens", "integer", "specimens in the analysis", low=0),
         Column("n_poses", "integer", "poses of each specimen in the analysis", low=0),
         Column("n_stiffness", "integer", "stiffness sets in the analysis", low=0),
-        Column("sd", "number", "standard deviation of the motion in the analysis", "deg",
-               null=NO_RESULT, low=0.0),
+        Column(
+            "sd",
+            "number",
+            "standard deviation of the motion in the analysis",
+            "deg",
+            null=NO_RESULT,
+            low=0.0,
+        ),
         *(column for name, meaning in FACTORS.items() for column in _share(name, meaning)),
         ENDED,
         MESSAGE,
     ),
-)  # fmt: skip
+)

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.discrepancy.design.seen import seen_in
-from spinepipe.discrepancy.design.testable import judgements
-from spinepipe.discrepancy.found import Found, Rules
-from spinepipe.discrepancy.proof.held_out import Asked, held_out
-from spinepipe.discrepancy.tasks import at_once
+from spinepipe.studies.discrepancy.design.seen import seen_in
+from spinepipe.studies.discrepancy.design.testable import judgements
+from spinepipe.studies.discrepancy.proof.held_out import Asked, held_out
+from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.store import at_once
 
 Told = dict[str, Any]
 

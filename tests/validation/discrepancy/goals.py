@@ -122,7 +122,10 @@ def _parameters(right: Sequence[Judged]) -> Rows:
     inside = [one.inside for one in found if one.inside is not None]
     return [
         share("parameters: within 10 % of the truth", (one.close for one in found)),
-        median("parameters: error as a share of the truth, median", [o.error for o in found],
-               Goal(high=0.1)),
+        median(
+            "parameters: error as a share of the truth, median",
+            [o.error for o in found],
+            Goal(high=0.1),
+        ),
         share("parameters: truth in the 95 % interval", inside, Goal(0.9, 0.98)),
-    ]  # fmt: skip
+    ]

@@ -18,9 +18,17 @@ Hidden = Mapping[str, Any]
 Options = Mapping[str, Any]
 Values = dict[str, float]
 
-AXES = {"flexion_extension": 2, "flexion": 2, "extension": 2, "lateral_bending": 0,
-        "right_bending": 0, "left_bending": 0, "axial_rotation": 1, "left_rotation": 1,
-        "right_rotation": 1}  # fmt: skip
+AXES = {
+    "flexion_extension": 2,
+    "flexion": 2,
+    "extension": 2,
+    "lateral_bending": 0,
+    "right_bending": 0,
+    "left_bending": 0,
+    "axial_rotation": 1,
+    "left_rotation": 1,
+    "right_rotation": 1,
+}
 """Ground axis of a test's moment, x y z."""
 
 
@@ -131,8 +139,13 @@ TRUTHS: dict[str, Callable[[Hidden, Options], Values | None]] = {
 }
 """All but level_dependence and load_misalignment, whose values differ by joint and by test."""
 
-VECTORS = ("joint_centre_offset", "joint_centre_migration", "load_offset", "marker_bias",
-           "load_misalignment")  # fmt: skip
+VECTORS = (
+    "joint_centre_offset",
+    "joint_centre_migration",
+    "load_offset",
+    "marker_bias",
+    "load_misalignment",
+)
 """Effects whose parameters are components: errors count against the length of the vector."""
 
 

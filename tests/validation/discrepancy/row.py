@@ -6,14 +6,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from spinepipe import cohort as cohorts
-from spinepipe.discrepancy.found import Found, Standing
-from spinepipe.discrepancy.grounds import NoBase
-from spinepipe.discrepancy.investigation import investigate
-from spinepipe.discrepancy.outcome import Outcome
-from spinepipe.discrepancy.tasks import at_once
-from spinepipe.discrepancy.values import fitted_values
-from spinepipe.studies import Discrepancy
-from spinepipe.studies.discrepancy import DiscrepancyBase
+from spinepipe.studies.discrepancy.search.grounds import NoBase
+from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.investigation import investigate
+from spinepipe.studies.discrepancy.search.model_files import fitted_values
+from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
+from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make
 from tests.validation.discrepancy.further import held_out_told, testable_told
 

@@ -93,19 +93,21 @@ def parameters(rows: Sequence[Judged]) -> pd.DataFrame:
         for one in compared(row.row):
             gap = ">= 0.5" if row.at_least(0.5) else "0.2"
             found.setdefault((one.effect, one.name, gap), []).append(one)
-    return pd.DataFrame([
-        {
-            "effect": effect,
-            "parameter": name,
-            "gap": gap,
-            "n": len(ones),
-            "within_10_percent": sum(one.close for one in ones),
-            "median_error": float(np.median([one.error for one in ones])),
-            "with_interval": sum(one.inside is not None for one in ones),
-            "in_interval": sum(one.inside is True for one in ones),
-        }
-        for (effect, name, gap), ones in sorted(found.items())
-    ])  # fmt: skip
+    return pd.DataFrame(
+        [
+            {
+                "effect": effect,
+                "parameter": name,
+                "gap": gap,
+                "n": len(ones),
+                "within_10_percent": sum(one.close for one in ones),
+                "median_error": float(np.median([one.error for one in ones])),
+                "with_interval": sum(one.inside is not None for one in ones),
+                "in_interval": sum(one.inside is True for one in ones),
+            }
+            for (effect, name, gap), ones in sorted(found.items())
+        ]
+    )
 
 
 def sets(rows: Sequence[Row], judgements: dict[int, Judged]) -> pd.DataFrame:

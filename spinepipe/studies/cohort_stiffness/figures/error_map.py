@@ -1,6 +1,10 @@
-"""Figure: signed error at the largest load, specimen by level, for each load case and stage."""
+"""Figure: signed error at the largest load, specimen by level, for each load case and stage.
+
+What the map of errors compares: published, fitted and predicted stiffness.
+"""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,13 +15,70 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Patch, Rectangle
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.named import case, short
-from spinepipe.report.cohort.stages import Stage, stages
-from spinepipe.report.layout import explain_marks
-from spinepipe.report.spread import Array, finite
+from spinepipe.report.marks import Array, finite
+from spinepipe.report.panels import explain_marks
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
-from spinepipe.report.words import POSITIVE, count, fixed
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.words import NAME, POSITIVE, case, count, fixed, short
+from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+
+MANY_SPECIMENS = 16
+"""With more of them only three stages have room."""
+
+_BY_WHOM = {
+    "fitted": "fitted to this specimen",
+    "left_out_specimen": "from the other specimens",
+}
+_ALL = (
+    ("literature", "literature"),
+    ("per_specimen", "fitted"),
+    ("per_joint", "fitted"),
+    ("per_joint", "left_out_specimen"),
+    ("partially_pooled", "left_out_specimen"),
+)
+_FEW = (
+    ("literature", "literature"),
+    ("per_joint", "fitted"),
+    ("partially_pooled", "left_out_specimen"),
+)
+_INSTEAD = ("partially_pooled", "per_joint", "per_specimen", "level_ratio")
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One line of panels: what it is called and its rows of the table ``errors``."""
+
+    title: str
+    rows: pd.DataFrame
+
+
+def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
+    """Stages that the study has, from published to predicted; another where one is absent.
+
+    Parameters
+    ----------
+    loaded : rows of ``errors`` in the loaded coordinate, at least one.
+    """
+    label = joint_label_of(loaded)
+    chosen = loaded[loaded["fitted_to"].isin([label, NOTHING])]
+    wanted = list(_FEW if specimens > MANY_SPECIMENS else _ALL)
+    for stage in ("fitted", "left_out_specimen"):
+        there = set(chosen.loc[chosen["stage"] == stage, "representation"])
+        if not any(name in there and at == stage for name, at in wanted):
+            wanted += [(name, stage) for name in _INSTEAD if name in there][:1]
+    found = [
+        Stage(_title(name, stage), rows)
+        for name, stage in wanted
+        if len(rows := chosen[(chosen["representation"] == name) & (chosen["stage"] == stage)])
+    ]
+    return found
+
+
+def _title(representation: str, stage: str) -> str:
+    name = NAME[representation]
+    words = name if stage == "literature" else f"{name}, {_BY_WHOM[stage]}"
+    return words[:1].upper() + words[1:]
+
 
 COLORS = "PuOr_r"
 """Purple to orange over white: colour-blind readers tell its ends apart."""
@@ -54,8 +115,9 @@ def error_map_figure(
             _frame(axis, signs, test, cohort)
             _label(axis, cohort, line == len(found) - 1, column == 0)
             words = _over(test, loaded, len(axes[0])) if line == 0 else ""
-            axis.set_title(f" \n{words}" if words else " ", fontweight="normal", fontsize=6.5,
-                           linespacing=1.7)  # fmt: skip
+            axis.set_title(
+                f" \n{words}" if words else " ", fontweight="normal", fontsize=6.5, linespacing=1.7
+            )
         _heading(axes[line][0], line, stage.title)
     assert image is not None
     _explain(figure, axes, image, scale, found, signs)
@@ -105,15 +167,34 @@ def _square(rows: pd.DataFrame, cohort: Cohort) -> Array:
 
 def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage:
     axis.set_facecolor(_EMPTY)
-    axis.add_patch(Rectangle((-0.5, -0.5), grid.shape[1], grid.shape[0], hatch="//////", lw=0,
-                             facecolor="none", edgecolor=_HATCH, zorder=0))  # fmt: skip
+    axis.add_patch(
+        Rectangle(
+            (-0.5, -0.5),
+            grid.shape[1],
+            grid.shape[0],
+            hatch="//////",
+            lw=0,
+            facecolor="none",
+            edgecolor=_HATCH,
+            zorder=0,
+        )
+    )
     shown = np.ma.masked_invalid(grid)
     image = axis.imshow(shown, cmap=COLORS, norm=scale, aspect="auto", zorder=1)
     for row, column in np.argwhere(np.isfinite(grid)) if numbers else ():
         value = grid[row, column]
         dark = abs(scale(value) - 0.5) > 0.31
-        axis.text(column, row, fixed(value, 1), ha="center", va="center", fontsize=5.0,
-                  color=WHITE if dark else BLACK, zorder=3, in_layout=False)  # fmt: skip
+        axis.text(
+            column,
+            row,
+            fixed(value, 1),
+            ha="center",
+            va="center",
+            fontsize=5.0,
+            color=WHITE if dark else BLACK,
+            zorder=3,
+            in_layout=False,
+        )
     for side in axis.spines.values():
         side.set_visible(False)
     return image
@@ -124,8 +205,18 @@ def _frame(axis: Axes, signs: pd.DataFrame, test: str, cohort: Cohort) -> None:
     levels = list(cohort.joint_names[::-1])
     for _, row in _flipped(signs)[_flipped(signs)["test"] == test].iterrows():
         x, y = levels.index(row["joint"]), cohort.specimen_names.index(row["specimen"])
-        axis.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, fill=False, edgecolor=BLACK, lw=1.3,
-                                 zorder=4, clip_on=False))  # fmt: skip
+        axis.add_patch(
+            Rectangle(
+                (x - 0.5, y - 0.5),
+                1.0,
+                1.0,
+                fill=False,
+                edgecolor=BLACK,
+                lw=1.3,
+                zorder=4,
+                clip_on=False,
+            )
+        )
 
 
 def _flipped(signs: pd.DataFrame) -> pd.DataFrame:
@@ -141,8 +232,9 @@ def _label(axis: Axes, cohort: Cohort, lowest: bool, leftmost: bool) -> None:
     every = max(1, int(np.ceil(_LABEL_MM / row_mm)))
     axis.set_yticks(range(0, len(names), every), [short(name, _NAME) for name in names[::every]])
     turned = max(len(name) for name in levels) * 1.25 + 1.0 > _cell_mm(cohort, grid.ncols)
-    axis.set_xticks(range(len(levels)), [short(name, _NAME) for name in levels],
-                    rotation=90 if turned else 0)  # fmt: skip
+    axis.set_xticks(
+        range(len(levels)), [short(name, _NAME) for name in levels], rotation=90 if turned else 0
+    )
     axis.tick_params(length=0.0, labelleft=leftmost, labelbottom=lowest, pad=2.0, labelsize=6.0)
 
 
@@ -158,9 +250,18 @@ def _over(test: str, loaded: pd.DataFrame, across: int) -> str:
 def _heading(axis: Axes, line: int, words: str) -> None:
     """Letter and words above the first panel of a line, over the names of the load cases."""
     above = 12.5 if line == 0 else 3.5
-    axis.annotate(f"{chr(ord('a') + line)}   {words}", (0.0, 1.0), (0.0, above), va="bottom",
-                  xycoords="axes fraction", textcoords="offset points", fontsize=7.5,
-                  fontweight="bold", annotation_clip=False, in_layout=False)  # fmt: skip
+    axis.annotate(
+        f"{chr(ord('a') + line)}   {words}",
+        (0.0, 1.0),
+        (0.0, above),
+        va="bottom",
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=7.5,
+        fontweight="bold",
+        annotation_clip=False,
+        in_layout=False,
+    )
 
 
 def _explain(
@@ -173,13 +274,26 @@ def _explain(
 ) -> None:
     sizes = np.abs(np.concatenate([finite(stage.rows["peak_error"]) for stage in found]))
     beyond = float(sizes.max()) > float(scale.vmax or 0.0) * (1.0 + 1e-9)
-    bar = figure.colorbar(image, ax=[panel for line in axes for panel in line], pad=0.012,
-                          location="bottom", aspect=60, shrink=0.6,
-                          extend="both" if beyond else "neither")  # fmt: skip
+    bar = figure.colorbar(
+        image,
+        ax=[panel for line in axes for panel in line],
+        pad=0.012,
+        location="bottom",
+        aspect=60,
+        shrink=0.6,
+        extend="both" if beyond else "neither",
+    )
     bar.set_label("predicted less measured motion at the largest load, loaded direction (°)")
     bar.outline.set_linewidth(0.4)
-    handles = [Patch(facecolor=_EMPTY, edgecolor=_HATCH, hatch="//////", lw=0,
-                     label="not measured, or no result")]  # fmt: skip
+    handles = [
+        Patch(
+            facecolor=_EMPTY,
+            edgecolor=_HATCH,
+            hatch="//////",
+            lw=0,
+            label="not measured, or no result",
+        )
+    ]
     if len(_flipped(signs)):
         label = "measured motion goes against the load: sign flipped?"
         handles.append(Patch(facecolor=WHITE, edgecolor=BLACK, lw=1.3, label=label))

@@ -1,4 +1,7 @@
-"""Figure: error of motion that was fitted and of motion that was held out, by representation."""
+"""Figure: error of motion that was fitted and of motion that was held out, by representation.
+
+Errors of fitted and of held-out motion, one number per specimen.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,16 +12,34 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.held_out import rotation_errors
-from spinepipe.report.cohort.named import NAME
-from spinepipe.report.layout import explain_marks, head
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.spread import finite
+from spinepipe.report.marks import finite
+from spinepipe.report.panels import explain_marks, head, log_ticks
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import count, number
+from spinepipe.report.words import NAME, count, number
 from spinepipe.statistics import mean_of
-from spinepipe.studies import CohortStiffness
-from spinepipe.tables.cohort_stiffness_columns import REPRESENTATIONS
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, specimen_rms
+from spinepipe.studies.cohort_stiffness.tables import REPRESENTATIONS
+
+KEYS = ["stage", "representation", "specimen"]
+
+
+def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
+    """Root mean square error over all readings of rotations, column ``error``, deg, by ``KEYS``.
+
+    Of held-out load cases each is predicted by the fit that left it out; all else is of fits to
+    all load cases. A specimen without an error for all that was measured of it is left out.
+    """
+    found = {
+        (stage, name): values
+        for stage in errors["stage"].unique()
+        for name, rows in of_joint_fits(errors, stage).groupby("representation", sort=False)
+        if len(values := specimen_rms(rows, errors))
+    }
+    if not found:
+        return pd.DataFrame(columns=[*KEYS, "error"])
+    return pd.concat(found, names=KEYS).rename("error").reset_index()
+
 
 PANELS = {
     "fitted": "Fitted motion",
@@ -95,8 +116,14 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
         interval = mean_of(values).interval
         if interval is not None:
             ends = max(0.0, interval[0]), interval[1]
-            axis.plot([max(ends[0], low), ends[1]], [y + 0.16] * 2, color=BLACK, lw=1.1, zorder=4,
-                      solid_capstyle="butt")  # fmt: skip
+            axis.plot(
+                [max(ends[0], low), ends[1]],
+                [y + 0.16] * 2,
+                color=BLACK,
+                lw=1.1,
+                zorder=4,
+                solid_capstyle="butt",
+            )
             words = f"{words} ({number(ends[0])}–{number(ends[1])})"
         middle = max(float(values.mean()), LEAST_DEG)
         axis.plot([middle], [y + 0.16], "D", color=BLACK, ms=3.2, mew=0, zorder=5)
@@ -104,8 +131,9 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
 
 
 def _explain(figure: Figure, published: Mapping[str, float], specimens: int) -> None:
-    handles = [Line2D([], [], color=OURS, marker="o", ms=3.0, mew=0, ls="", alpha=0.55,
-                      label="a specimen")]  # fmt: skip
+    handles = [
+        Line2D([], [], color=OURS, marker="o", ms=3.0, mew=0, ls="", alpha=0.55, label="a specimen")
+    ]
     mean = "mean with 95 % interval" if specimens > 1 else "mean"
     handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
     for name, value in published.items():

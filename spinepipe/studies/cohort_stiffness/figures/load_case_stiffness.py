@@ -1,4 +1,7 @@
-"""Figure: stiffness fitted to one load case against stiffness fitted to all of them."""
+"""Figure: stiffness fitted to one load case against stiffness fitted to all of them.
+
+Stiffness fitted to one load case as a multiple of that fitted to all.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,17 +13,45 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.case_ratios import ratios
-from spinepipe.report.cohort.named import NAME, case, short
-from spinepipe.report.layout import explain_marks, head
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.sections import sections
-from spinepipe.report.spread import BAR_PT, Array, finite, quartiles
+from spinepipe.report.marks import BAR_PT, Array, finite, quartiles
+from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
-from spinepipe.report.words import AXIS, count
-from spinepipe.studies import CohortStiffness
-from spinepipe.studies.fitted_to import load_cases
+from spinepipe.report.words import AXIS, NAME, case, count, short
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted
+from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
+
+_KEYS = ["specimen", "representation", "joint", "coordinate"]
+_SHARED = ("per_specimen", "level_ratio")
+"""Representations with one unknown for all joints of a specimen."""
+
+
+def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
+    """One row per fit to a single load case, with the ratio and its interval.
+
+    The interval is that of the fit to the single load case alone. Where joints share an unknown,
+    the first joint stands for all.
+
+    Returns
+    -------
+    Columns ``fitted_to``, those of the keys, ``ratio``, ``low``, ``high``, ``doubted``, and
+    ``loaded``: whether that load case drives the coordinate.
+    """
+    own = stiffness[stiffness["source"] == "own"]
+    first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
+    own = own[~own["representation"].isin(_SHARED) | first]
+    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
+    whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
+    both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
+    divided = {
+        new: both[old].astype(float) / both["whole"].astype(float)
+        for new, old in (("ratio", "stiffness"), ("low", "low"), ("high", "high"))
+    }
+    driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
+    pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
+    loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
+    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
+
 
 _SHOWN = ("per_specimen", "per_joint")
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
@@ -85,8 +116,15 @@ def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
         axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=0)
         here = rows[rows["fitted_to"] == test]
         if not len(here):
-            axis.text(0.02, y, "no result", transform=axis.get_yaxis_transform(), color=GREY,
-                      fontsize=6.0, va="center")  # fmt: skip
+            axis.text(
+                0.02,
+                y,
+                "no result",
+                transform=axis.get_yaxis_transform(),
+                color=GREY,
+                fontsize=6.0,
+                va="center",
+            )
             continue
         _draw_row(axis, here, y)
 
@@ -107,16 +145,32 @@ def _draw_row(axis: Axes, rows: pd.DataFrame, y: int) -> None:
     low, high = axis.get_xlim()
     n = len(rows)
     if n > _MOST_INTERVALS:
-        axis.plot(np.clip(rows["ratio"], low, high), y + _shifts(n), "o", color=color, ms=1.8,
-                  mew=0, alpha=0.3, zorder=3, rasterized=True)  # fmt: skip
+        axis.plot(
+            np.clip(rows["ratio"], low, high),
+            y + _shifts(n),
+            "o",
+            color=color,
+            ms=1.8,
+            mew=0,
+            alpha=0.3,
+            zorder=3,
+            rasterized=True,
+        )
     else:
         for at, row in zip(y + _shifts(n), rows.to_dict("records"), strict=True):
             _draw_fit(axis, row, float(at), color, n <= _FEW)
     if n > _FEW:  # of all fits: without those not held by the data the median would be biased
         middle = quartiles(np.clip(finite(rows["ratio"]), low, high))
         axis.plot([middle.median] * 2, [y - 0.36, y + 0.36], color=BLACK, lw=1.2, zorder=6)
-        axis.plot([middle.low, middle.high], [y, y], color=BLACK, lw=BAR_PT * 0.5, alpha=0.8,
-                  solid_capstyle="butt", zorder=5)  # fmt: skip
+        axis.plot(
+            [middle.low, middle.high],
+            [y, y],
+            color=BLACK,
+            lw=BAR_PT * 0.5,
+            alpha=0.8,
+            solid_capstyle="butt",
+            zorder=5,
+        )
 
 
 def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool) -> None:
@@ -126,12 +180,28 @@ def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool
     beyond = x != row["ratio"]
     if not pd.isna(row["low"]) and not beyond:
         ends = [max(row["low"], low), min(row["high"], high)]
-        axis.plot(ends, [y, y], color=color, lw=0.8 if roomy else 0.5, zorder=3,
-                  alpha=1.0 if roomy else 0.45, solid_capstyle="butt")  # fmt: skip
+        axis.plot(
+            ends,
+            [y, y],
+            color=color,
+            lw=0.8 if roomy else 0.5,
+            zorder=3,
+            alpha=1.0 if roomy else 0.45,
+            solid_capstyle="butt",
+        )
     shape = "o" if not beyond else "<" if x == low else ">"
     face = WHITE if row["doubted"] or beyond else color
-    axis.plot([x], [y], shape, color=color, mfc=face, ms=3.0 if roomy else 2.2, mew=0.6,
-              zorder=4, clip_on=False)  # fmt: skip
+    axis.plot(
+        [x],
+        [y],
+        shape,
+        color=color,
+        mfc=face,
+        ms=3.0 if roomy else 2.2,
+        mew=0.6,
+        zorder=4,
+        clip_on=False,
+    )
 
 
 def _shifts(n: int) -> Array:
@@ -147,8 +217,18 @@ def _explain(figure: Figure, rows: pd.DataFrame, tested: Sequence[str]) -> None:
         Line2D([], [], color=GREY, marker="o", ms=3.0, lw=0.8, label="it does not"),
     ]
     if rows["doubted"].any():
-        handles.append(Line2D([], [], color=GREY, marker="o", mfc=WHITE, ms=3.0, lw=0.8,
-                              label="not identifiable or at a bound"))  # fmt: skip
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=GREY,
+                marker="o",
+                mfc=WHITE,
+                ms=3.0,
+                lw=0.8,
+                label="not identifiable or at a bound",
+            )
+        )
     words = (
         "Symbol: a specimen, or a joint of it; line: 95 % interval of the fit to this load case; "
         f"black, where more than {_FEW} stand in a row: median and middle half; lines are left out "

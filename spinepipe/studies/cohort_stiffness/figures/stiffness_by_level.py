@@ -1,26 +1,187 @@
-"""Figure: fitted stiffness of every specimen, level by level, beside the published values."""
+"""Figure: fitted stiffness of every specimen, level by level, beside the published values.
+
+Which rows of the tables of a cohort study a figure shows.
+
+An axis of levels, cranial on the left.
+
+Symbols of stiffness with its interval, upright; hollow where the data do not hold it.
+
+How far a logarithmic axis of stiffness reaches.
+"""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.chosen import doubted, own
-from spinepipe.report.cohort.levels import label_levels, places, shade
-from spinepipe.report.cohort.mark import Mark, draw_marks, handle
-from spinepipe.report.cohort.named import NAME, listed
-from spinepipe.report.cohort.reach import reach
-from spinepipe.report.layout import explain_marks, head
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.spread import draw_upright, finite
-from spinepipe.report.stage_errors import joint_label_of
-from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, blank, saying
-from spinepipe.report.words import AXIS, count, number, stiffness_unit
-from spinepipe.studies import CohortStiffness
+from spinepipe.report.marks import draw_upright, finite, quartiles
+from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
+from spinepipe.report.words import AXIS, NAME, count, listed, number, short, stiffness_unit
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.units import COORDINATES
+
+
+def own(stiffness: pd.DataFrame, representations: Sequence[str]) -> pd.DataFrame:
+    """Stiffness fitted to each specimen's own motion under all load cases."""
+    fitted = stiffness["fitted_to"] == joint_label_of(stiffness)
+    return stiffness[
+        fitted
+        & (stiffness["source"] == "own")
+        & stiffness["representation"].isin(list(representations))
+    ]
+
+
+def doubted(rows: pd.DataFrame) -> pd.Series:
+    """Whether each stiffness is not held by the data: not identifiable, or at a bound."""
+    known = rows["identifiable"].map(lambda flag: flag is None or bool(flag)).astype(bool)
+    return ~known | (rows["at_bound"] != "no")
+
+
+_SHARE = 0.82
+_SHADE = "#F2F2F2"
+_MOST_LETTERS = 140
+"""Letters that stand side by side below a panel of the whole width."""
+
+
+def places(
+    level: int, specimens: Sequence[str], representations: Sequence[str]
+) -> dict[tuple[str, str], float]:
+    """Where each specimen and representation stands within a level."""
+    keys = [(specimen, name) for specimen in specimens for name in representations]
+    n = len(keys)
+    return {key: level + _SHARE * ((i + 0.5) / n - 0.5) for i, key in enumerate(keys)}
+
+
+def shade(axis: Axes, n: int) -> None:
+    """Every second level a shade darker."""
+    for level in range(0, n, 2):
+        axis.axvspan(level - 0.5, level + 0.5, color=_SHADE, lw=0, zorder=0)
+    axis.set_xlim(-0.5, n - 0.5)
+
+
+def label_levels(axis: Axes, levels: Sequence[str]) -> None:
+    """Names below the axis, slanted where they are long."""
+    slanted = sum(len(name) + 2 for name in levels) > _MOST_LETTERS
+    names = [short(name) for name in levels]
+    turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
+    axis.set_xticks(range(len(levels)), names, **turned)  # type: ignore[arg-type]
+    axis.tick_params(axis="x", length=0.0)
+
+
+_EDGE = 0.025
+"""How far from the end of the axis something beyond it is marked, as a share of the axis."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Colour, shape and size of a symbol, and whether it is filled."""
+
+    color: str
+    shape: str
+    size_pt: float
+    filled: bool = True
+
+    def hollow(self) -> "Mark":
+        """The same symbol, not filled."""
+        return replace(self, filled=False)
+
+
+def handle(mark: Mark, label: str) -> Line2D:
+    """The symbol as the key shows it."""
+    return Line2D(
+        [],
+        [],
+        color=mark.color,
+        lw=0.9,
+        marker=mark.shape,
+        ms=mark.size_pt,
+        mfc=mark.color if mark.filled else WHITE,
+        mew=0.7,
+        label=label,
+    )
+
+
+def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
+    """Stiffness of each row at its place (n,); the axis has its limits already."""
+    low, high = axis.get_ylim()
+    doubt = doubted(rows)
+    for at, row, doubtful in zip(x, rows.to_dict("records"), doubt, strict=True):
+        value = row["stiffness"]
+        if value is None or not np.isfinite(value):
+            _at_edge(axis, at, 0.0, "x", BLACK)
+        elif value > high or value < low:
+            _at_edge(axis, at, float(value > high), "^" if value > high else "v", mark.color)
+        else:
+            if not pd.isna(row["low"]):
+                axis.plot(
+                    [at, at],
+                    [max(row["low"], low), min(row["high"], high)],
+                    color=mark.color,
+                    lw=0.9,
+                    solid_capstyle="butt",
+                    zorder=3,
+                )
+            face = WHITE if doubtful or not mark.filled else mark.color
+            axis.plot(
+                [at],
+                [value],
+                mark.shape,
+                color=mark.color,
+                mfc=face,
+                ms=mark.size_pt,
+                mew=0.7,
+                zorder=4,
+            )
+
+
+def _at_edge(axis: Axes, x: float, top: float, shape: str, color: str) -> None:
+    y = 1.0 - _EDGE if top else _EDGE
+    axis.plot(
+        [x],
+        [y],
+        shape,
+        color=color,
+        mfc=WHITE,
+        ms=3.5,
+        mew=0.8,
+        transform=axis.get_xaxis_transform(),
+        zorder=5,
+    )
+
+
+FARTHEST = 10.0
+"""What lies farther than this factor from the quartiles is shown at the edge."""
+
+_MARGIN, _LEAST = 0.06, 0.09
+"""Room at either end: a share of the axis, and at least so many decades."""
+
+
+def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
+    """Ends of the axis.
+
+    Parameters
+    ----------
+    rows : with stiffness and interval; those the data do not hold count only where all are such.
+    more : further values that are on the axis if they are near.
+    """
+    held = rows[~doubted(rows)]
+    chosen = held if len(held) else rows
+    values = finite(chosen["stiffness"])
+    middle = quartiles(values)
+    near = np.concatenate([finite(chosen[name]) for name in ("stiffness", "low", "high")])
+    near = np.concatenate([near, finite(more)])
+    near = near[(near > middle.low / FARTHEST) & (near < middle.high * FARTHEST)]
+    low, high = float(near.min()), float(near.max())
+    margin = 10.0 ** max(_LEAST, _MARGIN * np.log10(high / low))
+    return low / margin, high * margin
+
 
 MOST_INTERVALS = 170
 """More intervals than this cannot be told apart side by side."""
@@ -112,8 +273,14 @@ def _draw_published(axis: Axes, published: pd.DataFrame, levels: Sequence[str]) 
     each = published[published["representation"] == "literature_levels"]
     for joint, value in each.groupby("joint")["stiffness"].first().dropna().items():
         x = list(levels).index(str(joint))
-        axis.plot([x - 0.46, x + 0.46], [value, value], color=THEIRS, lw=1.4,
-                  solid_capstyle="butt", zorder=1.6)  # fmt: skip
+        axis.plot(
+            [x - 0.46, x + 0.46],
+            [value, value],
+            color=THEIRS,
+            lw=1.4,
+            solid_capstyle="butt",
+            zorder=1.6,
+        )
 
 
 def _explain(
@@ -125,8 +292,18 @@ def _explain(
 ) -> None:
     handles: list[Line2D] = []
     if _crowded(cohort):
-        handles.append(Line2D([], [], color=OURS, marker="o", ms=2.2, mew=0, ls="",
-                              label=f"{NAME[shown[0]]}, a specimen"))  # fmt: skip
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=OURS,
+                marker="o",
+                ms=2.2,
+                mew=0,
+                ls="",
+                label=f"{NAME[shown[0]]}, a specimen",
+            )
+        )
     else:
         handles += [handle(mark, NAME[name]) for mark, name in zip(_MARKS, shown, strict=False)]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
@@ -138,8 +315,7 @@ def _explain(
     if doubt and not _crowded(cohort):
         handles.append(handle(_MARKS[0].hollow(), "not identifiable or at a bound"))
     if rows["stiffness"].isna().any() and not _crowded(cohort):
-        handles.append(Line2D([], [], color=BLACK, marker="x", ms=3.5, ls="",
-                              label="no stiffness"))  # fmt: skip
+        handles.append(Line2D([], [], color=BLACK, marker="x", ms=3.5, ls="", label="no stiffness"))
     explain_marks(
         figure, handles, _words(stiffness, rows, cohort), len(handles) if len(handles) < 5 else 3
     )

@@ -10,15 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import orth
 
-from spinepipe.discrepancy.forms import Trials
-from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.groups import Index
-from spinepipe.discrepancy.prediction import Solved
-from spinepipe.discrepancy.projected import SEEN, UNSEEN
-from spinepipe.discrepancy.signatures import Column, columns_of, signatures
-from spinepipe.discrepancy.whitening import Whitening
 from spinepipe.effects.contract import Array
 from spinepipe.statics import FreeParameter
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Trials
+from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.projected import (
+    SEEN,
+    UNSEEN,
+    Column,
+    columns_of,
+    signatures,
+)
+from spinepipe.studies.discrepancy.search.screen import Index
+from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,141 @@
-"""What a cohort's tests could tell apart, before residuals are looked at: all of it together."""
+"""What a cohort's tests could tell apart, before residuals are looked at: all of it together.
 
-from collections.abc import Sequence
+Which effects a design of tests can tell apart, before residuals are looked at.
+
+Of what base and nuisances leave of a typical effect A, the share that another effect B explains:
+``1 - min_x (|a - F x|^2 + |x|^2 / t^2) / |a|^2``, F the signatures of B, x its strengths with prior
+SD t. B has one variant and shape at a time, the best; its strengths may differ between joints.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from spinepipe.discrepancy.design.confusions import Confusion, confusions, families
-from spinepipe.discrepancy.design.extra_tests import NotTestable, bench, not_testable
-from spinepipe.discrepancy.design.seen import Design, candidates, seen_in
-from spinepipe.discrepancy.design.testable import Judgement, judgements
-from spinepipe.discrepancy.forms import Trials
-from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.tasks import Run
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.design.extra_tests import NotTestable, bench, not_testable
+from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.studies.discrepancy.design.testable import Judgement, Typical, judgements, summing
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
+from spinepipe.studies.discrepancy.search.screen import SIZES, Places
+from spinepipe.studies.discrepancy.store import Run
+
+ALIKE = 0.95
+"""Effects that explain more than this share of each other cannot be told apart."""
+
+FREE = (Spread.SHARED, Spread.BY_JOINT)
+"""How the strengths of the explaining effect may differ, if its trial knows one of these."""
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """Share (0..1) of what ``effect`` would do that ``other`` can explain."""
+
+    effect: str
+    other: str
+    share: float
+
+
+@dataclass(frozen=True)
+class _Target:
+    """A typical effect: what it makes in each specimen (M, d), and its squared size."""
+
+    effect: str
+    made: Mapping[str, Array]
+    size: float
+
+
+def confusions(design: Design, judged: Sequence[Judgement]) -> tuple[Confusion, ...]:
+    """All ordered pairs of different effects that the tests can show.
+
+    Parameters
+    ----------
+    judged : of all effects of the design, in their order.
+    """
+    shown = [number for number, one in enumerate(judged) if one.testable]
+    if len(shown) < 2:
+        return ()
+    targets = {number: _target(design, number, judged[number].best) for number in shown}
+    return tuple(
+        Confusion(target.effect, judged[other].effect, share)
+        for other in shown
+        for target, share in zip(
+            (targets[number] for number in shown if number != other),
+            _shares(design, other, [targets[number] for number in shown if number != other]),
+            strict=True,
+        )
+    )
+
+
+def families(found: Sequence[Confusion]) -> tuple[tuple[str, ...], ...]:
+    """Sets of effects that explain each other, alphabetical; effects alone are not listed."""
+    names = sorted({one.effect for one in found})
+    share = np.zeros((len(names), len(names)))
+    for one in found:
+        share[names.index(one.effect), names.index(one.other)] = one.share
+    mutual = np.minimum(share, share.T) > ALIKE
+    _, labels = connected_components(mutual, directed=False)
+    sets = [
+        tuple(name for name, label in zip(names, labels, strict=True) if label == number)
+        for number in sorted(set(labels.tolist()))
+    ]
+    return tuple(one for one in sets if len(one) > 1)
+
+
+def _target(design: Design, number: int, one: Typical) -> _Target:
+    start, directions = design.those.starts[number], one.directions
+    made = {}
+    for specimen, columns, owners in one.places:
+        onto = summing(owners, len(one.mean))
+        made[specimen] = design.of[specimen].left[:, start + columns] @ onto.T @ directions
+    return _Target(design.those.trials[number].effect, made, one.squared(one.left))
+
+
+def _shares(design: Design, other: int, targets: Sequence[_Target]) -> list[float]:
+    """Share of each target that effect ``other`` explains at its best."""
+    forms = design.those.trials[other].forms
+    free = [form for form in forms if form.spread in FREE]
+    best = np.zeros(len(targets))
+    for form in free or forms:
+        for sds in shape_grid(form.variant):
+            best = np.maximum(best, _explained(design, other, form, sds, targets))
+    return [float(share) for share in np.clip(best, 0.0, 1.0)]
+
+
+def _explained(
+    design: Design, other: int, form: Form, sds: tuple[float, ...], targets: Sequence[_Target]
+) -> Array:
+    index, start = design.those.indices[other], design.those.starts[other]
+    places, strengths = index.places(form, sds, tuple(design.of), design.those.tests)
+    gram, moments = _products(design, start, places, len(strengths), targets)
+    prior = np.eye(len(gram)) / SIZES[-1] ** 2
+    solution = np.linalg.solve(gram + prior, np.concatenate(moments, axis=1))
+    ends = np.cumsum([m.shape[1] for m in moments])[:-1]
+    return np.array(
+        [
+            float(np.sum(m * x)) / target.size
+            for target, m, x in zip(targets, moments, np.split(solution, ends, axis=1), strict=True)
+        ]
+    )
+
+
+def _products(
+    design: Design, start: int, places: Places, count: int, targets: Sequence[_Target]
+) -> tuple[Array, list[Array]]:
+    """F'F (k, k), and F'a (k, d) of each target."""
+    gram = np.zeros((count, count))
+    widths = [next(iter(target.made.values())).shape[1] for target in targets]
+    moments = [np.zeros((count, width)) for width in widths]
+    for specimen, columns, owners in places:
+        onto, mine = summing(owners, count), start + columns
+        gram += onto @ design.of[specimen].left[np.ix_(mine, mine)] @ onto.T
+        for moment, target in zip(moments, targets, strict=True):
+            if specimen in target.made:
+                moment += onto @ target.made[specimen][mine]
+    return gram, moments
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.cohort.named import short
-from spinepipe.report.discrepancy.verdict import Verdict
-from spinepipe.report.discrepancy.words import plain
-from spinepipe.report.layout import explain_marks, head
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.spread import finite
+from spinepipe.report.marks import finite
+from spinepipe.report.panels import explain_marks, head, log_ticks
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
+from spinepipe.report.words import short
+from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.words import plain
 
 KINDS = {"specimen": "One specimen left out", "test": "One test left out"}
 MODELS = {
@@ -71,8 +70,10 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: list[str]) -> None:
             color, shape, size, _ = MODELS[name]
             axis.plot([row[name]], [y], shape, color=color, ms=size, mew=0.0, zorder=4)
     axis.axvline(1.0, color=BLACK, lw=0.8, ls="--", zorder=1)
-    axis.set_yticks(range(len(rows)), [_name(fold, kind) for fold, kind in
-                                       zip(rows["fold"], rows["kind"], strict=True)])  # fmt: skip
+    axis.set_yticks(
+        range(len(rows)),
+        [_name(fold, kind) for fold, kind in zip(rows["fold"], rows["kind"], strict=True)],
+    )
     axis.spines["left"].set_visible(False)
     axis.set_xlabel("root mean square residual (noise SD)")
 

@@ -12,10 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from spinepipe.discrepancy.mistakes.driven import joint_moments
-from spinepipe.discrepancy.mistakes.suspected import SuspectedError, of_specimens
-from spinepipe.discrepancy.readings import Repeats, SpecimenReadings
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.mistakes.suspected import (
+    SuspectedError,
+    joint_moments,
+    of_specimens,
+)
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import COORDINATES, ROTATIONS
 
 MANY_TIMES = 3.0

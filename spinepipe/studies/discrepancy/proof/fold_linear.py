@@ -2,19 +2,100 @@
 
 All readings enter as normal equations, made once for each test and choice of load steps; a fold
 sums those of its training.
+
+A fit as a linear model: readings to first order in its unknowns and in the nuisances.
+
+A surrogate without physics: the base, and a ridge on the generic basis.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 from scipy.optimize import lsq_linear
 
-from spinepipe.discrepancy.proof.chosen import Chosen, Flags
-from spinepipe.discrepancy.proof.folds import Part
-from spinepipe.discrepancy.proof.tangent import LinearModel
 from spinepipe.effects.contract import Array, Indices
+from spinepipe.studies.discrepancy.proof.folds import Chosen, Flags, Part
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Unknown
+from spinepipe.studies.discrepancy.search.lack_of_fit import generic_columns
+from spinepipe.studies.discrepancy.search.whitening import Whitening
+from spinepipe.units import COORDINATES
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """One specimen's readings near a fit; zero where nothing was read.
+
+    Attributes
+    ----------
+    predicted : per test (T, J, 6). by_x : per test (T, J, 6, m), by each of its unknowns.
+    numbers : (m,) which of all unknowns these are.
+    nuisances : per test (T, J, 6, k), by nuisances of SD one.
+    """
+
+    predicted: tuple[Array, ...]
+    by_x: tuple[Array, ...]
+    numbers: Indices
+    nuisances: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """All specimens near a fit, and the unknowns' moves from it: priors (M,) and bounds (M,)."""
+
+    members: Mapping[str, Tangent]
+    mean: Array
+    sd: Array
+    low: Array
+    high: Array
+
+
+def tangent(grounds: Grounds, nuisance_size: float) -> LinearModel:
+    """The grounds' fit to first order; nuisances of that many prior SDs."""
+    fit = grounds.fit
+    unknowns: tuple[Unknown, ...] = fit.hypothesis.unknowns
+    members = {}
+    for name, member in fit.hypothesis.members.items():
+        plain, full = grounds.plain[name], grounds.setting.whitenings[name]
+        sizes = full.sizes
+        members[name] = Tangent(
+            fit.predicted[name],
+            in_readings(plain, lengthened(full, fit.jacobians[name])),
+            np.array(member.numbers, dtype=np.int64),
+            in_readings(plain, full.directions * (nuisance_size * sizes)),
+        )
+    return LinearModel(
+        members,
+        np.array([u.mean for u in unknowns]) - fit.x,
+        np.array([u.sd for u in unknowns]),
+        np.minimum(np.array([u.low for u in unknowns]) - fit.x, 0.0),
+        np.maximum(np.array([u.high for u in unknowns]) - fit.x, 0.0),
+    )
+
+
+def lengthened(white: Whitening, rows: Array) -> Array:
+    """Noise-whitened rows (N, m) of those with the nuisances' share taken out."""
+    longer = 1.0 / (1.0 + white.shrink) - 1.0
+    result: Array = rows + white.directions @ (longer[:, None] * (white.directions.T @ rows))
+    return result
+
+
+def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
+    """(T, J, 6, m) per test, of noise-whitened rows (N, m): the inverse of ``noise_only``."""
+    found: list[Array] = []
+    at = 0
+    for root, used in zip(plain.roots, plain.used, strict=True):
+        rows = np.zeros((*used.shape, white.shape[1]))
+        count = int(used.sum())
+        rows[used] = white[at : at + count]
+        at += count
+        empty = ~used.transpose(1, 2, 0)  # (J, 6, T)
+        square = root + empty[..., None] * np.eye(used.shape[0])
+        raw = np.asarray(np.linalg.solve(square, rows.transpose(1, 2, 0, 3)), dtype=np.float64)
+        found.append(raw.transpose(2, 0, 1, 3))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -169,3 +250,44 @@ def _se(by_x: Array, covariance: Array) -> Array:
     """(T, J, 6) standard error by the unknowns' covariance (m, m)."""
     found: Array = np.sqrt(np.maximum(np.sum((by_x @ covariance) * by_x, axis=-1), 0.0))
     return found
+
+
+def surrogate(grounds: Grounds, nuisance_size: float) -> LinearModel:
+    """The base to first order, with generic terms that are the same in all specimens.
+
+    A term's strength is that of all joints together plus a part of each joint's own, both with
+    prior SD one in units of the term's size.
+
+    Raises
+    ------
+    NoEquilibrium
+        When a load step has no stable pose.
+    """
+    base = tangent(grounds, nuisance_size)
+    known = len(base.mean)
+    read = np.any([used.any(axis=(0, 1)) for w in grounds.plain.values() for used in w.used], 0)
+    coordinates = [name for name, there in zip(COORDINATES, read, strict=True) if there]
+    members, added = {}, 0
+    for name, one in base.members.items():
+        model, cases = grounds.fit.models[name], grounds.readings[name].cases
+        found = generic_columns(model, cases, grounds.noise.zeroed, coordinates)
+        keys = [(t.family, t.coordinate, t.number) for t in found.terms]
+        order = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+        together = np.zeros((len(keys), len(order)))
+        together[np.arange(len(keys)), [order[key] for key in keys]] = 1.0
+        onto = np.hstack([np.eye(len(keys)), together])
+        added = onto.shape[1]
+        columns = tuple(
+            np.concatenate([by_x, moved @ onto], axis=-1)
+            for by_x, moved in zip(one.by_x, found.moved, strict=True)
+        )
+        numbers = np.concatenate([one.numbers, known + np.arange(added)])
+        members[name] = replace(one, by_x=columns, numbers=numbers)
+    free = np.full(added, np.inf)
+    return LinearModel(
+        members,
+        np.concatenate([base.mean, np.zeros(added)]),
+        np.concatenate([base.sd, np.ones(added)]),
+        np.concatenate([base.low, -free]),
+        np.concatenate([base.high, free]),
+    )

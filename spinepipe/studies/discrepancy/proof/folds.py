@@ -2,15 +2,20 @@
 
 A test is left out in all specimens at once. A left-out specimen has stiffness of its own, so every
 second load step of its tests is given away to fit that, and the others are predicted; then swapped.
+
+Readings of chosen load steps alone, and their whitening.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.discrepancy.readings import SpecimenReadings
+from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening
 
 Steps = Mapping[str, tuple[NDArray[np.bool_], ...]]
 """Load steps (T,) of each test, by specimen."""
@@ -94,3 +99,42 @@ def _all(one: SpecimenReadings) -> tuple[NDArray[np.bool_], ...]:
 
 def _every_second(one: SpecimenReadings, first: int) -> tuple[NDArray[np.bool_], ...]:
     return tuple(np.arange(len(case.steps)) % 2 == first for case in one.cases)
+
+
+Flags = NDArray[np.bool_]
+
+Masks = Mapping[str, tuple[Flags, ...]]
+"""Readings of each test, (T, J, 6), by specimen."""
+
+
+def only(test: Repeats, chosen: Flags) -> Repeats:
+    """A test with the readings of some load steps (T,), or of some places (T, J, 6), alone."""
+    there = chosen[:, None, None] if chosen.ndim == 1 else chosen
+    return replace(test, cycles=np.where(there, test.cycles, np.nan))
+
+
+class Chosen:
+    """Whitenings of chosen load steps of a test; each is made once."""
+
+    def __init__(self, readings: Mapping[str, SpecimenReadings], noise: Noise) -> None:
+        self.readings, self.noise = readings, noise
+        self._known: dict[tuple[str, int, bytes], Whitening] = {}
+
+    def whitening(self, specimen: str, test: int, chosen: Flags) -> Whitening:
+        """Of one test of a specimen."""
+        key = (specimen, test, chosen.tobytes())
+        if key not in self._known:
+            masked = only(self.readings[specimen].tests[test], chosen)
+            self._known[key] = whitening((masked,), self.noise)
+        return self._known[key]
+
+    def mean(self, specimen: str, test: int) -> Array:
+        """(T, J, 6) mean over the cycles, 0 where nothing was read."""
+        return np.nan_to_num(self.readings[specimen].tests[test].mean)
+
+    def sd(self, specimen: str, test: int) -> Array:
+        """(T, J, 6) SD of the mean over the cycles, 0 where nothing was read."""
+        count = self.readings[specimen].tests[test].count
+        size = np.sqrt(np.diagonal(self.noise.correlations(len(count))))
+        sd = size[:, None, None] * self.noise.sd / np.sqrt(np.maximum(count, 1))
+        return np.where(count > 0, sd, 0.0)

@@ -1,35 +1,216 @@
 """Held-out confirmation: base, model with effects and surrogate on readings no fit has seen.
 
 By default folds are fitted in the linear models around the full fits, which costs next to nothing.
+
+Scores of a fold: what predictions miss of readings that were left out, in noise SD.
+
+Motion of each reading as predicted by a fit that did not see it.
+
+Held-out confirmation as data: folds, margins, and what they say together.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from spinepipe.discrepancy.found import Found
-from spinepipe.discrepancy.gaps import Gap
-from spinepipe.discrepancy.proof.fold_models import FoldModels, Predictions
-from spinepipe.discrepancy.proof.fold_refit import NoFold
-from spinepipe.discrepancy.proof.fold_scores import pooled, scored_gap
-from spinepipe.discrepancy.proof.folds import (
+from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.proof.fold_linear import Placed
+from spinepipe.studies.discrepancy.proof.fold_models import FoldModels, NoFold, Predictions
+from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
+    Chosen,
+    Flags,
     Fold,
+    Masks,
     folds_by_specimen,
     folds_by_test,
     step_fold,
 )
-from spinepipe.discrepancy.proof.held_out_motion import HeldOutMotion, fill, nothing_held_out
-from spinepipe.discrepancy.proof.held_out_rows import (
-    NO_FIT,
-    NOT_DETERMINED,
-    SCORED,
-    FoldRow,
-    HeldOut,
-    Margin,
-)
-from spinepipe.discrepancy.tasks import Run
+from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.inquiry import Found
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.store import Run
+
+
+def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
+    """The gap over the scored readings of all parts, noise whitened within each test."""
+    white = [
+        _missed(chosen, name, test, there, placed)
+        for scored, placed in parts
+        for name, tests in scored.items()
+        for test, there in enumerate(tests)
+        if there.any()
+    ]
+    residual = np.concatenate([np.zeros(0), *white])
+    return Gap(float(residual @ residual), float(len(residual)), len(residual))
+
+
+def _missed(chosen: Chosen, specimen: str, test: int, there: Flags, placed: Placed) -> Array:
+    """(N,) residuals with SD one and independent where only noise is left."""
+    predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
+    errors = chosen.mean(specimen, test) - predicted
+    return chosen.whitening(specimen, test, there).noise_only([errors])
+
+
+def pooled(gaps: Sequence[Gap]) -> Gap | None:
+    """All together; None of none."""
+    if not gaps:
+        return None
+    return Gap(
+        sum(gap.chi2 for gap in gaps),
+        sum(gap.dof for gap in gaps),
+        sum(gap.readings for gap in gaps),
+    )
+
+
+@dataclass(frozen=True)
+class HeldOutMotion:
+    """A specimen's motion, per test (T, J, 6) m and rad; NaN where nothing was held out.
+
+    Attributes
+    ----------
+    fold : number of the fold, -1 for none. base, with_effects : of the models alone.
+    """
+
+    fold: tuple[NDArray[np.int64], ...]
+    base: tuple[Array, ...]
+    with_effects: tuple[Array, ...]
+
+
+def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
+    """Empty sheets, to be filled by `fill`."""
+    return {name: _empty(one) for name, one in readings.items()}
+
+
+def _empty(one: SpecimenReadings) -> HeldOutMotion:
+    shapes = [test.count.shape for test in one.tests]
+    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
+    return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
+
+
+def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -> None:
+    """Enter a part's scored readings, where no earlier fold has."""
+    for name, tests in found.scored.items():
+        sheet = sheets[name]
+        columns = (
+            (sheet.base, found.base.motion[name]),
+            (sheet.with_effects, found.with_effects.motion[name]),
+        )
+        for test, there in enumerate(tests):
+            new = there & (sheet.fold[test] < 0)
+            sheet.fold[test][new] = number
+            for column, values in columns:
+                column[test][new] = values[test][new]
+
+
+SAME = 1e-6
+"""Share of chi2 by which predictions that hang on nothing that was scored may differ."""
+
+SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
+
+
+@dataclass(frozen=True)
+class FoldRow:
+    """A fold: how large the discrepancy of its readings is, in noise SD.
+
+    Attributes
+    ----------
+    kind : test, specimen or steps. readings : scored. left_out : scored or not.
+    base, with_effects : None where nothing was scored; the same where no effect is named.
+    surrogate : None where there is none. status : scored, not determined or no fit.
+    expected : chi2 of a model that is right: noise, and nuisances that the training left open.
+    """
+
+    name: str
+    kind: str
+    readings: int
+    left_out: int
+    base: Gap | None
+    with_effects: Gap | None
+    surrogate: Gap | None
+    expected: float
+    status: str
+    message: str
+
+    @property
+    def closed(self) -> float | None:
+        """Share of the base's excess that the effects close; None where noise hides the excess."""
+        return closed(self.base, self.with_effects, self.expected)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """By how much chi2 a model is better than another, over all folds; SE from three folds on."""
+
+    chi2: float
+    se: float | None
+
+    @property
+    def beats(self) -> bool:
+        """Whether the model is the better one."""
+        return self.chi2 > 0.0
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """All folds, and what they say together.
+
+    Attributes
+    ----------
+    motion : by specimen. base, with_effects, surrogate : over all scored readings; None of none.
+    expected : chi2 of a model that is right: noise, and nuisances that training left open.
+    over_base, over_surrogate : margins of the model with effects; None where nothing compares.
+    """
+
+    folds: tuple[FoldRow, ...]
+    motion: Mapping[str, HeldOutMotion]
+    base: Gap | None
+    with_effects: Gap | None
+    surrogate: Gap | None
+    expected: float
+    over_base: Margin | None
+    over_surrogate: Margin | None
+
+    @property
+    def closed(self) -> float | None:
+        """Share of the base's excess that the effects close; None where noise hides the excess."""
+        return closed(self.base, self.with_effects, self.expected)
+
+    def of_base(self) -> "HeldOut":
+        """The base in the place of the model with effects."""
+        folds = tuple(replace(row, with_effects=row.base) for row in self.folds)
+        motion = {name: replace(one, with_effects=one.base) for name, one in self.motion.items()}
+        return replace(self, folds=folds, motion=motion, with_effects=self.base)
+
+    @property
+    def tells(self) -> bool:
+        """Whether any scored reading is predicted otherwise with the effects than without."""
+        if self.over_base is None:
+            return False
+        return abs(self.over_base.chi2) > (SAME * self.base.chi2 if self.base else 0.0)
+
+    @property
+    def beats_base(self) -> bool:
+        """Whether the effects predict better than the base alone."""
+        return self.over_base is not None and self.over_base.beats
+
+    @property
+    def beats_surrogate(self) -> bool:
+        """Whether the effects predict better than a surrogate without physics."""
+        return self.over_surrogate is not None and self.over_surrogate.beats
+
+
+def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
+    """(chi2 of base - chi2 of new) / (chi2 of base - expected), at most 1.
+
+    None where noise, or nuisances that the training left open, may be all that the base misses.
+    """
+    if base is None or new is None or base.interval[0] <= 0.0 or base.chi2 <= expected:
+        return None
+    return min((base.chi2 - new.chi2) / (base.chi2 - expected), 1.0)
+
 
 FEWEST_FOLDS = 3
 """Folds from which a margin has a standard error."""
@@ -135,6 +316,3 @@ def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
     enough = len(drops) >= FEWEST_FOLDS
     se = float(np.sqrt(len(drops)) * np.std(drops, ddof=1)) if enough else None
     return Margin(float(drops.sum()), se)
-
-
-__all__ = ["Asked", "FoldRow", "HeldOut", "Margin", "held_out", "together"]

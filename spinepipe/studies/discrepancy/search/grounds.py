@@ -3,18 +3,17 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from spinepipe.discrepancy.hypothesis import Hypothesis, Supposed, hypothesis
-from spinepipe.discrepancy.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.discrepancy.noise import REPEATS, Noise
-from spinepipe.discrepancy.noise_of_residuals import noise_of_residuals
-from spinepipe.discrepancy.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.discrepancy.prediction import Solved
-from spinepipe.discrepancy.readings import SpecimenReadings
-from spinepipe.discrepancy.tasks import Run
-from spinepipe.discrepancy.whitening import Whitening, whitening, with_nuisances
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics import FreeParameter
+from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Supposed, hypothesis
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
+from spinepipe.studies.discrepancy.search.noise import REPEATS, Noise, noise_of_residuals
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
+from spinepipe.studies.discrepancy.store import Run
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,221 @@
 """A hypothesis: the base and the effects that are said to be there, as models and unknowns.
 
 Unknowns are shared between specimens or of one; each moves rows of an effect's values.
+
+The base a study starts from: linear joints, shared by the levels or free, or a model file.
+
+Forms of an effect that a search tries: which variant, and how its values may differ where.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
 
 import numpy as np
 
-from spinepipe.discrepancy.forms import Form, Variant
-from spinepipe.effects import Spread
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import spine_model
+from spinepipe.effects import Effect, Parameter, Spread, Trial, create, registered
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import FreeParameter, declared
+from spinepipe.model.file import ModelFile, effects_for
+from spinepipe.statics import FreeParameter, declared, free_parameters
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+
+BUSHING = "linear_bushing"
+DAMPING = np.array([2000.0] * 3 + [10.0] * 3)
+"""N s/m and N m s/rad; poses at rest do not hang on it, only the verdict that they are stable."""
+
+
+def base_model(
+    cohort: Cohort,
+    readings: SpecimenReadings,
+    stiffness: Array,
+    file: ModelFile | None,
+) -> SpineModel:
+    """The model of a specimen where its fit starts: (6,) SI for all joints, or as in the file."""
+    joints = cohort.joint_names
+    if file is not None:
+        effects = effects_for(file, readings.specimen, joints)
+    else:
+        values = np.tile(stiffness, (len(joints), 1))
+        effects = (ScopedEffect(create(BUSHING), tuple(range(len(joints))), values),)
+    return spine_model(cohort, readings.specimen, readings.frames, effects, DAMPING)
+
+
+def base_parameters(
+    model: SpineModel, grouping: str, coordinates: Sequence[str]
+) -> tuple[FreeParameter, ...]:
+    """The stiffnesses that are fitted along with everything: of the coordinates that are read.
+
+    A model file's bushings keep the ratios of their joints: ``per_specimen`` moves them together.
+    """
+    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in coordinates]
+    bushings = [
+        index for index, scoped in enumerate(model.effects) if scoped.effect.name == BUSHING
+    ]
+    return tuple(
+        parameter
+        for index in bushings
+        for parameter in free_parameters(model, index, names, grouping)
+    )
+
+
+def bushing_stiffness(model: SpineModel) -> Array:
+    """(J, 6) N/m and N m/rad, of all linear bushings of each joint together."""
+    total = np.zeros((model.n_joints, len(COORDINATES)))
+    for scoped in model.effects:
+        if scoped.effect.name == BUSHING:
+            total[list(scoped.joints)] += scoped.values
+    return total
+
+
+SHAPE_SDS = (-1.0, 0.0, 1.0)
+"""Prior SDs from its default at which a parameter of shape is tried before it is fitted."""
+
+Options = tuple[tuple[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """An effect with its options, apart from where it acts."""
+
+    effect: str
+    options: Options
+
+    def create(self) -> Effect:
+        """The effect itself."""
+        return create(self.effect, dict(self.options))
+
+    @property
+    def strengths(self) -> tuple[int, ...]:
+        """Columns of the parameters that switch the effect on."""
+        return _columns(self.create(), strengths=True)
+
+    @property
+    def shapes(self) -> tuple[int, ...]:
+        """Columns of the parameters of shape."""
+        return _columns(self.create(), strengths=False)
+
+    def off(self, sds: Sequence[float]) -> Array:
+        """(P,) values with all strengths off and shapes that many prior SDs from their default."""
+        effect = self.create()
+        values = np.array([p.default if p.off is None else p.off for p in effect.parameters])
+        for column, sd in zip(self.shapes, sds, strict=True):
+            values[column] = shape_at(effect.parameters[column], sd)
+        return values
+
+
+@dataclass(frozen=True)
+class Form:
+    """A variant and how its values may differ; joint, specimen and test for one place only."""
+
+    variant: Variant
+    spread: Spread
+    joint: int | None = None
+    specimen: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.variant.effect
+
+    def acts_in(self, specimen: str) -> bool:
+        """Whether a specimen has the effect."""
+        return self.specimen in (None, specimen)
+
+
+@dataclass(frozen=True)
+class Trials:
+    """All that is tried of one effect."""
+
+    effect: str
+    variants: tuple[Variant, ...]
+    forms: tuple[Form, ...]
+
+    def log_share(self, form: Form) -> float:
+        """Logarithm of a form's share of its effect: equal for variants, ways to differ, places."""
+        spreads = len({one.spread for one in self.forms})
+        like = [f for f in self.forms if (f.variant, f.spread) == (form.variant, form.spread)]
+        return -float(np.log(len(self.variants) * spreads * max(len(like), 1)))
+
+
+def shape_at(parameter: Parameter, sds: float) -> float:
+    """Value of a shape that many prior SDs from its default, inside its bounds."""
+    away = sds * parameter.prior_scale
+    value = parameter.default * np.exp(away) if parameter.logarithmic else parameter.default + away
+    return float(np.clip(value, parameter.low, parameter.high))
+
+
+def shape_grid(variant: Variant) -> list[tuple[float, ...]]:
+    """Prior SDs of the shapes at which a variant is tried; one empty point without shapes."""
+    return list(product(SHAPE_SDS, repeat=len(variant.shapes)))
+
+
+def trials(
+    names: Sequence[str] | None, coordinates: Sequence[str], specimens: Sequence[str], joints: int
+) -> tuple[Trials, ...]:
+    """What is tried of each effect that may be missing, in alphabetical order.
+
+    Parameters
+    ----------
+    names : effects to try; None for all that declare how. coordinates : those with readings.
+    """
+    found = []
+    for name, cls in sorted(registered().items()):
+        trial: Trial | None = getattr(cls, "trial", None)
+        if trial is not None and (names is None or name in names):
+            every = (Variant(name, _options(options)) for options in trial.variants)
+            variants = tuple(variant for variant in every if _is_read(variant, coordinates))
+            forms = [
+                form
+                for variant in variants
+                for spread in _possible(trial.spreads, len(specimens))
+                for form in _forms(variant, spread, specimens, joints)
+            ]
+            if variants:
+                found.append(Trials(name, variants, tuple(forms)))
+    return tuple(found)
+
+
+def _is_read(variant: Variant, coordinates: Sequence[str]) -> bool:
+    """Whether a variant acts on coordinates with readings, as far as it says on which."""
+    options = dict(variant.options)
+    named = [c for c in (options.get("coordinate"), *options.get("pair", ())) if c in COORDINATES]
+    return not named or bool(set(named) & set(coordinates))
+
+
+def _options(options: Mapping[str, Any]) -> Options:
+    return tuple(
+        (key, tuple(value) if isinstance(value, list) else value) for key, value in options.items()
+    )
+
+
+def _possible(spreads: Sequence[Spread], specimens: int) -> list[Spread]:
+    """With one specimen, what is shared by all specimens and what is of one are the same."""
+    if specimens > 1:
+        return list(spreads)
+    same = {
+        Spread.BY_SPECIMEN: Spread.SHARED,
+        Spread.EACH: Spread.BY_JOINT,
+        Spread.ONE: Spread.ONE_JOINT,
+    }
+    return list(dict.fromkeys(same.get(spread, spread) for spread in spreads))
+
+
+def _forms(variant: Variant, spread: Spread, specimens: Sequence[str], joints: int) -> list[Form]:
+    if spread is Spread.ONE_JOINT:
+        return [Form(variant, spread, joint) for joint in range(joints)]
+    if spread is Spread.ONE:
+        return [Form(variant, spread, j, s) for s in specimens for j in range(joints)]
+    return [Form(variant, spread)]
+
+
+def _columns(effect: Effect, *, strengths: bool) -> tuple[int, ...]:
+    return tuple(c for c, p in enumerate(effect.parameters) if (p.off is not None) == strengths)
+
 
 LOG_STIFFNESS_SD = 3.0
 """Prior SD of the logarithm of a base stiffness: it only keeps what no test tells from running."""

@@ -1,14 +1,156 @@
-"""A search at work: its rules, how its pieces are run, and what it has looked at so far."""
+"""A search at work: its rules, how its pieces are run, and what it has looked at so far.
 
-from spinepipe.discrepancy.found import Rules, Stage
-from spinepipe.discrepancy.grounds import Grounds
-from spinepipe.discrepancy.hypothesis import Supposed
-from spinepipe.discrepancy.joint_fit import JointFit, joint_fit
-from spinepipe.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
-from spinepipe.discrepancy.refit import Refit, refit, refits
-from spinepipe.discrepancy.rounds import look
-from spinepipe.discrepancy.screen import Screen
-from spinepipe.discrepancy.tasks import Run
+What a search may do, and where it ended.
+
+One round of a search: all effects screened at where the fit stands.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Supposed, Trials
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
+from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.projected import (
+    Linearised,
+    Products,
+    columns_of,
+    drawn,
+    linearised,
+    products,
+    signatures,
+    taken_out,
+)
+from spinepipe.studies.discrepancy.search.refit import Refit, refit, refits
+from spinepipe.studies.discrepancy.search.screen import Index, Screen, screen, screened
+from spinepipe.studies.discrepancy.store import Run
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a search may do. ``draws`` of the null; ``margin`` of log evidence over a rival."""
+
+    trials: tuple[Trials, ...]
+    coordinates: tuple[str, ...]
+    false_alarm: float
+    draws: int
+    margin: float
+    most_effects: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of a named one, and by how much evidence it is behind."""
+
+    name: str
+    margin: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A form that stands in the final model.
+
+    Attributes
+    ----------
+    log_evidence : beside the others. alone : of its effect on the first screen, beside none.
+    over_stiffness : how far its evidence is above that of a stiffness of its own for each joint of
+        each specimen, where the form differs between joints as well; None elsewhere.
+    """
+
+    supposed: Supposed
+    log_evidence: float
+    alone: float
+    gain: float
+    rivals: tuple[Rival, ...]
+    over_stiffness: float | None
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.supposed.form.name
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One look at the effects, with the refits that followed.
+
+    ``name`` : number of the round, or whose place all others were tried in.
+    """
+
+    name: str
+    screen: Screen
+    refits: tuple[Refit, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    base, final : the grounds with the base alone and with what stands. standing : what stands.
+    lack : the generic basis beside the final model.
+    generic_threshold : evidence of the generic basis that the null seldom exceeds.
+    """
+
+    base: Grounds
+    final: Grounds
+    standing: tuple[Standing, ...]
+    stages: tuple[Stage, ...]
+    lack: LackOfFit
+    generic_threshold: float
+    base_gap: Gap
+    final_gap: Gap
+
+
+def look(
+    grounds: Grounds,
+    trials: Sequence[Trials],
+    draws: int,
+    false_alarm: float,
+    seed: int,
+    threshold: float | None = None,
+) -> Screen:
+    """Evidence of every effect beside those of the fit, with base and nuisances taken out.
+
+    Parameters
+    ----------
+    threshold : as known already; then no draws of the null are needed.
+    """
+    number = draws if threshold is None else 0
+    problems = linearised_for(grounds, trials, number, seed)
+    found = [
+        screened(one, index, problem, tuple(grounds.readings), grounds.tests)
+        for one, (index, problem) in zip(trials, problems, strict=True)
+    ]
+    return screen(found, false_alarm, threshold)
+
+
+def linearised_for(
+    grounds: Grounds, trials: Sequence[Trials], draws: int, seed: int
+) -> list[tuple[Index, Linearised]]:
+    """The products of each effect's signatures; draws of the null are the same for all effects."""
+    joints = next(iter(grounds.fit.models.values())).n_joints
+    columns = [columns_of(one, joints, grounds.tests) for one in trials]
+    taken = taken_out(grounds.fit)
+    parts: list[dict[str, Products]] = [{} for _ in trials]
+    for number, (name, one) in enumerate(grounds.readings.items()):
+        solved = Solved(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
+        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
+        for place, of_effect in zip(parts, columns, strict=True):
+            plain = grounds.plain[name].noise_only(signatures(solved, of_effect))
+            white = grounds.setting.whitenings[name].shortened(plain)
+            place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
+    return [
+        (Index(of_effect), linearised(place))
+        for of_effect, place in zip(columns, parts, strict=True)
+    ]
 
 
 class Inquiry:

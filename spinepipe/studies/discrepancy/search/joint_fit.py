@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from spinepipe.discrepancy.hypothesis import STRENGTH_SDS, Hypothesis, Unknown
-from spinepipe.discrepancy.prediction import NoEquilibrium, Predicted, Simulated
-from spinepipe.discrepancy.readings import SpecimenReadings
-from spinepipe.discrepancy.whitening import Whitening
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
+from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS, Hypothesis, Unknown
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Predicted, Simulated
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 MOST_EVALUATIONS = 40
 

@@ -10,11 +10,10 @@ from itertools import combinations
 
 import numpy as np
 
-from spinepipe.discrepancy.base import bushing_stiffness
-from spinepipe.discrepancy.forms import Variant
-from spinepipe.discrepancy.prediction import Solved
-from spinepipe.discrepancy.signatures import EVERY_TEST, Column, signatures
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.hypothesis import Variant, bushing_stiffness
+from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Column, signatures
 from spinepipe.units import COORDINATES, ROTATIONS
 
 

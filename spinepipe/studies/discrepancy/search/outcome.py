@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from spinepipe.discrepancy.found import Found, Standing
-from spinepipe.discrepancy.mistakes.suspected import SuspectedError
-from spinepipe.discrepancy.proof.folds import TEST
-from spinepipe.discrepancy.proof.held_out import HeldOut
-from spinepipe.discrepancy.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
+from spinepipe.studies.discrepancy.proof.folds import TEST
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 
 UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""

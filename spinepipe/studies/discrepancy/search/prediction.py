@@ -8,7 +8,6 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import (
-    Chain,
     FreeParameter,
     SolvedStep,
     System,
@@ -19,6 +18,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
+from spinepipe.world import Chain
 
 
 class NoEquilibrium(RuntimeError):

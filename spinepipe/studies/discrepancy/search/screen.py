@@ -2,18 +2,180 @@
 
 An effect's evidence is averaged over its variants, shapes and ways to differ, each with an equal
 share, so that no effect is favoured by its place or by its number of variants.
+
+Evidence for a group of strengths in a linearised problem, against none of them.
+
+Readings are whitened, base and nuisances projected out: residual r, signatures F in prior SDs of
+the strengths. With strengths ~ N(0, t^2) the evidence (log of the ratio of marginal likelihoods) is
+1/2 sum [ t^2 b^2 / (1 + t^2 l) - log(1 + t^2 l) ] over the eigenvalues l of F'F, b the components
+of F'r; t is averaged over a few sizes. Strengths of one sign have half a normal as prior.
+
+The strengths of a form as a group in the linearised problem: which columns each one sums.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp
 
-from spinepipe.discrepancy.forms import Form, Trials, shape_grid
-from spinepipe.discrepancy.groups import Index, Summed, summed
-from spinepipe.discrepancy.projected import Linearised
+from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
+from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Column, Linearised
+
+SIZES = np.array([0.1, 0.3, 1.0, 3.0])
+"""Sizes of strengths, in declared prior SDs, that are held equally likely."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Strengths that share a size: eigenvalues (k,) and vectors (k, k) of their F'F.
+
+    ``signs`` (k,): the side of off that bounds allow, 0 for both.
+    """
+
+    eigenvalues: Array
+    vectors: Array
+    signs: Array
+
+    @classmethod
+    def of(cls, gram: Array, signs: Array) -> "Group":
+        """The group with F'F (k, k)."""
+        values, vectors = np.linalg.eigh(gram)
+        return cls(np.maximum(values, 0.0), vectors, signs)
+
+    def log_evidence(self, moments: Array) -> Array:
+        """(D,) evidence for F'r of each draw, (k, D)."""
+        components = self.vectors.T @ moments
+        found = []
+        for size in SIZES:
+            variance = 1.0 / (size**-2.0 + self.eigenvalues)
+            gain = 0.5 * np.sum(variance[:, None] * components**2, axis=0)
+            cost = 0.5 * np.sum(np.log1p(size**2 * self.eigenvalues))
+            found.append(gain - cost + self._one_sided(variance, components))
+        return np.asarray(logsumexp(np.stack(found), axis=0) - np.log(len(SIZES)))
+
+    def _one_sided(self, variance: Array, components: Array) -> Array:
+        """(D,) what the signs add: twice the posterior's share on the allowed side, each."""
+        there = self.signs != 0.0
+        if not there.any():
+            return np.zeros(components.shape[1])
+        mean = (self.vectors @ (variance[:, None] * components))[there]
+        sd = np.sqrt(np.einsum("ij,j,ij->i", self.vectors, variance, self.vectors))[there]
+        sides = self.signs[there, None] * mean / sd[:, None]
+        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=0))
+
+    def estimate(self, moments: Array) -> Array:
+        """(k,) strengths, in prior SDs, that explain most, shrunk a little where nothing tells."""
+        inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)
+        found: Array = self.vectors @ (inverse * (self.vectors.T @ moments))
+        return np.where(self.signs * found < 0.0, 0.0, found)
+
+
+Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
+"""(specimen, columns (c,), strength (c,) that each column belongs to)."""
+
+
+@dataclass(frozen=True)
+class Summed:
+    """A form at one shape: its strengths' Gram matrix (k, k), moments (k, D + 1) and signs (k,).
+
+    Attributes
+    ----------
+    strengths : (k,) column of the effect's values that each strength is of.
+    """
+
+    form: Form
+    sds: tuple[float, ...]
+    strengths: tuple[int, ...]
+    gram: Array
+    moments: Array
+    group: Group
+
+
+class Index:
+    """Columns of one effect by variant, shape, test and joint."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self._at: dict[tuple[object, ...], list[int]] = {}
+        for number, c in enumerate(columns):
+            self._at.setdefault((c.variant, c.sds, c.test, c.joint, c.strength), []).append(number)
+        self.columns = tuple(columns)
+
+    def places(
+        self, form: Form, sds: tuple[float, ...], specimens: Sequence[str], tests: Sequence[str]
+    ) -> tuple[Places, tuple[int, ...]]:
+        """Columns of a form in each specimen, and for each strength the value's column."""
+        keys: dict[tuple[object, ...], int] = {}
+        found = []
+        for specimen in specimens:
+            if form.acts_in(specimen):
+                columns, owners = [], []
+                for number, key in self._of(form, sds, specimen, tests):
+                    columns.append(number)
+                    owners.append(keys.setdefault(key, len(keys)))
+                found.append((specimen, np.array(columns), np.array(owners)))
+        return tuple(found), tuple(int(key[0]) for key in keys)  # type: ignore[call-overload]
+
+    def _of(
+        self, form: Form, sds: tuple[float, ...], specimen: str, tests: Sequence[str]
+    ) -> list[tuple[int, tuple[object, ...]]]:
+        """Columns and which strength each belongs to."""
+        spread = form.spread
+        by_specimen = spread in (Spread.BY_SPECIMEN, Spread.EACH)
+        by_joint = spread in (Spread.BY_JOINT, Spread.EACH)
+        wanted = tests if spread is Spread.BY_TEST else (EVERY_TEST,)
+        found: list[tuple[int, tuple[object, ...]]] = []
+        for (variant, at, test, joint, strength), numbers in self._at.items():
+            if (variant, at) != (form.variant, sds) or test not in wanted:
+                continue
+            if form.joint is None or joint == form.joint:
+                key = (
+                    strength,
+                    specimen if by_specimen else None,
+                    joint if by_joint else None,
+                    test if spread is Spread.BY_TEST else None,
+                )
+                found += [(number, key) for number in numbers]
+        return found
+
+    def signs(self, form: Form, places: Places, count: int) -> Array:
+        """(k,) side of off that each strength's bounds allow."""
+        parameters = form.variant.create().parameters
+        signs = np.zeros(count)
+        for _, columns, owners in places:
+            for column, owner in zip(columns, owners, strict=True):
+                signs[owner] = parameters[self.columns[column].strength].side
+        return signs
+
+
+def summed(
+    index: Index,
+    problem: Linearised,
+    form: Form,
+    sds: tuple[float, ...],
+    specimens: Sequence[str],
+    tests: Sequence[str],
+) -> Summed:
+    """A form's strengths at one shape."""
+    places, strengths = index.places(form, sds, specimens, tests)
+    count = len(strengths)
+    draws = problem.moments_shared.shape[1]
+    gram, moments = np.zeros((count, count)), np.zeros((count, draws))
+    coupled = np.zeros((count, len(problem.gram_shared)))
+    for specimen, columns, owners in places:
+        onto = np.zeros((count, len(columns)))
+        onto[owners, np.arange(len(columns))] = 1.0
+        part = problem.of[specimen]
+        gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
+        moments += onto @ part.moments[columns]
+        coupled += onto @ part.shared[columns]
+    gram, moments = problem.without_shared(gram, moments, coupled)
+    signs = index.signs(form, places, count)
+    return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))
+
 
 LEAST_THRESHOLD = 5.0
 """Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""

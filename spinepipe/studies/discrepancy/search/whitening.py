@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.discrepancy.noise import Noise
-from spinepipe.discrepancy.readings import Repeats
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.noise import Noise
+from spinepipe.studies.discrepancy.search.readings import Repeats
 
 
 @dataclass(frozen=True)

@@ -9,21 +9,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.global_sensitivity.measures import NAME, Measures, measures_of, unit_of
-from spinepipe.report.global_sensitivity.panels import (
+from spinepipe.report.panels import explain_marks, log_ticks
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, saying
+from spinepipe.studies.global_sensitivity.figures.panels import (
+    NAME,
+    OUTPUT,
+    Measures,
     Panel,
+    factor_name,
     leading,
+    measures_of,
+    no_index,
     outputs,
     pooled,
+    sections_of,
     shown,
+    title,
+    unit_of,
     with_results,
 )
-from spinepipe.report.global_sensitivity.titles import no_index, sections_of, title
-from spinepipe.report.global_sensitivity.words import OUTPUT, factor_name
-from spinepipe.report.layout import explain_marks
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, saying
-from spinepipe.studies.global_sensitivity import DUMMY
+from spinepipe.studies.global_sensitivity.settings import DUMMY
 
 MOST_PANELS = 9
 _LOOKS = (
@@ -71,10 +76,19 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
     rows = pooled(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
     for name, look in looks.items():
         one = rows[rows["factor"] == name]
-        axis.fill_between(one["runs"], one["low"], one["high"], color=look["color"], alpha=0.18,
-                          lw=0, zorder=2)  # fmt: skip
-        axis.plot(one["runs"], one["estimate"], ms=2.8, mew=0.6, lw=1.0, zorder=3,
-                  label=factor_name(name), **look)  # fmt: skip
+        axis.fill_between(
+            one["runs"], one["low"], one["high"], color=look["color"], alpha=0.18, lw=0, zorder=2
+        )
+        axis.plot(
+            one["runs"],
+            one["estimate"],
+            ms=2.8,
+            mew=0.6,
+            lw=1.0,
+            zorder=3,
+            label=factor_name(name),
+            **look,
+        )
     axis.axhline(0.0, color=BLACK, lw=0.5, zorder=1)
     axis.set_xscale("log")
     log_ticks(axis.xaxis, float(rows["runs"].min()), float(rows["runs"].max()))
@@ -83,8 +97,9 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
     axis.set_ylabel(f"{NAME[measures.main]}{unit}")
     axis.tick_params(axis="y", length=2.5)
     _limit(axis, rows[rows["factor"].isin(list(looks))])
-    axis.legend(loc="upper right", fontsize=SMALL_PT, handlelength=2.2, labelspacing=0.25,
-                borderaxespad=0.0)  # fmt: skip
+    axis.legend(
+        loc="upper right", fontsize=SMALL_PT, handlelength=2.2, labelspacing=0.25, borderaxespad=0.0
+    )
 
 
 def _limit(axis: Axes, rows: pd.DataFrame) -> None:

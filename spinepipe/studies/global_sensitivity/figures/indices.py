@@ -1,4 +1,7 @@
-"""Figure: what each output hangs on, factor by factor, beside the noise floor."""
+"""Figure: what each output hangs on, factor by factor, beside the noise floor.
+
+Which factors have a row in the figure: those with an effect, and the dummy below them.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,26 +13,75 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.global_sensitivity.drawn_factors import drawn_factors
-from spinepipe.report.global_sensitivity.measures import (
+from spinepipe.report.panels import MOST_ACROSS, explain_marks
+from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
+from spinepipe.report.words import count, number
+from spinepipe.studies.global_sensitivity.figures.panels import (
     COLORS,
     NAME,
+    OUTPUT,
     Measures,
-    measures_of,
-    unit_of,
-)
-from spinepipe.report.global_sensitivity.panels import (
     Panel,
     above_floor,
+    factor_name,
+    leading,
+    measures_of,
+    no_index,
     outputs,
     pooled,
+    sections_of,
     shown,
+    title,
+    told,
+    unit_of,
 )
-from spinepipe.report.global_sensitivity.titles import no_index, sections_of, title, told
-from spinepipe.report.global_sensitivity.words import OUTPUT, factor_name
-from spinepipe.report.layout import explain_marks
-from spinepipe.report.sections import MOST_ACROSS
-from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
+from spinepipe.studies.global_sensitivity.settings import DUMMY
+
+MOST, FEWEST = 24, 6
+SMALL = 0.01
+"""Part of a panel's largest index below which an effect cannot be seen in a picture."""
+
+
+def drawn_factors(found: Sequence[Panel], measures: Measures) -> tuple[list[str], str]:
+    """Factors from the top down, and what is said of those that are not drawn."""
+    order = leading(found, measures)
+    own = [name for name in order if name != DUMMY]
+    seen = _seen(found, measures)
+    worth = [name for name in own if name in seen][:MOST]
+    kept = worth if len(worth) >= FEWEST else _filled(worth, own)
+    drawn = kept + [DUMMY] * (DUMMY in order)
+    return drawn, _of_others([name for name in own if name not in kept], found, measures)
+
+
+def _filled(worth: Sequence[str], own: Sequence[str]) -> list[str]:
+    """The fewest rows, in their order."""
+    others = [name for name in own if name not in worth][: FEWEST - len(worth)]
+    return [name for name in own if name in worth or name in others]
+
+
+def _seen(found: Sequence[Panel], measures: Measures) -> set[str]:
+    """Factors that are above the floor, where there is one, and not small, in any panel."""
+    names: set[str] = set()
+    for panel in found:
+        main = panel.rows[panel.rows["index"] == measures.main]
+        means = pooled(main, ["factor"]).set_index("factor")["estimate"]
+        large = set(means.index[means >= SMALL * means.max()])
+        floor = main["noise_floor"].notna().any()
+        names |= large & above_floor(main) if floor else large
+    return names
+
+
+def _of_others(names: Sequence[str], found: Sequence[Panel], measures: Measures) -> str:
+    rows = pd.concat([panel.rows for panel in found])
+    left = rows[rows["factor"].isin(list(names)) & (rows["index"] == measures.main)]
+    if left.empty:
+        return ""
+    many, largest = count(len(names), "more factor"), float(left["estimate"].max())
+    if largest <= 0.0:
+        return f"{many} without any effect"
+    size = "small" if measures.in_units else f"at most {number(largest, 2)}"
+    return f"{many}, {size}, only in the table"
+
 
 _ROW_MM, _LEAST_ROW_MM, _AROUND_MM, _KEY_MM = 5.0, 3.0, 17.0, 18.0
 _BARS = 0.78
@@ -117,14 +169,24 @@ def _bars(
     axis.barh(y, one["estimate"], height=height, color=color, lw=0, zorder=3)
     for at_y, low, high in zip(y, one["low"], one["high"], strict=True):
         if np.isfinite([low, high]).all():
-            axis.plot([low, high], [at_y, at_y], color=BLACK, lw=0.8, solid_capstyle="butt",
-                      zorder=4)  # fmt: skip
+            axis.plot(
+                [low, high], [at_y, at_y], color=BLACK, lw=0.8, solid_capstyle="butt", zorder=4
+            )
     if (one["places"] > 1).any():
         places = dict(zip(one.index, y, strict=True))
         far = rows["estimate"].abs() > _DOT_FROM * rows["estimate"].abs().max()
         dots = rows[rows["factor"].isin(one.index) & far]
-        axis.plot(dots["estimate"], dots["factor"].map(places), "o", ms=1.7, mfc=WHITE, mec=BLACK,
-                  mew=0.35, ls="", zorder=6)  # fmt: skip
+        axis.plot(
+            dots["estimate"],
+            dots["factor"].map(places),
+            "o",
+            ms=1.7,
+            mfc=WHITE,
+            mec=BLACK,
+            mew=0.35,
+            ls="",
+            zorder=6,
+        )
 
 
 def _floor(axis: Axes, rows: pd.DataFrame, color: str, main: bool) -> None:
@@ -179,8 +241,19 @@ def _handles(kept: Sequence[Panel], measures: Measures) -> list[Line2D | Patch]:
     if rows["ci_low"].notna().any():
         handles.append(Line2D([], [], color=BLACK, lw=0.8, label="interval"))
     if any(panel.places > 1 for panel in kept):
-        handles.append(Line2D([], [], marker="o", ms=2.5, mfc=WHITE, mec=BLACK, mew=0.4, lw=0,
-                              label="single joint"))  # fmt: skip
+        handles.append(
+            Line2D(
+                [],
+                [],
+                marker="o",
+                ms=2.5,
+                mfc=WHITE,
+                mec=BLACK,
+                mew=0.4,
+                lw=0,
+                label="single joint",
+            )
+        )
     if rows["noise_floor"].max() > 0.0:
         handles.append(
             Patch(

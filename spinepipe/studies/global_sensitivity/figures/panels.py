@@ -1,16 +1,152 @@
-"""Which outputs the figures show, and the rows of each."""
+"""Which outputs the figures show, and the rows of each.
 
-from collections.abc import Sequence
+Which coordinate a test loads, and at which step most: also of loads without a moment.
+
+Which indices a study has, and how they are called.
+
+What figures and sentences call outputs and factors.
+
+What stands above and below the panels of sensitivity figures.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.global_sensitivity.loaded import loaded
-from spinepipe.report.global_sensitivity.measures import Measures
-from spinepipe.report.global_sensitivity.words import OUTPUT
-from spinepipe.units import COORDINATES
+from spinepipe.cohort.specimen import joint_frames
+from spinepipe.report.marks import Array
+from spinepipe.report.panels import sections
+from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
+from spinepipe.report.words import AXIS, count, short, unit
+from spinepipe.studies.discrepancy.words import capital, plain
+from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
+
+_DRIVEN = ("right_bending", "left_rotation", "extension")
+"""Coordinate that a moment about x, y and z of ground drives."""
+
+
+def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
+    """Coordinate and step of a test's largest moment about the most cranial joint.
+
+    None where the cohort has no such test, or nothing turns that joint.
+    """
+    if cohort.loads is None or test not in cohort.tests:
+        return None
+    rows = cohort.loads[cohort.loads["test"] == test]
+    specimen = cohort.specimen_names[0]
+    own = rows[rows["specimen"].isin([specimen, "*"])]
+    rows = own if len(own) else rows
+    rows = rows[rows["cycle"].isna() | (rows["cycle"] == rows["cycle"].min())]
+    turning = _moments(rows, joint_frames(cohort, specimen)[-1].origin)
+    by_step = pd.DataFrame(turning).groupby(rows["step"].to_numpy()).sum()
+    size = np.linalg.norm(by_step, axis=1)
+    if not size.any():
+        return None
+    peak = int(size.argmax())
+    return _DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
+
+
+def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
+    """(n, 3) N m, ground: each row's moment and that of its force about a point."""
+    forces, moments, points_mm = (
+        loads[[f"{letter}{axis}_{unit}" for axis in "xyz"]].fillna(0.0).to_numpy(float)
+        for letter, unit in (("f", "n"), ("m", "nm"), ("p", "mm"))
+    )
+    return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Indices of one kind of design.
+
+    Attributes
+    ----------
+    main : the index that factors are put in order by. shown : those that are drawn, main first.
+    of_variance : whether they are shares of the output's variance.
+    in_units : whether they are in the output's unit.
+    """
+
+    main: str
+    shown: tuple[str, ...]
+    of_variance: bool = False
+    in_units: bool = False
+
+
+_KNOWN = (
+    Measures("ST", ("ST", "S1"), of_variance=True),
+    Measures("mu_star", ("mu_star", "sigma"), in_units=True),
+    Measures("PAWN", ("PAWN", "delta", "S1_RBD")),
+)
+NAME = {
+    "ST": "total index ST",
+    "S1": "first-order index S1",
+    "mu_star": "mean size of effects μ*",
+    "sigma": "SD of effects σ",
+    "PAWN": "PAWN",
+    "delta": "δ",
+    "S1_RBD": "S1 (RBD-FAST)",
+}
+COLORS = (BLUE, GREEN, VERMILLION)
+"""Of the shown indices, the main one first."""
+
+DONE = "done"
+
+
+def measures_of(indices: pd.DataFrame) -> Measures | None:
+    """The measures of a study's indices; None where none of them is known."""
+    names = set(indices["index"])
+    return next((known for known in _KNOWN if known.main in names), None)
+
+
+def unit_of(output: str, coordinate: str) -> str:
+    """Unit of an output as printed."""
+    along = coordinate in TRANSLATIONS
+    if output == "stiffness":
+        return "N/m" if along else "N m/rad"
+    if output == "joint_load":
+        return "N" if along else "N m"
+    return unit(coordinate)
+
+
+OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrated stiffness"}
+"""Outputs in their order."""
+
+_LONGEST = 34
+
+
+def factor_name(factor: str, longest: int = _LONGEST) -> str:
+    """``stiffness_L1L2_extension`` as ``stiffness L1L2 extension``."""
+    return f"{DUMMY} (no effect)" if factor == DUMMY else short(plain(factor), longest)
+
+
+def what(output: str, coordinate: str) -> str:
+    """``motion in flexion–extension``; a load along a rotation is a moment."""
+    return f"{kind(output, coordinate)} in {AXIS[coordinate].lower()}"
+
+
+def kind(output: str, coordinate: str) -> str:
+    """``motion``, ``force``, ``moment`` or ``stiffness``."""
+    if output == "joint_load":
+        return "force" if coordinate in TRANSLATIONS else "moment"
+    return output
+
+
+def where(test: str, joint: str) -> str:
+    """``flexion, L1L2``: what there is of them."""
+    return ", ".join(part for part in (capital(plain(test)), joint) if part)
+
+
+def whole(n: int) -> str:
+    """``20 480``."""
+    return f"{n:,}".replace(",", "\u2009")
+
 
 PLACE = ["specimen", "joint"]
 EVERY = "*"
@@ -149,3 +285,70 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
         every.append(rows.set_index("factor")["estimate"] / (largest or 1.0))
     mean = pd.concat(every).groupby(level=0, sort=False).mean()
     return [str(name) for name in mean.sort_values(ascending=False, kind="stable").index]
+
+
+def title(index: int, panel: Panel) -> str:
+    """Letter, test and joint, and below them the output."""
+    first = where(panel.test, panel.joint)
+    second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
+    return f"{chr(ord('a') + index)}   " + "\n".join(part for part in (first, second) if part)
+
+
+def sections_of(
+    kept: Sequence[Panel], heights_mm: Mapping[str, float], key_mm: float
+) -> tuple[list[Axes], Figure]:
+    """Axes of the panels, each output in lines of its own and of its own height."""
+    counts = {name: sum(panel.output == name for panel in kept) for name in OUTPUT}
+    lines = [(n, heights_mm[name]) for name, n in counts.items() if n]
+    parts, figure = sections(lines, key_mm)
+    return [axis for part in parts for axis in part], figure
+
+
+def no_index(rows: pd.DataFrame) -> Figure:
+    """A figure that says why there is nothing to show."""
+    why = rows.loc[rows["status"] != DONE, ["status", "message"]].drop_duplicates()
+    said = [str(row.message or row.status).replace("_", " ") for row in why.itertuples()]
+    reason = "; ".join(dict.fromkeys(said[:2])) or "there is no output"
+    return saying(f"No index can be shown: {reason}.")
+
+
+def told(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
+    """Below the panels: runs, what is together, the dummy, and what is only in the table."""
+    rows = pd.concat([panel.rows for panel in kept])
+    parts = [_runs(rows), _together(kept), _dummy(rows), _more(kept, found), not_drawn]
+    return "; ".join(part for part in parts if part) + "."
+
+
+def _runs(rows: pd.DataFrame) -> str:
+    least, most = int(rows["runs"].min()), int(rows["runs"].max())
+    runs = count(most, "run") if least == most else f"{whole(least)} to {count(most, 'run')}"
+    failed = int(rows["failed"].max())
+    lost = f", at most {failed} failed" if failed else ", none failed"
+    several = rows["specimen"].nunique() > 1
+    return f"{runs}{' of each specimen' if several else ''}{lost}"
+
+
+def _together(kept: Sequence[Panel]) -> str:
+    if all(panel.places < 2 for panel in kept):
+        return ""
+    rows = pd.concat([panel.rows for panel in kept])
+    specimens = rows["specimen"].nunique()
+    what_of = "joints" if specimens == 1 else f"joints of {specimens} specimens"
+    if set(rows["output"]) == {"stiffness"}:
+        what_of = f"{specimens} specimens"
+    return f"bars and lines: means over the {what_of}"
+
+
+def _dummy(rows: pd.DataFrame) -> str:
+    if DUMMY not in set(rows["factor"]):
+        return "no dummy, so no noise floor"
+    if rows["noise_floor"].fillna(0.0).max() <= 0.0:
+        return "the dummy's index is exactly 0 in this design"
+    return "grey names: above the noise floor in no panel"
+
+
+def _more(kept: Sequence[Panel], found: Sequence[Panel]) -> str:
+    there = {(panel.output, panel.test, panel.coordinate) for panel in kept}
+    if len(there) == len(found):
+        return ""
+    return f"{len(there)} of {len(found)} outputs, the others are in the table"

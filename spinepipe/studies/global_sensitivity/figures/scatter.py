@@ -1,6 +1,10 @@
-"""Figure: outputs of all runs over the values of the factors that lead."""
+"""Figure: outputs of all runs over the values of the factors that lead.
+
+Outputs run by run beside the factors' values.
+"""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -10,17 +14,125 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.discrepancy.words import capital
-from spinepipe.report.global_sensitivity.measures import NAME, Measures, measures_of, unit_of
-from spinepipe.report.global_sensitivity.panels import first_of, outputs
-from spinepipe.report.global_sensitivity.responses import TOP, Output, Values, output_of, running
-from spinepipe.report.global_sensitivity.titles import no_index
-from spinepipe.report.global_sensitivity.words import factor_name, what, where
-from spinepipe.report.layout import explain_marks
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.spread import Array
+from spinepipe.report.marks import Array
+from spinepipe.report.panels import explain_marks, log_ticks
 from spinepipe.report.style import BLUE, GREY, blank, saying
 from spinepipe.report.words import count, fixed, number
+from spinepipe.status import Status
+from spinepipe.studies.discrepancy.words import capital
+from spinepipe.studies.global_sensitivity.figures.panels import (
+    NAME,
+    Measures,
+    Panel,
+    factor_name,
+    first_of,
+    measures_of,
+    no_index,
+    outputs,
+    unit_of,
+    what,
+    where,
+)
+from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
+
+TOP = 3
+Values = Mapping[str, pd.Series]
+"""Value of each factor of the design by sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """One output of one joint.
+
+    Attributes
+    ----------
+    values : output by sample, in the unit of the tables.
+    factors : its leading factors, of a group one member.
+    index : rows of the main index of this output, by factor or group.
+    """
+
+    panel: Panel
+    specimen: str
+    joint: str
+    values: pd.Series
+    factors: tuple[str, ...]
+    index: pd.DataFrame
+
+
+def output_of(
+    panel: Panel,
+    responses: pd.DataFrame,
+    measures: Measures,
+    drawn: Values,
+    groups: Mapping[str, str],
+) -> Output | None:
+    """The output at the joint where it varies most, of the first specimen; None without runs.
+
+    Parameters
+    ----------
+    groups : group of each factor.
+    """
+    specimen = str(panel.rows["specimen"].iloc[0])
+    rows = responses[
+        (responses["specimen"] == specimen)
+        & (responses["test"] == panel.test)
+        & (responses["step"] == panel.step)
+        & (responses["status"] == Status.CONVERGED.value)
+    ]
+    if rows.empty:
+        return None
+    column = column_of(panel.output, panel.coordinate, responses)
+    joint = str(rows.groupby("joint", sort=False)[column].std().fillna(0.0).idxmax())
+    values = rows[rows["joint"] == joint].set_index("sample")[column]
+    index = panel.rows[
+        (panel.rows["index"] == measures.main)
+        & (panel.rows["specimen"] == specimen)
+        & (panel.rows["joint"] == joint)
+    ].set_index("factor")
+    order = index["estimate"].drop(DUMMY, errors="ignore").sort_values(ascending=False)
+    leading = _drawn(list(order.index), values, drawn, groups)
+    return Output(panel, specimen, joint, values, leading, index)
+
+
+def _drawn(
+    order: Sequence[str], values: pd.Series, drawn: Values, groups: Mapping[str, str]
+) -> tuple[str, ...]:
+    """The leading factors; of a group the member whose ranks follow the output's most."""
+    ranks = values.rank()
+
+    def follows(name: str) -> float:
+        return abs(float(ranks.corr(drawn[name].reindex(values.index).rank())))
+
+    members = [[name for name in drawn if groups[name] == leader] for leader in order[:TOP]]
+    return tuple(max(of_group, key=follows) for of_group in members if of_group)
+
+
+def column_of(output: str, coordinate: str, responses: pd.DataFrame) -> str:
+    """Column of an output in ``responses``: motion ends with mm or deg, loads with n or nm."""
+    if output == "motion":
+        return f"predicted_{COORDINATE_COLUMNS[COORDINATES.index(coordinate)]}"
+    ending = f"{coordinate}_{'n' if coordinate in TRANSLATIONS else 'nm'}"
+    return next(str(name) for name in responses.columns if str(name).endswith(ending))
+
+
+def running(x: Array, y: Array, few: int = 12) -> tuple[Array, Array]:
+    """(P,) middles and (3, P) 5th percentile, median and 95th of y along x.
+
+    Parts hold equal numbers of runs, of about 100 different values of x: designs repeat values, and
+    runs that share one are much alike. Of a design of few levels each level is one part.
+    """
+    levels = np.unique(x)
+    if len(levels) <= few:
+        groups = [x == level for level in levels]
+    else:
+        parts = min(20, max(4, len(levels) // 100))
+        part = np.searchsorted(np.quantile(levels, np.arange(1, parts) / parts), x)
+        groups = [part == number for number in range(parts)]
+    middles = np.array([np.median(x[group]) for group in groups])
+    found = np.array([np.percentile(y[group], [5.0, 50.0, 95.0]) for group in groups])
+    return middles, found.T
+
 
 MOST_OUTPUTS, MOST_DOTS = 3, 1000
 _PANEL_MM, _KEY_MM = 56.0, 17.0
@@ -86,8 +198,9 @@ def _line(
 def _cloud(axis: Axes, x: Array, y: Array, unit: str) -> None:
     """Runs as dots, at most so many of them; the middle 90 % and the median of all."""
     kept = np.random.default_rng(0).permutation(len(x))[:MOST_DOTS]
-    axis.plot(x[kept], y[kept], "o", color=GREY, ms=1.6, mew=0.0, alpha=0.45, zorder=2,
-              rasterized=True)  # fmt: skip
+    axis.plot(
+        x[kept], y[kept], "o", color=GREY, ms=1.6, mew=0.0, alpha=0.45, zorder=2, rasterized=True
+    )
     at, (low, middle, high) = running(x, y)
     axis.fill_between(at, low, high, color=BLUE, alpha=0.15, lw=0, zorder=1)
     axis.plot(at, middle, color=BLUE, lw=1.6, zorder=4)

@@ -1,6 +1,13 @@
-"""Figure: how much fitted stiffness and errors hang on start values, damping and loading."""
+"""Figure: how much fitted stiffness and errors hang on start values, damping and loading.
+
+The published bootstrap beside ours: medians and ranges by loading, joint and direction.
+
+Which rows the bootstrap figure has: what was sampled, how it was loaded, specimen and joint.
+"""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,21 +16,128 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.bootstrap_paper import draw_errors, write_range
-from spinepipe.report.bootstrap_rows import FIT, bootstrap_rows
-from spinepipe.report.layout import explain, head, label_rows, mark_start
-from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.marks import STRIP_KEY, Array, draw_strip, finite, rounded
+from spinepipe.report.panels import (
+    EVERY_JOINT,
+    MOST_ACROSS,
+    MOST_ROWS,
+    Rows,
+    explain,
+    head,
+    label_rows,
+    log_ticks,
+    mark_start,
+    sections,
+)
 from spinepipe.report.published import OF_JOINT_POSE, paper_of
-from spinepipe.report.rounding import rounded
-from spinepipe.report.rows import EVERY_JOINT, Rows
-from spinepipe.report.sections import MOST_ACROSS, sections
-from spinepipe.report.spread import Array, finite
-from spinepipe.report.strip import STRIP_KEY, draw_strip
-from spinepipe.report.style import GREY, OURS, TALLEST_MM, THEIRS, note, saying
+from spinepipe.report.style import BLACK, GREY, OURS, TALLEST_MM, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
-from spinepipe.statics.status import Status
-from spinepipe.studies import JointPoseSensitivity
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
+
+_RANGE_OF = "quasi_static"
+"""The loading whose ranges of stiffness are published."""
+
+
+def draw_errors(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
+    """Median of an error with its range around it (no ends are printed), where it is published."""
+    sampled, loading, joint = (row[key].iloc[0] for key in ("bootstrap", "loading", "joint"))
+    column = COORDINATE_COLUMNS[COORDINATES.index(name)]
+    table = _paper(cohort).get(f"{sampled}_bootstrap_error", {})
+    found = table.get(loading, {}).get(joint, {})
+    median, width = (found.get(what, {}).get(column) for what in ("median", "range"))
+    if median is None or width is None:
+        return
+    low = max(0.0, median - width / 2.0)  # an error is not negative
+    axis.plot([low, low + width], [y, y], color=THEIRS, lw=0.8, zorder=4)
+    axis.plot([median], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
+    axis.plot([median], [y], "D", color=THEIRS, ms=2.6, mew=0.0, zorder=4)
+
+
+def write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
+    """Width of the range of a stiffness, where it is published (its place is not)."""
+    column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
+    table = _paper(cohort).get("bootstrap_stiffness_range", {})
+    width = table.get(row["bootstrap"].iloc[0], {}).get(column)
+    if width is not None and row["loading"].iloc[0] == _RANGE_OF:
+        note(axis, 0.02, y, f"range {number(width, 2)}", THEIRS)
+
+
+def _paper(cohort: str) -> Mapping[str, Any]:
+    """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
+    found = paper_of(cohort, OF_JOINT_POSE)
+    return {} if found is None else found[1]
+
+
+SAMPLED = {"start": "start", "damping": "damping"}
+"""What is sampled, as printed; the first stands on top."""
+
+LOADING_NAMES = {
+    "equilibrium": "at rest",
+    "quasi_static": "quasi-static",
+    "dynamic": "dynamic",
+}
+FIT = ["specimen", "bootstrap", "loading", "set"]
+"""What one fit is known by."""
+
+
+def bootstrap_rows(
+    solved: pd.DataFrame,
+    columns: Sequence[str],
+    specimens: Sequence[str],
+    joints: Sequence[str],
+    most: int = MOST_ROWS,
+) -> tuple[Rows, bool]:
+    """Rows from the bottom up, and whether more than ``most`` of them were pooled.
+
+    Where they were, each specimen and joint is taken relative to its own median: ``columns`` are
+    then shares of it for stiffness, and differences from it for errors.
+    """
+    keys = list(product(SAMPLED, LOADINGS, specimens, reversed(joints)))
+    parts = [(key, part) for key in keys if len(part := _part(solved, *key))]
+    if len(parts) <= most:
+        labels = [_label(*key, len(specimens), len(joints)) for key, _ in reversed(parts)]
+        return Rows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
+    relative = pd.concat([_from_median(part, columns) for _, part in parts])
+    groups = [
+        ((sampled, loading), part)
+        for sampled, loading in reversed(list(product(SAMPLED, LOADINGS)))
+        if len(part := relative.query("bootstrap == @sampled and loading == @loading"))
+    ]
+    labels = [f"{SAMPLED[sampled]}, {LOADING_NAMES[loading]}" for (sampled, loading), _ in groups]
+    return Rows(
+        tuple(labels), tuple(part for _, part in groups), "specimens and joints pooled"
+    ), True
+
+
+def _part(
+    solved: pd.DataFrame, sampled: str, loading: str, specimen: str, joint: str
+) -> pd.DataFrame:
+    chosen = solved["bootstrap"].eq(sampled) & solved["loading"].eq(loading)
+    chosen &= solved["specimen"].eq(specimen)
+    if joint == EVERY_JOINT:  # the stiffness is the same in the rows of all joints
+        return solved[chosen].drop_duplicates(FIT)
+    return solved[chosen & solved["joint"].eq(joint)]
+
+
+def _from_median(part: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+    moved = part.copy()
+    for name in columns:
+        middle = part[name].median()
+        moved[name] = part[name] - middle if "_error_" in name else part[name] / middle
+    return moved
+
+
+def _label(
+    sampled: str, loading: str, specimen: str, joint: str, n_specimens: int, n_joints: int
+) -> str:
+    words = [SAMPLED[sampled], LOADING_NAMES[loading]]
+    words += [specimen] if n_specimens > 1 else []
+    words += [joint] if n_joints > 1 else []
+    return ", ".join(words)
+
 
 MOST_ROWS_WITH_WORDS = 14
 _ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 3.2, 15.0, 16.0

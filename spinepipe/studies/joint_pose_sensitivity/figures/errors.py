@@ -10,15 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.layout import explain, grid, head, label_rows, row_height
-from spinepipe.report.rounding import EXACT, exact, rounded
-from spinepipe.report.rows import Rows, rows_of
-from spinepipe.report.settling import settling
-from spinepipe.report.spread import BAR_PT, KEY, THIN_BAR_PT, draw_bar, finite
+from spinepipe.report.marks import BAR_PT, EXACT, KEY, THIN_BAR_PT, draw_bar, exact, finite, rounded
+from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
-from spinepipe.statics.status import Status
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.findings import settling
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 OWN = "calibrated"
@@ -113,8 +111,15 @@ def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
         axis.plot([share], [y], "o", color=color, ms=3.0, clip_on=False, zorder=5)
         if few:
             words = percent(int(failed.sum()), len(failed))
-            axis.annotate(words, (share, y), (5, 0), textcoords="offset points", fontsize=6.0,
-                          va="center", color=INK[color])  # fmt: skip
+            axis.annotate(
+                words,
+                (share, y),
+                (5, 0),
+                textcoords="offset points",
+                fontsize=6.0,
+                va="center",
+                color=INK[color],
+            )
     axis.set_xlim(0.0, max(5.0, 1.25 * axis.get_xlim()[1]))
     axis.set_xlabel("share of runs (%)")
     axis.set_ylim(-0.7, len(order) - 0.3)

@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
-from spinepipe.report.layout import explain, grid, head, label_rows, row_height
+from spinepipe.report.marks import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
+from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.published import OF_JOINT_POSE, paper_of
-from spinepipe.report.rows import Rows, rows_of
-from spinepipe.report.spread import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent, unit
-from spinepipe.statics.status import Status
+from spinepipe.status import Status
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 _ORIGIN = dict(zip(("x_mm", "y_mm", "z_mm"), TRANSLATIONS, strict=True))

@@ -1,4 +1,7 @@
-"""Figure: how precise landmarks must be for errors below a limit."""
+"""Figure: how precise landmarks must be for errors below a limit.
+
+A required landmark SD in words.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,12 +11,28 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.layout import explain, head
+from spinepipe.report.panels import explain, head
 from spinepipe.report.published import OF_JOINT_POSE, paper_of
-from spinepipe.report.required import required_words
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
-from spinepipe.report.words import count, number, tick
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+
+
+def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
+    """``1.20 mm (1.05–1.40)``, or why there is no such SD.
+
+    An end of the interval that lies outside the sampled SDs, mm, is told as such:
+    ``0.95 mm (0.65 to above 4 mm)``.
+    """
+    if not np.isfinite(row["sd_mm"]):
+        return str(row["message"]) or "none"
+    low, high = row["sd_low_mm"], row["sd_high_mm"]
+    if np.isfinite(low) and np.isfinite(high):
+        return f"{fixed(row['sd_mm'])} mm ({fixed(low)}–{fixed(high)})"
+    start = fixed(low) if np.isfinite(low) else f"below {tick(min(sampled))}"
+    end = f"{fixed(high)} mm" if np.isfinite(high) else f"above {tick(max(sampled))} mm"
+    return f"{fixed(row['sd_mm'])} mm ({start} to {end})"
+
 
 COLORS = {"calibrated": OURS, "nominal": BEST}
 WHOSE = {
@@ -56,8 +75,15 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
     for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
         rows = rows.sort_values("sd_mm")
         color = COLORS[str(whose)]
-        axis.plot(rows["sd_mm"], rows["median"], color=color, marker="o", ms=2.5,
-                  lw=1.2 if alone else 0.5, alpha=1.0 if alone else 0.4)  # fmt: skip
+        axis.plot(
+            rows["sd_mm"],
+            rows["median"],
+            color=color,
+            marker="o",
+            ms=2.5,
+            lw=1.2 if alone else 0.5,
+            alpha=1.0 if alone else 0.4,
+        )
         if alone:
             axis.fill_between(
                 rows["sd_mm"], rows["median"], rows["p95"], color=color, alpha=0.15, lw=0
@@ -68,9 +94,15 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
     limit = float(here["limit"].iloc[0])
     axis.axhline(limit, color=GREY, lw=0.8, ls=":")
     axis.annotate(
-        f"limit {tick(limit)} {symbol}", (1.0, limit), (0, 2), xycoords=("axes fraction", "data"),
-        textcoords="offset points", ha="right", fontsize=6.0, color=INK[GREY],
-    )  # fmt: skip
+        f"limit {tick(limit)} {symbol}",
+        (1.0, limit),
+        (0, 2),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        fontsize=6.0,
+        color=INK[GREY],
+    )
     axis.set_ylim(0.0, None)
     axis.set_ylabel(f"error ({symbol})")
 
@@ -89,8 +121,15 @@ def _draw_shares(
     for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
         rows = rows.sort_values("sd_mm")
         color = COLORS[str(whose)]
-        axis.plot(rows["sd_mm"], 100.0 * rows["below"], color=color, marker="o", ms=2.5,
-                  lw=1.2 if alone else 0.5, alpha=1.0 if alone else 0.4)  # fmt: skip
+        axis.plot(
+            rows["sd_mm"],
+            100.0 * rows["below"],
+            color=color,
+            marker="o",
+            ms=2.5,
+            lw=1.2 if alone else 0.5,
+            alpha=1.0 if alone else 0.4,
+        )
         if alone:
             low, high = 100.0 * rows["below_low"], 100.0 * rows["below_high"]
             axis.fill_between(rows["sd_mm"], low, high, color=color, alpha=0.15, lw=0)
@@ -99,9 +138,16 @@ def _draw_shares(
     asked = 100.0 * study.landmark_precision.share
     axis.axhline(asked, color=GREY, lw=0.8, ls=":")
     axis.annotate(
-        f"{tick(asked)} % asked for", (0.0, asked), (3, -2), xycoords=("axes fraction", "data"),
-        textcoords="offset points", ha="left", va="top", fontsize=6.0, color=INK[GREY],
-    )  # fmt: skip
+        f"{tick(asked)} % asked for",
+        (0.0, asked),
+        (3, -2),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        fontsize=6.0,
+        color=INK[GREY],
+    )
     for place, (whose, rows) in enumerate(required.groupby("stiffness")):
         sampled = study.landmark_precision.sd_mm
         _mark_required(axis, rows, COLORS[str(whose)], 6.0 + 8.0 * place, sampled)
@@ -122,15 +168,26 @@ def _mark_required(
         lift = y + 4.0 * (index / len(found))
         ends = row[["sd_low_mm", "sd_high_mm"]].to_numpy(float)
         ends = np.where(np.isfinite(ends), ends, (min(sampled), max(sampled)))
-        axis.plot(ends, [lift, lift], color=color, lw=1.2 if len(found) == 1 else 0.7,
-                  solid_capstyle="butt")  # fmt: skip
+        axis.plot(
+            ends,
+            [lift, lift],
+            color=color,
+            lw=1.2 if len(found) == 1 else 0.7,
+            solid_capstyle="butt",
+        )
         axis.plot([row["sd_mm"]], [lift], "^", color=color, ms=4.5, mec="white", mew=0.4, zorder=5)
     if len(rows) == 1:
         row = rows.iloc[0]
         known = np.isfinite(row["sd_mm"])
-        axis.annotate(required_words(row, sampled), (0.0, y + 2.0 if known else y), (4, 3.5),
-                      textcoords="offset points", va="bottom" if known else "center",
-                      fontsize=6.0, color=INK[color])  # fmt: skip
+        axis.annotate(
+            required_words(row, sampled),
+            (0.0, y + 2.0 if known else y),
+            (4, 3.5),
+            textcoords="offset points",
+            va="bottom" if known else "center",
+            fontsize=6.0,
+            color=INK[color],
+        )
 
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
@@ -142,9 +199,15 @@ def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
     for axis in (upper, lower):
         axis.axvline(sd, color=THEIRS, lw=0.9, zorder=1)
     upper.annotate(
-        f"{paper[0]}: {number(sd, 2)} mm", (sd, 1.0), (2, -1), xycoords=("data", "axes fraction"),
-        textcoords="offset points", va="top", fontsize=6.0, color=INK[THEIRS],
-    )  # fmt: skip
+        f"{paper[0]}: {number(sd, 2)} mm",
+        (sd, 1.0),
+        (2, -1),
+        xycoords=("data", "axes fraction"),
+        textcoords="offset points",
+        va="top",
+        fontsize=6.0,
+        color=INK[THEIRS],
+    )
 
 
 def _words(

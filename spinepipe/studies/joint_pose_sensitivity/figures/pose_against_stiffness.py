@@ -9,13 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.intervals import draw_interval
-from spinepipe.report.layout import explain, head, label_rows
-from spinepipe.report.rows import Rows, rows_of
-from spinepipe.report.sections import sections
+from spinepipe.report.marks import draw_interval
+from spinepipe.report.panels import Rows, explain, head, label_rows, rows_of, sections
 from spinepipe.report.style import BEST, GREY, OURS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES
 
 COLORS = {"pose": OURS, "stiffness": BEST, "interaction": GREY}

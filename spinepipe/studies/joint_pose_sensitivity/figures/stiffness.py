@@ -10,11 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.layout import explain, grid, head, label_rows, mark_start, row_height
-from spinepipe.report.log_axis import log_ticks
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
-from spinepipe.report.rows import EVERY_JOINT, Rows, rows_of
-from spinepipe.report.spread import (
+from spinepipe.report.marks import (
     KEY,
     Array,
     Quartiles,
@@ -24,10 +20,23 @@ from spinepipe.report.spread import (
     finite,
     quartiles,
 )
+from spinepipe.report.panels import (
+    EVERY_JOINT,
+    Rows,
+    explain,
+    grid,
+    head,
+    label_rows,
+    log_ticks,
+    mark_start,
+    row_height,
+    rows_of,
+)
+from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
-from spinepipe.statics.status import Status
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 AT_BOUND = 1e-4

@@ -1,4 +1,7 @@
-"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by."""
+"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by.
+
+Ways of fitting that were refused, and why.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,16 +13,25 @@ from matplotlib.ticker import LogLocator, NullLocator
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.intervals import draw_interval
-from spinepipe.report.layout import explain, head
-from spinepipe.report.log_axis import log_ticks
+from spinepipe.report.marks import STRIP_KEY, draw_interval, draw_strip, finite
+from spinepipe.report.panels import explain, head, log_ticks
 from spinepipe.report.published import OF_JOINT_POSE, paper_of
-from spinepipe.report.refused import refused
-from spinepipe.report.spread import finite
-from spinepipe.report.strip import STRIP_KEY, draw_strip
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number, percent, tick
-from spinepipe.studies import JointPoseSensitivity
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+
+
+def refused(fits: pd.DataFrame) -> dict[str, str]:
+    """Message of each method of which every fit was refused, in the order of the table."""
+    if fits.empty:
+        return {}
+    return {
+        str(method): "; ".join(dict.fromkeys(rows["message"]))
+        for method, rows in fits.groupby("method", sort=False)
+        if (rows["status"] == Status.REFUSED.value).all()
+    }
+
 
 _ROW_MM, _AROUND_MM = 12.0, 36.0
 _LEAST = 1e-16

@@ -1,11 +1,30 @@
-"""How many fits succeed (sections 3.1 and 3.2)."""
+"""How many fits succeed (sections 3.1 and 3.2).
+
+The load and the start values of the paper, where its numbers do not fit each other.
+"""
 
 from collections.abc import Callable, Iterator
+from math import radians
 
-from spinepipe.comparison.claim import Claim, Ours
-from spinepipe.comparison.paper import COUNTS, REDUCED, SAMPLES
-from spinepipe.comparison.ranges import Range, binomial, wilson_percent
-from spinepipe.comparison.run import NotComputed, Run
+from spinepipe.comparison.claim import (
+    Claim,
+    NotComputed,
+    Ours,
+    Range,
+    Run,
+    binomial,
+    exactly,
+    wilson_percent,
+)
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
+    COUNTS,
+    MEASURED_JOINTS,
+    PAPER,
+    REDUCED,
+    SAMPLES,
+    STIFFNESS_KEY,
+    measured,
+)
 
 _EXACT = (
     "fits are solved at rest with exact derivatives here; by this rule other ways of fitting may "
@@ -23,24 +42,46 @@ METHODS = {
 }
 
 
-def claims() -> Iterator[Claim]:
+def claims_of_counts() -> Iterator[Claim]:
     """Shares of successful fits."""
     successful = int(COUNTS["pose_samples_successful"])
-    yield _share("pose_samples_successful", "section 3.2", "sampled joint poses fitted",
-                 successful, SAMPLES, _successful("poses", "equilibrium"))  # fmt: skip
-    yield _share("pose_samples_reduced", "section 3.2", "sampled joint poses in the reduced set",
-                 REDUCED, SAMPLES, _reduced)  # fmt: skip
+    yield _share(
+        "pose_samples_successful",
+        "section 3.2",
+        "sampled joint poses fitted",
+        successful,
+        SAMPLES,
+        _successful("poses", "equilibrium"),
+    )
+    yield _share(
+        "pose_samples_reduced",
+        "section 3.2",
+        "sampled joint poses in the reduced set",
+        REDUCED,
+        SAMPLES,
+        _reduced,
+    )
     for part, words in (("start", "start stiffness"), ("damping", "damping")):
         key = f"{part}_stiffness_sets" if part == "start" else f"{part}_sets"
-        yield _share(f"{key}_successful", "section 3.1", f"sets of {words} fitted, quasi-static",
-                     int(COUNTS[f"{key}_successful"]), int(COUNTS[key]),
-                     _successful(f"{part}_bootstrap", "quasi_static"))  # fmt: skip
+        yield _share(
+            f"{key}_successful",
+            "section 3.1",
+            f"sets of {words} fitted, quasi-static",
+            int(COUNTS[f"{key}_successful"]),
+            int(COUNTS[key]),
+            _successful(f"{part}_bootstrap", "quasi_static"),
+        )
     for method, words in METHODS.items():
         yield Claim(
-            f"success.{method}", "section 3.2", f"sampled joint poses fitted: {words}", "%",
-            100.0 * successful / SAMPLES, binomial(successful, SAMPLES), _by_method(method),
+            f"success.{method}",
+            "section 3.2",
+            f"sampled joint poses fitted: {words}",
+            "%",
+            100.0 * successful / SAMPLES,
+            binomial(successful, SAMPLES),
+            _by_method(method),
             _EXACT if method == "exact" else _EMULATED,
-        )  # fmt: skip
+        )
 
 
 def _share(
@@ -78,3 +119,101 @@ def _by_method(method: str) -> Callable[[Run], Ours]:
         return _percent(int(row["successful"]), int(row["fits"]))
 
     return ours
+
+
+_MM_PER_M = 1000.0
+FORCE_N = float(PAPER["load"]["largest_compression_n"])
+BEST = PAPER["best_model"]["stiffness"]
+
+
+def claims_of_experiment() -> Iterator[Claim]:
+    """Load, moment, lever arm, start values."""
+    yield from _moments()
+    for name in ("anterior", "right"):
+        yield _outside_box(
+            "start_stiffness",
+            "section 2.2, Table 1",
+            "A6",
+            name,
+            float(PAPER["start_stiffness"][STIFFNESS_KEY[name]]),
+        )
+    yield _outside_box(
+        "best_model", "section 3.3, Table 1", "A7", "anterior", float(BEST["anterior_n_per_m"])
+    )
+
+
+def _moments() -> Iterator[Claim]:
+    printed = float(PAPER["load"]["flexion_moment_nm"])
+    offset = float(PAPER["bodies"]["top_offset_mm"])
+    moment = FORCE_N * offset / _MM_PER_M
+    yield _closed(
+        "load.moment",
+        "sections 2.1, 2.2",
+        f"moment of the load at {offset:g} mm",
+        "N m",
+        printed,
+        moment,
+        f"A1: {FORCE_N:g} N at {offset:g} mm make {moment:.2f} N m, "
+        f"printed is about {printed:g} N m",
+    )
+    arm = _MM_PER_M * printed / FORCE_N
+    yield _closed(
+        "load.lever_arm",
+        "sections 2.1, 2.2",
+        "lever arm of the load",
+        "mm",
+        offset,
+        arm,
+        f"A2: {printed:g} N m of {FORCE_N:g} N need {arm:.1f} mm; printed are {offset:g} mm, and "
+        f"{PAPER['load']['offset_percent_of_disc_depth']:g} % of a disc's depth",
+    )
+    spring = float(BEST["extension_nm_per_rad"])
+    for joint in MEASURED_JOINTS:
+        angle = measured(joint, "extension")
+        carried = spring * radians(angle)
+        yield _closed(
+            f"load.spring_moment.{joint}",
+            "sections 2.1, 3.1, 3.3",
+            f"moment that the best model's spring carries at {joint}",
+            "N m",
+            printed,
+            carried,
+            f"A3: {spring:g} N m/rad turned by {angle:g} deg carry {carried:.2f} N m, "
+            f"the load is said to be about {printed:g} N m",
+        )
+
+
+def _closed(
+    name: str, where: str, quantity: str, unit: str, paper: float, ours: float, reason: str
+) -> Claim:
+    """Numbers of the paper alone that exclude each other."""
+    return Claim(
+        name,
+        where,
+        quantity,
+        unit,
+        paper,
+        exactly(paper),
+        lambda run: Ours(ours),
+        "",
+        note="ours: recomputed from the paper's other numbers",
+        contradicted=reason,
+    )
+
+
+def _outside_box(of: str, where: str, check: str, name: str, value: float) -> Claim:
+    box = PAPER["start_stiffness_box"]
+    low, high = (float(box[end][STIFFNESS_KEY[name]]) for end in ("low", "high"))
+    reason = f"{check}: {value:g} N/m lies outside Table 1, {low:g} to {high:g} N/m"
+    return Claim(
+        f"{of}.{name}_in_box",
+        where,
+        f"{name} stiffness against the box of start values",
+        "N/m",
+        value,
+        Range(low, high, "the box of Table 1"),
+        lambda run: Ours(value),
+        "",
+        note="ours: the paper's own number again",
+        contradicted=reason,
+    )

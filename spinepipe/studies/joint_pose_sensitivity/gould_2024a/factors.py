@@ -1,13 +1,39 @@
-"""Joint pose against stiffness: Friedman tests, regression tree, shares of variance."""
+"""Joint pose against stiffness: Friedman tests, regression tree, shares of variance.
+
+The reduced dataset against the complete one, and bounds of both: sections 3.5 and 4.
+
+Table 6: correlations within the two-factor grid, compared by significance and sign.
+"""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import product
 
-from spinepipe.comparison.claim import Claim, Ours
-from spinepipe.comparison.paper import FITTED, MEASURED_JOINTS, PAPER
-from spinepipe.comparison.ranges import Range
-from spinepipe.comparison.run import NotComputed, Run
-from spinepipe.comparison.tested import tested
+import pandas as pd
+
+from spinepipe.comparison.claim import (
+    Claim,
+    NotComputed,
+    Ours,
+    Range,
+    Run,
+    at_most,
+    exactly,
+    kendall_p,
+    spearman_p,
+    tested,
+)
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import paper as summary
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
+    FITTED,
+    JOINTS,
+    MEASURED_JOINTS,
+    P_BELOW,
+    PAPER,
+    REDUCED,
+)
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.poses import DATASETS, END_JOINTS
+from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 _HALF = Range(0.5, 1.0, "the paper's tree finds the joint pose more influential: above one half")
 _TREE = (
@@ -16,28 +42,44 @@ _TREE = (
 )
 
 
-def claims() -> Iterator[Claim]:
+def claims_of_factors() -> Iterator[Claim]:
     """Section 3.4."""
     bound = float(PAPER["friedman"]["p_below"])
     for factor in ("pose", "stiffness"):
         yield Claim(
-            f"friedman.{factor}", "section 3.4",
-            f"largest p of Friedman tests of errors between levels of {factor}", "p", None,
-            Range(0.0, bound, f"the paper finds all below {bound:g}"), _friedman(factor), _TREE,
-        )  # fmt: skip
+            f"friedman.{factor}",
+            "section 3.4",
+            f"largest p of Friedman tests of errors between levels of {factor}",
+            "p",
+            None,
+            Range(0.0, bound, f"the paper finds all below {bound:g}"),
+            _friedman(factor),
+            _TREE,
+        )
     for joint, name in product(MEASURED_JOINTS, FITTED):
         yield Claim(
-            f"tree.{joint}.{name}", "section 3.4",
+            f"tree.{joint}.{name}",
+            "section 3.4",
             f"share of the joint pose in the regression tree of the {name} error at {joint}",
-            "share", None, _HALF, _tree(joint, name), _TREE,
-        )  # fmt: skip
+            "share",
+            None,
+            _HALF,
+            _tree(joint, name),
+            _TREE,
+        )
     for joint, name in product(MEASURED_JOINTS, FITTED):
         yield Claim(
-            f"variance_share.{joint}.{name}", "section 3.4",
+            f"variance_share.{joint}.{name}",
+            "section 3.4",
             f"variance of the {name} error at {joint} due to the joint pose, of that due to pose "
-            "or stiffness alone", "share", None, _HALF, _variance(joint, name), _TREE,
+            "or stiffness alone",
+            "share",
+            None,
+            _HALF,
+            _variance(joint, name),
+            _TREE,
             "the paper has no such shares; its tree's order is what is compared",
-        )  # fmt: skip
+        )
 
 
 def _friedman(factor: str) -> Callable[[Run], Ours]:
@@ -77,3 +119,347 @@ def _variance(joint: str, name: str) -> Callable[[Run], Ours]:
         return Ours(pose / (pose + stiffness), note=note)
 
     return ours
+
+
+_SHIFT = PAPER["reduced_against_complete"]
+_BOUND = PAPER["spread_bound"]
+MIDDLE_JOINT = "L2L3"
+_KEPT = "it hangs on which fits succeeded, and those are not the paper's"
+_SCATTER = "landmark SDs and the construction of frames are not published (A20, A21)"
+_SIDEWAYS = ("right_bending", "left_rotation")
+
+
+def claims_of_datasets() -> Iterator[Claim]:
+    """Shifts between the datasets, drops of the extension IQR, bounds of the spreads."""
+    for key, words, unit, bound, quantity, kind, names in (
+        (
+            "origin_median",
+            "median origin",
+            "mm",
+            "origin_median_mm",
+            "origin",
+            "median",
+            TRANSLATIONS,
+        ),
+        ("origin_iqr", "IQR of origins", "mm", "origin_iqr_mm", "origin", "iqr", TRANSLATIONS),
+        (
+            "orientation_median",
+            "median orientation",
+            "deg",
+            "orientation_deg",
+            "orientation",
+            "median",
+            ROTATIONS,
+        ),
+        (
+            "orientation_iqr",
+            "IQR of bending and rotation",
+            "deg",
+            "orientation_deg",
+            "orientation",
+            "iqr",
+            _SIDEWAYS,
+        ),
+    ):
+        value = float(_SHIFT[bound])
+        yield Claim(
+            f"reduced_against_complete.{key}",
+            "section 3.5",
+            f"largest difference of {words} between reduced and complete dataset",
+            unit,
+            value,
+            at_most(value),
+            _largest_shift(quantity, kind, names),
+            _KEPT,
+        )
+    for joint in END_JOINTS:
+        yield _drop(joint)
+    yield from _bounds()
+    for joint in END_JOINTS:
+        yield _ratio(joint)
+
+
+def _value(run: Run, dataset: str, column: str, quantity: str, joint: str, name: str) -> float:
+    return summary.value(
+        run,
+        column,
+        part="poses",
+        loading="equilibrium",
+        dataset=DATASETS[dataset][0],
+        quantity=quantity,
+        joint=joint,
+        coordinate=name,
+    )
+
+
+def _shift(run: Run, column: str, quantity: str, joint: str, name: str) -> float:
+    """Reduced less complete."""
+    reduced, complete = (
+        _value(run, dataset, column, quantity, joint, name) for dataset in ("reduced", "complete")
+    )
+    return reduced - complete
+
+
+def _largest_shift(quantity: str, column: str, names: tuple[str, ...]) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        cells = product(JOINTS, names)
+        return Ours(max(abs(_shift(run, column, quantity, *cell)) for cell in cells))
+
+    return ours
+
+
+def _drop(joint: str) -> Claim:
+    paper = float(_SHIFT["extension_iqr_drop_deg"][joint])
+    return Claim(
+        f"reduced_against_complete.extension_iqr_drop.{joint}",
+        "section 3.5",
+        f"drop of the IQR of extension of {joint} from complete to reduced dataset",
+        "deg",
+        paper,
+        exactly(paper),
+        lambda run: Ours(-_shift(run, "iqr", "orientation", joint, "extension")),
+        _KEPT,
+        contradicted="A19: it rests on a column of Table 8 that is probably copied",
+    )
+
+
+def _ratio(joint: str) -> Claim:
+    """Extension of an end joint scatters more than that of the middle joint."""
+    printed = PAPER["joint_orientation"]["complete"]
+    end, middle = (float(printed[name]["iqr"]["extension_deg"]) for name in (joint, MIDDLE_JOINT))
+    return Claim(
+        f"extension_iqr_over_middle.{joint}",
+        "section 4, Table 8",
+        f"IQR of extension of {joint} in that of {MIDDLE_JOINT}",
+        "ratio",
+        end / middle,
+        Range(1.0, None, "the paper finds the end joints' larger: above 1"),
+        partial(_over_middle, joint),
+        _SCATTER,
+        "one vertebra against the mean of two (A21)",
+    )
+
+
+def _over_middle(joint: str, run: Run) -> Ours:
+    end, middle = (
+        _value(run, "complete", "iqr", "orientation", name, "extension")
+        for name in (joint, MIDDLE_JOINT)
+    )
+    if middle == 0.0:
+        raise NotComputed(f"the IQR of {MIDDLE_JOINT} is 0")
+    return Ours(end / middle)
+
+
+def _bounds() -> Iterator[Claim]:
+    for key, unit, quantity, names in (
+        ("origin_iqr_mm", "mm", "origin", TRANSLATIONS),
+        ("bending_and_rotation_iqr_deg", "deg", "orientation", _SIDEWAYS),
+        ("extension_iqr_deg", "deg", "orientation", ("extension",)),
+    ):
+        value = float(_BOUND[key])
+        yield Claim(
+            f"spread_bound.{key.rsplit('_', 1)[0]}",
+            "section 4",
+            f"largest IQR of {quantity}: {', '.join(names)}",
+            unit,
+            value,
+            at_most(value),
+            _largest_iqr(quantity, names),
+            _SCATTER,
+        )
+
+
+def _largest_iqr(quantity: str, names: tuple[str, ...]) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        cells = product(JOINTS, names)
+        return Ours(max(_value(run, "complete", "iqr", quantity, *cell) for cell in cells))
+
+    return ours
+
+
+_PRINTED = PAPER["two_factor_correlation"]
+_TEST = {"orientation": "kendall", "stiffness": "spearman"}
+_AGAINST = {"orientation": "pose", "stiffness": "stiffness"}
+_FACTORS = {"orientation": ROTATIONS, "stiffness": FITTED}
+_BEST = int(PAPER["counts"]["best_models"])
+
+_FEWEST_TESTS = 2
+"""A printed coefficient that is not significant among so few tests is not in any family."""
+
+_POWER = (
+    "whether any of many tests passes Bonferroni hangs on the size of the family, which the paper "
+    "does not give, and on frames and motion that are not published"
+)
+_SIGN = "signs hang on frames and motion that are not published"
+_ASSUMED = "signs of the paper's joint angles are assumed to be as printed"
+NOTES = {
+    ("stiffness", "anterior", "anterior"): "A27: Table 5 has the opposite sign, over all poses",
+    ("stiffness", "extension", "extension"): "A28: Table 5 has the opposite sign, over all poses",
+}
+
+
+def claims_of_two_factor() -> Iterator[Claim]:
+    """One row per cell for significance, one more per significant cell for the coefficients."""
+    for kind in ("orientation", "stiffness"):
+        for factor, joint, error in product(_FACTORS[kind], MEASURED_JOINTS, FITTED):
+            yield from _cell(kind, factor, joint, error)
+    yield from _sets()
+    yield from _share_of_models()
+    yield from _contradicted()
+
+
+def _cell(kind: str, factor: str, joint: str, error: str) -> Iterator[Claim]:
+    printed = _PRINTED[kind][joint].get(factor, {}).get(error)
+    key = f"table_6.{factor}_{kind}.{joint}.{error}_error"
+    words = f"{_TEST[kind]}: {error} error at {joint} and {factor} {kind}"
+    note = _ASSUMED if kind == "orientation" else NOTES.get((kind, factor, error), "")
+    significant = float(printed is not None)
+    yield Claim(
+        f"{key}.significant",
+        "Table 6",
+        f"{words}, any significant after Bonferroni",
+        "1: yes, 0: no",
+        significant,
+        exactly(significant),
+        _any(kind, factor, joint, error),
+        _POWER,
+    )
+    if printed is not None:
+        low, high = float(printed[0]), float(printed[1])
+        sign = f"sign only; the paper's coefficients run from {low:g} to {high:g}"
+        yield Claim(
+            f"{key}.coefficient",
+            "Table 6",
+            f"{words}, median of the significant ones",
+            "tau" if kind == "orientation" else "rho",
+            None,
+            Range(0.0, 1.0, sign) if low > 0.0 else Range(-1.0, 0.0, sign),
+            _coefficients(kind, factor, joint, error),
+            _SIGN,
+            note,
+            _unreachable(kind, low, high),
+        )
+
+
+def _unreachable(kind: str, low: float, high: float) -> str:
+    """Why a printed coefficient cannot be significant after Bonferroni, or nothing."""
+    smallest = min(abs(low), abs(high))
+    if kind == "stiffness":
+        check, n, p = "A24", _BEST, spearman_p(smallest, _BEST)
+    else:
+        check, n, p = "A25", REDUCED, kendall_p(smallest, REDUCED)
+    if _FEWEST_TESTS * p < P_BELOW:
+        return ""
+    return (
+        f"{check}: {smallest:g} of {n} values has p = {p:.2g}, not below {P_BELOW:g} after "
+        f"Bonferroni for even {_FEWEST_TESTS} tests"
+    )
+
+
+def _tests(run: Run, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
+    """Tests of one cell that have a result."""
+    family = f"two-factor: {error}_error at {joint} against {_AGAINST[kind]}"
+    return tested(run, _TEST[kind], family=family, factor=f"{factor}_{kind}")
+
+
+def _any(kind: str, factor: str, joint: str, error: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        rows = _tests(run, kind, factor, joint, error)
+        significant = int((rows["p_bonferroni"] < P_BELOW).sum())
+        note = (
+            f"ours: {significant} of {len(rows)} tests, family of {int(rows['family_size'].max())}"
+        )
+        return Ours(float(significant > 0), note=note)
+
+    return ours
+
+
+def _coefficients(kind: str, factor: str, joint: str, error: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        rows = _tests(run, kind, factor, joint, error)
+        low, high = rows["effect"].min(), rows["effect"].max()
+        found = rows.loc[rows["p_bonferroni"] < P_BELOW, "effect"]
+        if found.empty:
+            told = f"none of {len(rows)} tests is significant after Bonferroni"
+            raise NotComputed(f"{told}; their coefficients run from {low:.2f} to {high:.2f}")
+        note = f"ours: {int((found > 0.0).sum())} of {len(found)} significant ones are positive"
+        return Ours(float(found.median()), float(found.min()), float(found.max()), note)
+
+    return ours
+
+
+def _sets() -> Iterator[Claim]:
+    """In how many stiffness sets the extension of the frames goes with the anterior error."""
+    count = float(_PRINTED["extension_orientation_stiffness_sets"])
+    for joint in MEASURED_JOINTS:
+        yield Claim(
+            f"table_6.extension_orientation.{joint}.anterior_error.sets",
+            "Table 6",
+            f"stiffness sets of {_BEST} in which the anterior error at {joint} correlates with "
+            "extension orientation",
+            "count",
+            count,
+            exactly(count),
+            partial(_number_of_sets, joint),
+            _POWER,
+        )
+
+
+def _number_of_sets(joint: str, run: Run) -> Ours:
+    rows = _tests(run, "orientation", "extension", joint, "anterior")
+    return Ours(float((rows["p_bonferroni"] < P_BELOW).sum()), note=f"ours: of {len(rows)}")
+
+
+def _share_of_models() -> Iterator[Claim]:
+    """In how many of the reduced poses the stiffness correlations are significant."""
+    for factor in ("anterior", "extension"):
+        count = int(_PRINTED[f"{factor}_stiffness_fewer_models_than"])
+        percent = 100.0 * count / REDUCED
+        yield Claim(
+            f"table_6.{factor}_stiffness.significant_models",
+            "Table 6",
+            f"poses in which {factor} stiffness correlates with an error, largest cell",
+            "%",
+            percent,
+            Range(0.0, percent, f"fewer than {count} of {REDUCED} poses in the paper"),
+            _largest_share(factor),
+            _POWER,
+        )
+
+
+def _largest_share(factor: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        cells = []
+        for joint, error in product(MEASURED_JOINTS, FITTED):
+            rows = _tests(run, "stiffness", factor, joint, error)
+            cells.append(100.0 * float((rows["p_bonferroni"] < P_BELOW).mean()))
+        return Ours(max(cells), min(cells), max(cells), "ours: smallest to largest of six cells")
+
+    return ours
+
+
+def _contradicted() -> Iterator[Claim]:
+    yield Claim(
+        "table_6.anterior_stiffness_lowers_extension_error",
+        "section 3.4, Table 6",
+        "anterior stiffness lowers the extension error, any significant at L3L4",
+        "1: yes, 0: no",
+        1.0,
+        exactly(1.0),
+        _any("stiffness", "anterior", "L3L4", "extension"),
+        "",
+        contradicted="A29: section 3.4 says so, Table 6 has no significant test at either joint",
+    )
+    caption = float(_PRINTED["p_below_of_caption"])
+    yield Claim(
+        "table_6.significance",
+        "Table 6, section 2.5",
+        "p below which a test is significant",
+        "p",
+        caption,
+        exactly(caption),
+        lambda run: Ours(P_BELOW),
+        "",
+        note="ours: section 2.5",
+        contradicted=f"A30: the caption has {caption:g}, section 2.5 and the cells {P_BELOW:g}",
+    )
