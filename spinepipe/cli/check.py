@@ -5,11 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from spinepipe import cohort as cohorts
-from spinepipe import studies
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
+from spinepipe.studies import read as studies
 from spinepipe.studies.study import COHORTS
 
 

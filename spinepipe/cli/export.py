@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from spinepipe import studies
 from spinepipe.cli.find import specimen_of, study_names, unknown
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
@@ -13,6 +12,7 @@ from spinepipe.frames import Pose
 from spinepipe.jobs.inputs import bushing_model, sampled_poses, start_stiffness
 from spinepipe.problems import InputError, Problem
 from spinepipe.status import Status
+from spinepipe.studies import read as studies
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spinepipe import cohort as cohorts
-from spinepipe import studies
 from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies import read as studies
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.study import COHORTS
 

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies.cohort_stiffness import kind as cohort_stiffness
 from spinepipe.studies.discrepancy import kind as discrepancy
 from spinepipe.studies.global_sensitivity import kind as global_sensitivity
 from spinepipe.studies.joint_pose_sensitivity import kind as layout
 from spinepipe.studies.range_of_motion import kind as range_of_motion
 from spinepipe.studies.study import Study
+from spinepipe.studies.study_files import StudyFiles
 
 LAYOUTS: dict[str, Callable[[Any, Cohort], StudyFiles]] = {
     "joint_pose_sensitivity": layout.Layout.of,

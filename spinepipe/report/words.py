@@ -1,8 +1,6 @@
-"""What figures call coordinates, units and numbers.
+"""What figures and findings call coordinates, units, numbers, load cases and lists of names."""
 
-What figures and findings call representations, load cases and sources.
-"""
-
+from collections.abc import Iterable
 from math import floor, isfinite, log10
 
 from spinepipe.units import TRANSLATIONS
@@ -115,7 +113,34 @@ def short(name: str, longest: int = _LONGEST) -> str:
     return f"{name[: longest - 1 - tail]}…{name[-tail:]}"
 
 
-def listed(names: tuple[str, ...], most: int) -> str:
+def first_of(names: tuple[str, ...], most: int) -> str:
     """The first names, and how many more there are."""
     shown = ", ".join(short(name) for name in names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+_MOST = 4
+_PAIRS = {"flexion extension": "flexion–extension", "bending rotation": "bending–rotation"}
+
+
+def plain(name: str) -> str:
+    """A name of results without underscores."""
+    words = name.replace("_", " ").strip()
+    for apart, pair in _PAIRS.items():
+        words = words.replace(apart, pair)
+    return words
+
+
+def capital(words: str) -> str:
+    """With a capital letter at the beginning."""
+    return words[:1].upper() + words[1:]
+
+
+def listed(names: Iterable[str], most: int = _MOST, last: str = "and") -> str:
+    """``a, b and c``; of many the first, and how many more."""
+    every = list(names)
+    if len(every) > most:
+        return f"{', '.join(every[:most])} and {len(every) - most} more"
+    if len(every) < 2:
+        return "".join(every)
+    return f"{', '.join(every[:-1])} {last} {every[-1]}"

@@ -1,13 +1,10 @@
-"""Read one study file, or say everything that is wrong with it.
+"""Read study files: one by itself, one together with its cohort, and which of them a run builds.
 
-A study together with its cohort: do the two fit each other?
-
-Which studies a run builds.
+Whatever is wrong is told at once, with file, line, what was found, what is allowed and what to do.
 """
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, Field
 
@@ -15,29 +12,11 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
-from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
-from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.discrepancy.checks import check_base_model, check_discrepancy
-from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
-from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.parts import FORM
-from spinepipe.studies.range_of_motion.settings import RangeOfMotion, check_range_of_motion
+from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import COHORTS, Study, cohort_folder
 
 STUDIES = Path("config") / "studies"
-
-KINDS: dict[str, type[Study]] = {
-    "joint_pose_sensitivity": JointPoseSensitivity,
-    "range_of_motion": RangeOfMotion,
-    "cohort_stiffness": CohortStiffness,
-    "discrepancy": Discrepancy,
-    "global_sensitivity": GlobalSensitivity,
-}
-"""The model of each kind of study."""
 
 
 def read(path: Path, root: Path) -> Study:
@@ -80,13 +59,13 @@ def displayed(path: Path, root: Path) -> str:
 
 def _validated(document: Document) -> tuple[Study | None, list[Problem]]:
     kind = document.data.get("kind")
-    if isinstance(kind, str) and kind in KINDS:
-        return validate(KINDS[kind], document)
+    if isinstance(kind, str) and kind in kind_names():
+        return validate(kind_of(kind).settings, document)
     place = (document.file, document.line_of("kind"), "kind")
     found = "nothing: the key is missing" if kind is None else repr(kind)
     otherwise = "the kind decides which other keys are allowed"
-    remedy = did_you_mean(str(kind), KINDS, otherwise)
-    return None, [Problem(*place, found, one_of(KINDS), remedy)]
+    remedy = did_you_mean(str(kind), kind_names(), otherwise)
+    return None, [Problem(*place, found, one_of(kind_names()), remedy)]
 
 
 def _name_problems(document: Document, stem: str) -> list[Problem]:
@@ -96,27 +75,6 @@ def _name_problems(document: Document, stem: str) -> list[Problem]:
     place = (document.file, document.line_of("study"), "study")
     remedy = "rename the file or change the key"
     return [Problem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
-
-
-CHECKS: dict[str, Callable[[Document, Any, Cohort], Iterator[Problem]]] = {
-    "joint_pose_sensitivity": check_joint_pose_sensitivity,
-    "range_of_motion": check_range_of_motion,
-    "cohort_stiffness": check_cohort_stiffness,
-    "discrepancy": check_discrepancy,
-    "global_sensitivity": check_global_sensitivity,
-}
-"""What each kind of study demands of its cohort."""
-
-FILE_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
-    "cohort_stiffness": check_cohort_base,
-    "discrepancy": check_base_model,
-}
-"""What kinds of studies demand of further files, whose paths count from the Snakefile."""
-
-ROOM_CHECKS: dict[str, Callable[[Document, Any, Cohort, Path], Iterator[Problem]]] = {
-    "global_sensitivity": check_size_of_design,
-}
-"""What kinds of studies need of the machine; asked when all else is sound."""
 
 
 def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Cohort]:
@@ -139,14 +97,23 @@ def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Co
     cohort, faults = _cohort(document, root)
     problems += faults
     if document and study and cohort:
-        problems += CHECKS[study.kind](document, study, cohort)
-        if study.kind in FILE_CHECKS:
-            problems += FILE_CHECKS[study.kind](document, study, cohort, root)
-        if starting and not problems and study.kind in ROOM_CHECKS:
-            problems += ROOM_CHECKS[study.kind](document, study, cohort, root)
+        problems += _misfits(document, study, cohort, root, starting and not problems)
     if problems or study is None or cohort is None:
         raise InputError(problems)
     return study, cohort
+
+
+def _misfits(
+    document: Document, study: Study, cohort: Cohort, root: Path, at_start: bool
+) -> list[Problem]:
+    """What the kind of the study finds wrong with it, its cohort, files and machine."""
+    kind = kind_of(study.kind)
+    problems = [found for check in kind.checks for found in check(document, study, cohort)]
+    for ask in kind.checks_of_files:
+        problems += ask(document, study, cohort, root)
+    if at_start and not problems:
+        problems = [p for ask in kind.checks_at_start for p in ask(document, study, cohort, root)]
+    return problems
 
 
 def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[Problem]]:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.unit.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 from spinepipe.sensitivity.global_indices import Settings, convergence, draw, indices
-from tests.unit.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 SEEDS = range(40)
 

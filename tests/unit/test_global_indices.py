@@ -5,6 +5,7 @@ import pytest
 from SALib.analyze import delta, fast, morris, pawn, rbd_fast, sobol
 from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
+from tests.unit.known_indices import FUNCTIONS, Array
 
 from spinepipe.sensitivity.global_indices import (
     DUMMY,
@@ -17,7 +18,6 @@ from spinepipe.sensitivity.global_indices import (
     indices,
     noise_floor,
 )
-from tests.unit.known_indices import FUNCTIONS, Array
 
 G = FUNCTIONS["g"]
 QUICK = Settings(bootstraps=20, delta_bootstraps=5)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from cohort_cases import Change, cell, joints, line, swap, text, without, write
 
-from spinepipe import studies
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies import read as studies
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 STUDY = """\

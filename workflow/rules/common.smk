@@ -5,7 +5,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from spinepipe import studies
+from spinepipe.studies import read as studies
 from spinepipe.jobs.cohort_stiffness.base_model import given_digest
 from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.jobs.layout import METHODS

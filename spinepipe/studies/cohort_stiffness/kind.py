@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.report.published import OF_COHORTS, stands_for
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -15,6 +14,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_sets,
     tests_of,
 )
+from spinepipe.studies.study_files import StudyFiles
 
 OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""

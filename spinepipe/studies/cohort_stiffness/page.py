@@ -10,10 +10,8 @@ from spinepipe.report.page.document import Document, Picture, Results, Sortable,
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.studies.cohort_stiffness.tables import FINDINGS
-from spinepipe.studies.joint_pose_sensitivity.page import AGAINST_COLUMNS
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024B
-from spinepipe.tables import TABLES
+from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS
+from spinepipe.tables.shared import against_as_shown
 
 SHOWN = {
     "findings": "Claims about the cohort, checked",
@@ -31,7 +29,7 @@ SHOWN = {
 _CLAIM_ORDER = ("statement", "holds", "value", "unit", "low", "high", "p", "quantity", "message")
 _COLUMNS = {
     FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
-    AGAINST_GOULD_2024B.name: AGAINST_COLUMNS,
+    AGAINST_GOULD_2024B.name: against_as_shown(AGAINST_GOULD_2024B),
 }
 """What a reader compares stands first; short names are left to the files."""
 

@@ -41,8 +41,8 @@ from spinepipe.studies.cohort_stiffness.stages import (
     of_single_cases,
     rotations,
 )
-from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
 from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import ROTATIONS
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)

@@ -6,6 +6,7 @@ Tables of studies of kind cohort_stiffness that are computed from its fits and t
 """
 
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
+from spinepipe.tables.shared import against_paper
 from spinepipe.units import COORDINATES
 
 REPRESENTATIONS = (
@@ -410,3 +411,5 @@ FINDINGS = Table(
         MESSAGE,
     ),
 )
+
+AGAINST_GOULD_2024B = against_paper("against_gould_2024b")

@@ -10,16 +10,13 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.report.page.document import Results
-from spinepipe.report.words import count, fixed, number
+from spinepipe.report.words import capital, count, fixed, listed, number, plain
 from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict
 from spinepipe.studies.discrepancy.words import (
     axis,
     called,
-    capital,
     differing,
     estimate_of,
-    listed,
-    plain,
     readable,
     what_of,
     where_of,

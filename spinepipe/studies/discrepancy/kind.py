@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.study_files import StudyFiles
 
 FOLDER = "discrepancy"
 """Folder of all results inside that of the study."""

@@ -13,6 +13,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
+from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, WHERE
@@ -22,7 +23,6 @@ from spinepipe.studies.discrepancy.words import (
     called,
     differing,
     name_and_place,
-    plain,
     readable,
     unit_of,
     value_of,

@@ -1,9 +1,9 @@
 """Effects, places and misfits in plain words."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
-from spinepipe.report.words import AXIS, number
+from spinepipe.report.words import AXIS, listed, number, plain
 from spinepipe.studies.discrepancy.verdict import Estimate, Missing
 
 ALL = "*"
@@ -11,28 +11,13 @@ _UNCOUNTED = (
     *("asymmetry", "contact", "coupling", "creep", "dependence", "hysteresis", "laxity"),
     *("migration", "stiffening", "tilt", "weight"),
 )
-_MOST = 4
-_PAIRS = {"flexion extension": "flexion–extension", "bending rotation": "bending–rotation"}
 _KEYS = ("per_joint", "per_specimen")
 _NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
-
-
-def plain(name: str) -> str:
-    """A name of results without underscores."""
-    words = name.replace("_", " ").strip()
-    for apart, pair in _PAIRS.items():
-        words = words.replace(apart, pair)
-    return words
 
 
 def readable(sentence: str) -> str:
     """A sentence with its names in plain words; keys of a study file stay as they are typed."""
     return _NAME.sub(lambda found: found[0] if found[0] in _KEYS else plain(found[0]), sentence)
-
-
-def capital(words: str) -> str:
-    """With a capital letter at the beginning."""
-    return words[:1].upper() + words[1:]
 
 
 def with_article(name: str) -> str:
@@ -46,16 +31,6 @@ def with_article(name: str) -> str:
 def axis(coordinate: str) -> str:
     """A coordinate as a direction: ``flexion-extension``; * is all of them."""
     return AXIS[coordinate].lower() if coordinate in AXIS else plain(coordinate)
-
-
-def listed(names: Iterable[str], most: int = _MOST, last: str = "and") -> str:
-    """``a, b and c``; of many the first, and how many more."""
-    every = list(names)
-    if len(every) > most:
-        return f"{', '.join(every[:most])} and {len(every) - most} more"
-    if len(every) < 2:
-        return "".join(every)
-    return f"{', '.join(every[:-1])} {last} {every[-1]}"
 
 
 def where_of(effect: Missing) -> str:

@@ -15,8 +15,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, Results
-from spinepipe.report.words import count, fixed, number
-from spinepipe.studies.discrepancy.words import capital, listed
+from spinepipe.report.words import capital, count, fixed, listed, number
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.study_files import StudyFiles
 
 OF_JOBS = ("responses", "calibrated", "indices", "convergence")
 """Tables joined from job files: of batches of samples, the last two of whole specimens."""

@@ -1,6 +1,5 @@
 """Tables of studies of kind global_sensitivity: the design, what it led to, and the indices."""
 
-from spinepipe.studies.joint_pose_sensitivity.tables import NO_EQUILIBRIUM
 from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
@@ -11,6 +10,7 @@ from spinepipe.tables.schema import (
     status,
     stiffness_unit,
 )
+from spinepipe.tables.shared import NO_EQUILIBRIUM
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 INDEX_MEANINGS = {

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.report.published import OF_JOINT_POSE, stands_for
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.study_files import StudyFiles
 
 ALWAYS = (
     *("landmarks", "poses", "calibrations", "simulations", "success", "counts", "summary"),

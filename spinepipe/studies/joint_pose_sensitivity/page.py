@@ -22,10 +22,10 @@ from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness imp
 )
 from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, STATISTICS
+from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
-from spinepipe.tables import TABLES
 from spinepipe.tables.schema import Column
+from spinepipe.tables.shared import STATISTICS, against_as_shown
 
 _SENTENCE_END = re.compile(r"(?<=[.])(?<!et al[.])\s+(?=[A-Z])")
 SIMULATED = ("errors", "agreement")
@@ -145,17 +145,7 @@ _IMPORTANCE = (
 )
 
 
-_AGAINST_ORDER = (
-    *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
-    *("verdict", "reason", "where"),
-)
-AGAINST_COLUMNS = tuple(
-    column
-    for name in _AGAINST_ORDER
-    for column in AGAINST_GOULD_2024A.columns
-    if column.name == name
-)
-"""What a reader compares stands first; the short name is left to the file."""
+AGAINST_COLUMNS = against_as_shown(AGAINST_GOULD_2024A)
 
 
 def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:

@@ -29,8 +29,8 @@ from spinepipe.studies.joint_pose_sensitivity.errors import (
 )
 from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
 from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 NORMALITY = (chi_squared_normality, kolmogorov_smirnov_normality, lilliefors_normality)

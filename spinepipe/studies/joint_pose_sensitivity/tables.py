@@ -1,7 +1,4 @@
-"""Tables of tests, shares and agreement, the same for every kind of study.
-
-Tables of studies of kind joint_pose_sensitivity.
-"""
+"""Tables of studies of kind joint_pose_sensitivity: poses, fits, motion, shares and agreement."""
 
 from spinepipe.tables.schema import (
     JOINT,
@@ -15,10 +12,19 @@ from spinepipe.tables.schema import (
     status,
     stiffness_unit,
 )
+from spinepipe.tables.shared import (
+    ENDED,
+    FRAME_COLUMNS,
+    FRAME_KEY,
+    FRAMES_IN_GROUND,
+    JOINT_OR_ALL,
+    NO_EQUILIBRIUM,
+    NO_RESULT,
+    p_value,
+)
 from spinepipe.units import COORDINATES
 
 NOT_MEASURED = "not measured"
-NO_EQUILIBRIUM = "no pose was found"
 
 LANDMARKS = Table(
     "landmarks",
@@ -37,29 +43,7 @@ LANDMARKS = Table(
     ),
 )
 
-POSES = Table(
-    "poses",
-    "Joint frames in ground at the neutral pose: one row per specimen, pose and joint. "
-    "Orientations are intrinsic Z, X', Y'' rotations.",
-    ("specimen", "pose", "joint"),
-    (
-        SPECIMEN,
-        POSE,
-        JOINT,
-        *(
-            Column(f"{axis}_mm", "number", f"origin along {axis}", "mm", null="no frame is defined")
-            for axis in "xyz"
-        ),
-        *(
-            Column(
-                f"{name}_deg", "number", "orientation of the frame", "deg", "no frame is defined"
-            )
-            for name in COORDINATES[3:]
-        ),
-        status("building of the frame"),
-        MESSAGE,
-    ),
-)
+POSES = Table("poses", f"{FRAMES_IN_GROUND}.", FRAME_KEY, FRAME_COLUMNS)
 
 
 def _calibration_columns() -> tuple[Column, ...]:
@@ -184,46 +168,6 @@ SIMULATIONS = Table(
 )
 
 
-NO_RESULT = "there is no result, see status"
-ENDED = Column(
-    "status",
-    "text",
-    "whether there is a result; constant: nothing varies; too_few: too little data",
-    allowed=("done", "constant", "too_few"),
-)
-JOINT_OR_ALL = Column("joint", "text", "joint, or * for all joints together")
-
-
-def _p(name: str, meaning: str) -> Column:
-    return Column(name, "number", meaning, null=NO_RESULT, low=0.0, high=1.0)
-
-
-STATISTICS = Table(
-    "statistics",
-    "Tests of significance: one row per test. A family is what is corrected for together.",
-    ("specimen", "family", "test", "joint", "response", "factor", "stratum"),
-    (
-        SPECIMEN,
-        Column("family", "text", "tests that are corrected together"),
-        Column("test", "text", "name of the test"),
-        JOINT_OR_ALL,
-        Column("response", "text", "what is tested, such as extension_error"),
-        Column("factor", "text", "what it is tested against; empty where there is nothing"),
-        Column("stratum", "text", "what was held fixed, a stiffness set or a pose; or empty"),
-        Column("n", "integer", "observations, or blocks of a Friedman test", low=0),
-        Column("statistic_name", "text", "what the statistic is called"),
-        Column("statistic", "number", "value of the statistic", null=NO_RESULT),
-        Column("effect_name", "text", "what the effect size is called"),
-        Column("effect", "number", "effect size", null=NO_RESULT),
-        _p("p", "p-value, uncorrected"),
-        _p("p_bonferroni", "p-value times the size of the family"),
-        _p("p_holm", "p-value corrected by Holm's method, never larger than Bonferroni's"),
-        Column("family_size", "integer", "tests of the family that have a p-value", low=0),
-        ENDED,
-        MESSAGE,
-    ),
-)
-
 _LIMITS = "mm or deg, see unit"
 
 
@@ -260,7 +204,7 @@ AGREEMENT = Table(
             low=-1.0,
             high=1.0,
         ),
-        _p("proportional_p", "its p-value, uncorrected"),
+        p_value("proportional_p", "its p-value, uncorrected"),
         ENDED,
         MESSAGE,
     ),

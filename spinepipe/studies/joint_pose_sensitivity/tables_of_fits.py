@@ -1,7 +1,5 @@
 """Tables of the bootstraps, filters, methods and landmark precision of a joint-pose study."""
 
-from dataclasses import replace
-
 from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
@@ -13,6 +11,7 @@ from spinepipe.tables.schema import (
     status,
     stiffness_unit,
 )
+from spinepipe.tables.shared import against_paper
 from spinepipe.units import COORDINATES
 
 NO_FIT = "no stiffness was found"
@@ -373,37 +372,4 @@ REQUIRED_PRECISION = Table(
     ),
 )
 
-AGAINST_GOULD_2024A = Table(
-    "against_gould_2024a",
-    "The paper's numbers beside ours: one row per published quantity.",
-    ("id",),
-    (
-        Column("id", "text", "short name of the quantity"),
-        Column("where", "text", "table or section of the paper"),
-        Column("quantity", "text", "what it is"),
-        Column("unit", "text", "unit of the values; may be empty"),
-        *(
-            Column(name, "number", meaning, "see unit", null="not printed, or not computed")
-            for name, meaning in (
-                ("paper", "the paper's value"),
-                ("paper_low", "lower end of the range it is compared with"),
-                ("paper_high", "upper end of the range it is compared with"),
-                ("ours", "our value"),
-                ("ours_low", "lower end of our range"),
-                ("ours_high", "upper end of our range"),
-            )
-        ),
-        Column(
-            "verdict",
-            "text",
-            "inside, outside: our value and the paper's range; circular: inside, but the cohort "
-            "was built to have it; recomputed: the paper's number from its other numbers; "
-            "contradicted: the paper's own numbers exclude each other; not_computed: this run "
-            "has no such value",
-            allowed=("inside", "outside", "circular", "recomputed", "contradicted", "not_computed"),
-        ),
-        Column("reason", "text", "what the range is, and why ours is outside it"),
-    ),
-)
-
-AGAINST_GOULD_2024B = replace(AGAINST_GOULD_2024A, name="against_gould_2024b")
+AGAINST_GOULD_2024A = against_paper("against_gould_2024a")

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.study_files import StudyFiles
 
 OF_JOBS = ("range_of_motion",)
 """Tables joined from job files, one for each specimen, pose and stiffness set."""

@@ -1,6 +1,5 @@
 """Tables of studies of kind range_of_motion."""
 
-from spinepipe.studies.joint_pose_sensitivity.tables import ENDED, NO_EQUILIBRIUM, NO_RESULT, POSES
 from spinepipe.tables.schema import (
     JOINT,
     MESSAGE,
@@ -12,6 +11,7 @@ from spinepipe.tables.schema import (
     status,
     stiffness_unit,
 )
+from spinepipe.tables.shared import ENDED, FRAME_COLUMNS, FRAME_KEY, NO_EQUILIBRIUM, NO_RESULT
 from spinepipe.units import COORDINATES, ROTATIONS
 
 STIFFNESS_SET = Column(
@@ -25,8 +25,8 @@ FRAMES = Table(
     "Joint frames in ground at the neutral pose: one row per specimen, pose and joint. Pose 0 is "
     "the cohort's own, the others are drawn around it. Orientations are intrinsic Z, X', Y'' "
     "rotations.",
-    POSES.key,
-    POSES.columns,
+    FRAME_KEY,
+    FRAME_COLUMNS,
 )
 
 STIFFNESS_SETS = Table(

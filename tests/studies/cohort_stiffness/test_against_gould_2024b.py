@@ -28,10 +28,10 @@ from spinepipe.studies.cohort_stiffness.gould_2024b.stiffness import (
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024B
+from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B
 from spinepipe.tables import TABLES, from_rows, read, read_frame
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
 STUDY = "t12s1_cohort_stiffness"
 

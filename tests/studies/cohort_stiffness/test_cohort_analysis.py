@@ -36,8 +36,8 @@ from spinepipe.studies.cohort_stiffness.stages import (
     without_result,
 )
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING
-from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
 from spinepipe.tables import from_rows
+from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import ROTATIONS
 
 CLAIM = Claim("name", "It is so.", "a number", "deg")

@@ -25,10 +25,10 @@ from chain_cases import (
     by_joint,
 )
 
-from spinepipe import studies
 from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
+from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness import claims_of_stiffness as findings
 from spinepipe.studies.cohort_stiffness import literature, pool, ranking
 from spinepipe.studies.cohort_stiffness import ranking as mae

@@ -20,7 +20,7 @@ from spinepipe.studies.cohort_stiffness.figures.held_out_error import rotation_e
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
 from spinepipe.studies.cohort_stiffness.kind import COHORT_ANALYSES, COHORT_FIGURES, OF_JOBS
 
-CAPTIONS = Path(__file__).resolve().parents[2] / "workflow" / "report"
+CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
 LONG = tuple(f"vertebra_number_{n}" for n in range(6))
 SPINE = ("S1", "L5", "L4", "L3", "L2", "L1", *(f"T{n}" for n in range(12, 0, -1)))
 SIZES = {

@@ -24,7 +24,7 @@ from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.settings import CrossValidation
 from spinepipe.tables import TABLES, to_arrow, write
 
-CAPTIONS = Path(__file__).resolve().parents[2] / "workflow" / "report"
+CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SIZES = {
     "three specimens": Size(),

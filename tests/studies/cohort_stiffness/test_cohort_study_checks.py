@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from chain_cases import DEGREES, MOMENT_OF, STUDY, Chains
 
-from spinepipe import studies
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])

@@ -17,6 +17,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.discrepancy import DRAW
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
+from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy import draw as figures_job
 from spinepipe.studies.discrepancy import report as report_job
 from spinepipe.studies.discrepancy.figures.effects import evidence_by_round, looks
@@ -26,10 +27,10 @@ from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, TABLES
 from spinepipe.studies.discrepancy.page import TITLES, discrepancy_page, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Answer, Estimate, verdict_of
-from spinepipe.studies.discrepancy.words import estimate_of, plain, readable, value_of
+from spinepipe.studies.discrepancy.words import estimate_of, readable, value_of
 from spinepipe.studies.read import check
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 CAPTIONS = {name: (ROOT / "workflow" / "report" / f"{name}.rst").read_text() for name in DRAW}
 
 

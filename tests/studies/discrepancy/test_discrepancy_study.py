@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from chain_cases import DEGREES, STUDY, Chains
 
-from spinepipe import studies
 from spinepipe.effects import Spread, Trial, registry
 from spinepipe.jobs.layouts import files_of
 from spinepipe.jobs.settings import relevant_settings
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import effects_to_try
 from spinepipe.studies.discrepancy.settings import Discrepancy
 

@@ -20,7 +20,7 @@ from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 COHORT, UNSEEN = "stiffening_spines", "s03"
 TESTS = ("axial_rotation", "flexion_extension", "lateral_bending")
 SD_DEG = 0.1

@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy import report
 from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, OTHERS, TABLES
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SCHEMAS = {table.name: table for table in (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)}
 START = [149000.0, 1890000.0, 135000.0, 51.0, 68.8, 291.0]
 """Default stiffness of studies (docs/studies/discrepancy.md): N/m, then N m/rad."""

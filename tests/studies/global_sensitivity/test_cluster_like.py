@@ -5,21 +5,18 @@ The profile for Slurm is used as it is, with an executor that submits to a shell
 
 import importlib.util
 import re
-import sys
 from pathlib import Path
 
+import grid_cases
 import pytest
 import yaml
 from lever import lever
 from small_project import Project, copy_project
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-import grid_cases
-
 pytestmark = pytest.mark.slow
 
 PLUGIN = "snakemake-executor-plugin-cluster-generic"
-PROFILE = Path(__file__).parents[2] / "profiles/slurm/config.yaml"
+PROFILE = Path(__file__).parents[3] / "profiles/slurm/config.yaml"
 MOVES = 16
 STUDY = (
     "poses: 2\nstiffness_sets: 8\n"

@@ -11,10 +11,10 @@ import pytest
 from cohort_cases import Change, add, both, cell, joints, line, swap, text, without, write
 from scipy import stats
 
-from spinepipe import studies
 from spinepipe.problems import InputError, Problem
 from spinepipe.sensitivity.global_indices import INDICES, Known
 from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import change as varied
 from spinepipe.studies.global_sensitivity import settings as study_file
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of

@@ -4,16 +4,11 @@ Everything but the solve is the product's: the design, batches, tables, indices,
 figures and report. Ishigami & Homma 1990, a = 7, b = 0.1.
 """
 
-import sys
-from pathlib import Path
-
 import pandas as pd
 import pytest
+from known_indices import ishigami, morris_truth
 from lever import lever, table
 from small_project import Project
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-from known_indices import ishigami, morris_truth
 
 SAMPLES = {"sobol": 1024, "fast": 2048, "morris": 500}
 NAMES = {"load_point_x": "x1", "load_point_y": "x2", "load_point_z": "x3"}
@@ -39,7 +34,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from spinepipe.studies import check
+from spinepipe.studies.read import check
 from spinepipe.tables import RESPONSES, to_arrow, write
 
 

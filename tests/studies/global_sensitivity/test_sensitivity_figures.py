@@ -40,7 +40,7 @@ from spinepipe.tables import Table, from_rows
 
 Rows = list[dict[str, Any]]
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SLOPES = {"load_size": 4.0, "load_point_x": 2.0, "mass": 0.2, "damping": 0.0, "dummy": 0.0}
 """Of independent standard normals: S1 = ST = slope squared over their sum, mu* = |slope|."""
 

@@ -10,8 +10,8 @@ from SALib.sample import fast_sampler, latin, sobol
 from SALib.sample.morris import morris
 
 from spinepipe import cohort as cohorts
-from spinepipe import studies
 from spinepipe.problems import InputError
+from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import size_of_design
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.size_of_design import Size, available_memory, free_disk

@@ -35,7 +35,7 @@ from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
 from spinepipe.tables import TABLES, from_rows, read, read_frame
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
 
 NOT_APPLICABLE = {"A35": "posterior ligaments intact or removed: two sentences, no number"}

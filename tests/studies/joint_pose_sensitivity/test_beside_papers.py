@@ -14,7 +14,7 @@ from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
 from spinepipe.studies.read import KINDS
 from spinepipe.studies.study import Study
 
-COHORTS = Path(__file__).resolve().parents[2] / "config" / "cohorts"
+COHORTS = Path(__file__).resolve().parents[3] / "config" / "cohorts"
 
 
 def study_of(kind: str, cohort: str) -> Study:

@@ -61,7 +61,7 @@ def words(svg: Path) -> str:
 
 def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
     assert set(figures.DRAW) == set(FIGURES)
-    captions = Path(__file__).resolve().parents[2] / "workflow" / "report"
+    captions = Path(__file__).resolve().parents[3] / "workflow" / "report"
     known = {*FIGURES, *COHORT_FIGURES, *ROM_FIGURES, *DISCREPANCY_FIGURES, *SENSITIVITY_FIGURES}
     assert {path.stem for path in captions.glob("*.rst")} == known
 

@@ -34,7 +34,7 @@ from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivi
 from spinepipe.tables import read_frame
 
 FOUR = ("anterior", "superior", "extension", "right_bending")
-CAPTIONS = Path(__file__).resolve().parents[2] / "workflow" / "report"
+CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
 Study = tuple[JointPoseSensitivity, Cohort, dict[str, pd.DataFrame]]
 
 

@@ -26,7 +26,7 @@ from spinepipe.model import ScopedEffect
 from spinepipe.statics import free_parameters
 from spinepipe.units import STIFFNESS_COLUMNS
 
-COHORT = read(Path(__file__).parents[2] / "config" / "cohorts" / "palanca_l1l4")
+COHORT = read(Path(__file__).parents[3] / "config" / "cohorts" / "palanca_l1l4")
 SPECIMEN = COHORT.specimen_names[0]
 FREE = [STIFFNESS_COLUMNS[0], STIFFNESS_COLUMNS[1], STIFFNESS_COLUMNS[3]]
 START = np.array([24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0])

@@ -1,9 +1,9 @@
 """A study of range of motion from beginning to end, and what is computed again."""
 
 import shutil
-import sys
 from pathlib import Path
 
+import grid_cases
 import numpy as np
 import pandas as pd
 import pyarrow.dataset as ds
@@ -13,9 +13,6 @@ from small_project import SKIPPED, Project, copy_project, written
 
 from spinepipe.studies.range_of_motion.kind import ROM_FIGURES, TABLES
 from spinepipe.tables import TABLES as SCHEMAS
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-import grid_cases
 
 pytestmark = pytest.mark.slow
 

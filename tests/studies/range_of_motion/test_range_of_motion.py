@@ -9,11 +9,11 @@ import pytest
 from grid_cases import JOINTS, STIFFNESS, STUDY, made_up, project, table_of
 from scipy.spatial.transform import Rotation
 
-from spinepipe import studies
 from spinepipe.cohort.load_tests import VIRTUAL_TESTS, virtual_load_cases
 from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.problems import InputError
+from spinepipe.studies import read as studies
 from spinepipe.studies.range_of_motion import analyse as summary
 from spinepipe.studies.range_of_motion import analyse as variance
 from spinepipe.studies.range_of_motion import draw as draw_stiffness

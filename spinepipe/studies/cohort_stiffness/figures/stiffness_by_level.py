@@ -22,7 +22,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_upright, finite, quartiles
 from spinepipe.report.panels import explain_marks, head, log_ticks
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
-from spinepipe.report.words import AXIS, NAME, count, listed, number, short, stiffness_unit
+from spinepipe.report.words import AXIS, NAME, count, first_of, number, short, stiffness_unit
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.units import COORDINATES
@@ -338,7 +338,7 @@ def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
         several = len(cohort.specimen_names) > 1
         if several:
             words.append(
-                f"in each level from left to right: {listed(cohort.specimen_names, _MOST_NAMES)}"
+                f"in each level from left to right: {first_of(cohort.specimen_names, _MOST_NAMES)}"
             )
         words += ["line: 95 % interval, where longer than the symbol", "▲▼: beyond the axis"]
     return "; ".join(words) + "."

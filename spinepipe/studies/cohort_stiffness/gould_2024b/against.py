@@ -27,7 +27,7 @@ from spinepipe.studies.cohort_stiffness.gould_2024b.tests import (
     claims_of_signed_rank,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024B
+from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B
 from spinepipe.tables import from_rows, read_frames, write
 
 CLAIMS = (

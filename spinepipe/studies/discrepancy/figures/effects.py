@@ -18,11 +18,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
 from spinepipe.report.panels import explain_marks, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, blank, note, saying
-from spinepipe.report.words import fixed, number, short, tick
+from spinepipe.report.words import fixed, number, plain, short, tick
 from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell, name_cells
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
 from spinepipe.studies.discrepancy.verdict import Verdict
-from spinepipe.studies.discrepancy.words import plain
 
 _SQUARE_MM, _BESIDE_MM, _SCALE_MM = 5.4, 34.0, 24.0
 _MOST_WITH_NUMBERS = 22

@@ -13,9 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import finite
 from spinepipe.report.panels import explain_marks, head, log_ticks
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import short
+from spinepipe.report.words import plain, short
 from spinepipe.studies.discrepancy.verdict import Verdict
-from spinepipe.studies.discrepancy.words import plain
 
 KINDS = {"specimen": "One specimen left out", "test": "One test left out"}
 MODELS = {

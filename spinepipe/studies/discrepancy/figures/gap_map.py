@@ -35,9 +35,8 @@ from spinepipe.report.style import (
     blank,
     saying,
 )
-from spinepipe.report.words import AXIS, count, fixed, number, short, unit
+from spinepipe.report.words import AXIS, capital, count, fixed, number, plain, short, unit
 from spinepipe.studies.discrepancy.verdict import Verdict
-from spinepipe.studies.discrepancy.words import capital, plain
 from spinepipe.units import COORDINATES
 
 MOST_PLACES, FEWEST_PLACES = 6, 3

@@ -23,8 +23,7 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.report.marks import Array
 from spinepipe.report.panels import sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
-from spinepipe.report.words import AXIS, count, short, unit
-from spinepipe.studies.discrepancy.words import capital, plain
+from spinepipe.report.words import AXIS, capital, count, plain, short, unit
 from spinepipe.studies.global_sensitivity.settings import DUMMY
 from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
 

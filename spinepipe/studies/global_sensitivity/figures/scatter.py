@@ -17,9 +17,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array
 from spinepipe.report.panels import explain_marks, log_ticks
 from spinepipe.report.style import BLUE, GREY, blank, saying
-from spinepipe.report.words import count, fixed, number
+from spinepipe.report.words import capital, count, fixed, number
 from spinepipe.status import Status
-from spinepipe.studies.discrepancy.words import capital
 from spinepipe.studies.global_sensitivity.figures.panels import (
     NAME,
     Measures,

@@ -1,0 +1,126 @@
+"""What a kind of study is: settings, checks, tables, jobs and figures in one declaration.
+
+The declaration of a kind is `KIND` in ``spinepipe/studies/<kind>/kind.py``. Functions are named, not
+imported, so that reading the declaration loads no mechanics and no drawing, and so that the
+digest of a job follows its own file alone.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document
+from spinepipe.problems import Problem
+from spinepipe.studies.study import Study
+from spinepipe.studies.study_files import StudyFiles
+from spinepipe.tables.schema import Table
+
+Check = Callable[[Document, Any, Cohort], Iterator[Problem]]
+"""What is asked of a study file, the study and its cohort."""
+
+CheckOfFiles = Callable[[Document, Any, Cohort, Path], Iterator[Problem]]
+"""The same, with the folder of the Snakefile, from which paths count."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A function that writes result files of a study.
+
+    Attributes
+    ----------
+    name : what rules, logs and digests call it.
+    at : ``file:function`` in the folder of the kind; without a function, `run`. By default the
+        file of the job's own name.
+    reads : for a job that makes tables of tables, the tables it is computed from, of those that
+        the study has; a name with a dot is another result file, handed over as an argument of its
+        own.
+    writes : the tables it makes of them.
+    ignores : settings that it does not look at: their names, with what of each is ignored. All
+        others count, so that one added later is not overlooked.
+    """
+
+    name: str
+    at: str = ""
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+    ignores: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def module(self) -> str:
+        """The file in the folder of the kind, as a dotted name."""
+        return (self.at or self.name).partition(":")[0]
+
+    @property
+    def function(self) -> str:
+        """The function in it."""
+        return self.at.partition(":")[2] or "run"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a study.
+
+    Attributes
+    ----------
+    name : of its files.
+    title : above it on the report's page.
+    at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
+    reads : what it is drawn from, as of a `Job`.
+    """
+
+    name: str
+    title: str
+    at: str
+    reads: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """All that the core asks a kind of study.
+
+    Attributes
+    ----------
+    settings : what its study files hold.
+    files : the result files of a study of a cohort.
+    checks : what it demands of its cohort; each asked whatever the others find.
+    checks_of_files : what it demands of further files.
+    checks_at_start : what it needs of the machine; asked before it starts, when all else is sound.
+    tables : the tables it can make.
+    jobs : what computes them.
+    figures : in the order of the report.
+    ignored_by_figures : settings that no figure looks at.
+    """
+
+    settings: type[Study]
+    files: Callable[[Any, Cohort], StudyFiles]
+    checks: tuple[Check, ...]
+    tables: tuple[Table, ...]
+    jobs: tuple[Job, ...]
+    figures: tuple[Figure, ...]
+    checks_of_files: tuple[CheckOfFiles, ...] = ()
+    checks_at_start: tuple[CheckOfFiles, ...] = ()
+    ignored_by_figures: tuple[str, ...] = ()
+
+    def job(self, name: str) -> Job:
+        """The job of that name."""
+        return next(job for job in self.jobs if job.name == name)
+
+    def table(self, name: str) -> Table:
+        """The table of that name."""
+        return next(table for table in self.tables if table.name == name)
+
+    def figure(self, name: str) -> Figure:
+        """The figure of that name."""
+        return next(figure for figure in self.figures if figure.name == name)
+
+    @property
+    def analyses(self) -> tuple[Job, ...]:
+        """Jobs that make tables of tables."""
+        return tuple(job for job in self.jobs if job.writes)
+
+
+def ignoring(*names: str, **parts: Any) -> dict[str, Any]:
+    """What a job ignores: whole settings by name, of others the parts given."""
+    return {**dict.fromkeys(names, True), **parts}

@@ -1,0 +1,38 @@
+"""Which kinds of studies there are: one folder each, found by name.
+
+Nothing is imported here by a written name, so that the digest of a job that asks for its study
+does not follow all kinds.
+"""
+
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from spinepipe.studies.kind import Kind
+
+_HERE = Path(__file__).resolve().parent
+PACKAGE = "spinepipe.studies"
+
+
+@cache
+def kind_names() -> tuple[str, ...]:
+    """Names of all kinds: the folders beside this file that declare one."""
+    return tuple(sorted(path.parent.name for path in _HERE.glob("*/kind.py")))
+
+
+@cache
+def kind_of(name: str) -> Kind:
+    """The declaration of a kind."""
+    found: Kind = import_module(f"{PACKAGE}.{name}.kind").KIND
+    return found
+
+
+def every_kind() -> dict[str, Kind]:
+    """All kinds by name."""
+    return {name: kind_of(name) for name in kind_names()}
+
+
+def place_of(kind: str, job: str) -> str:
+    """``module:function`` of a job of a kind."""
+    found = kind_of(kind).job(job)
+    return f"{PACKAGE}.{kind}.{found.module}:{found.function}"
