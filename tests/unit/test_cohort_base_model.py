@@ -15,12 +15,13 @@ import pytest
 from chain_cases import JOINTS, MOMENT_OF, STUDY, Chains, Written, by_joint
 from example_effects import CubicStiffening, MarkerError
 from scipy.optimize import brentq
+from spinepipe.jobs.cohort_stiffness.base_model import given_digest
 
 from spinepipe import studies
 from spinepipe.effects import register, registry
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
-from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN, given_digest
+from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN
 from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
