@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: all full test lint bench validate report env dev-env lock clean
+.PHONY: all full test test-kernels lint bench validate report env dev-env lock clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/snakemake -j$(CORES) all
@@ -14,6 +14,9 @@ full: env  ## build the long studies too
 
 test: dev-env  ## run all tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile
+
+test-kernels: dev-env  ## numeric tests under each kernel of the linear algebra that this processor can run
+	$(BIN)/python -m tests.kernels -n $(CORES) --dist loadfile
 
 lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 	$(BIN)/ruff format --check .

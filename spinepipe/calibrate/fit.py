@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
+from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
 from spinepipe.statics import moved
 from spinepipe.status import Status
@@ -261,12 +261,11 @@ def _least_squares(
                 arrived.append(optimum)
                 raise StopIteration
 
-    result = least_squares(
+    result = bounded_least_squares(
         residual,
         np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9),
-        jac=jacobian,
-        bounds=(problem.lower, problem.upper),
-        method="dogbox",
+        jacobian,
+        (problem.lower, problem.upper),
         x_scale=problem.scale,
         ftol=1e-11,
         xtol=_last_step(problem),

@@ -316,6 +316,8 @@ class _Search:
             except OutOfRuns:
                 message = f"no optimum within {self.runs.most} runs of the model"
                 return False, Status.NOT_CONVERGED, message
+            except np.linalg.LinAlgError as trouble:
+                return False, Status.NOT_CONVERGED, str(trouble)
         self.last = result.x
         return self._verdict(bool(result.success), str(result.message), notes)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array, Indices
 
 MEAN_SD = 10.0
@@ -100,7 +101,7 @@ class Hierarchy:
 
         Singular values keep both what is known to rounding and what is not seen at all.
         """
-        left, size, right = np.linalg.svd(design @ self._root)
+        left, size, right = svd(design @ self._root)
         self._size = size  # (S, m) of what is seen, in SDs of what to expect
         self._towards = right @ self._unroot  # (S, m, m) directions by unknowns
         self._aim = np.einsum("skm,sk->sm", left, target)

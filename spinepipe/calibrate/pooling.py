@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from spinepipe.calibrate.fit import (
     AT_THE_BRINK,
@@ -29,6 +28,7 @@ from spinepipe.calibrate.fit import (
 from spinepipe.calibrate.hierarchy import Hierarchy, between, change, condensed, estimated
 from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
+from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import RefusedModel
 from spinepipe.status import Status
@@ -236,7 +236,7 @@ class Member:
         scatter, prior = hierarchy.spreads.scatter, np.linalg.inv(np.linalg.cholesky(hierarchy.own))
         rows = np.vstack([design / scatter, prior])
         aims = np.append(aim / scatter, prior @ hierarchy.common)
-        return self.clipped(lsq_linear(rows, aims, (low, high), "bvls").x)
+        return self.clipped(bounded_lstsq(rows, aims, (low, high)))
 
     def result(self, expected: Array, covariance: Array, effective: float) -> PooledSpecimen:
         """Where it has ended; at what is ``expected`` (m,) of it where it has no pose."""

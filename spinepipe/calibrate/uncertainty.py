@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.calibrate.problem import Evaluation, Problem, shared_sums
+from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 from spinepipe.units import BORDER_PER_SI
 
@@ -115,7 +116,7 @@ def _deviation(
 
 def _seen(jacobian: Array) -> tuple[Array, Array, Array]:
     """Directions that leave a trace: left vectors (N, k), singular values (k,), right (k, m)."""
-    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    left, singular, right = svd(jacobian)
     seen = singular > RANK_TOLERANCE * max(singular.max(initial=0.0), np.finfo(float).tiny)
     return left[:, seen], singular[seen], right[seen]
 

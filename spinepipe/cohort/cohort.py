@@ -3,13 +3,17 @@
 What stands in ``cohort.yaml``.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from spinepipe.cohort.part_digest import PartDigests
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
@@ -105,3 +109,25 @@ class Cohort:
     def tests(self) -> tuple[str, ...]:
         """Tests in the order in which ``loads.csv`` first names them."""
         return () if self.loads is None else tuple(self.loads["test"].unique())
+
+    def digest_of(self, specimens: Sequence[str]) -> str:
+        """sha256 over what a job reads that looks at these specimens alone.
+
+        That is what the header says of the measurement, the names of the tests, and the
+        specimens' own rows of every table. Title and source are not part of it.
+        """
+        return self._parts.of(specimens)
+
+    @cached_property
+    def _parts(self) -> PartDigests:
+        sd = self.measurement_sd
+        shared = {
+            "cohort": self.name,
+            "vertebrae": self.vertebrae,
+            "gravity": self.gravity,
+            "zeroed_at_step_0": self.zeroed_at_step_0,
+            "measurement_sd": None if sd is None else sd.model_dump(mode="json"),
+            "tests": self.tests,
+        }
+        names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion")
+        return PartDigests(shared, {name: getattr(self, name) for name in names})

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.decomposition import eigh
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, joint_pose, reexpress, rotation_zxy
@@ -129,7 +130,7 @@ def _possible(inertia: Array) -> Array:
     Flat bodies and rods sit exactly on the limit (one principal moment the sum of the others),
     and figures in files are rounded; the reader has refused what is further off than that.
     """
-    moments, axes = np.linalg.eigh(inertia)
+    moments, axes = eigh(inertia)
     short = moments[2] * (1.0 + STRICTLY_INSIDE) - moments[0] - moments[1]
     if short <= 0.0:
         return inertia

@@ -1,20 +1,68 @@
 """Job: the rows of many files as one table, block by block and then as a whole."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pyarrow as pa
 
-from spinepipe.tables import TABLES, join, read
+from spinepipe.jobs.digest import code_digest, value_digest
+from spinepipe.marks import KEY
+from spinepipe.tables import TABLES, join, metadata_of, read
+
+NO_MARK = "none"
 
 
-def run(table: str, inputs: list[str], output: str) -> None:
-    """Join files of a table; what their folders say of them becomes columns again."""
-    join(TABLES[table], [_with_folders(table, path) for path in inputs], output)
+class StaleFile(ValueError):
+    """A file to be joined that hangs on other settings, data or code than the table does."""
 
 
-def _with_folders(table: str, path: str) -> pa.Table:
+def run(table: str, inputs: list[str], expected: list[str], output: str) -> None:
+    """Join files of a table; what their folders say of them becomes columns again.
+
+    Parameters
+    ----------
+    expected : the mark that each of the inputs must have.
+
+    Raises
+    ------
+    StaleFile
+        For a file with another mark.
+    """
+    parts = [read(path) for path in inputs]
+    found = [metadata_of(part) for part in parts]
+    for path, wanted, metadata in zip(inputs, expected, found, strict=True):
+        _check(path, wanted, metadata.get(KEY, ""))
+    rows = [_with_folders(table, path, part) for path, part in zip(inputs, parts, strict=True)]
+    mark = joined_digest(inputs, expected)
+    join(TABLES[table], rows, output, {**_together(found), KEY: mark})
+
+
+def joined_digest(parts: Sequence[str], marks: Sequence[str]) -> str:
+    """The mark of a file joined from others of these names and marks."""
+    return value_digest(code_digest("spinepipe.jobs.collect"), list(parts), list(marks))
+
+
+def _check(path: str, wanted: str, found: str) -> None:
+    if found != wanted:
+        raise StaleFile(
+            f"{path}: found the mark {found or NO_MARK}, expected {wanted}: the file was made with "
+            "other settings, data or code than it is joined for. Run again: it counts as lost and "
+            "is computed anew"
+        )
+
+
+def _together(found: Sequence[dict[str, str]]) -> dict[str, str]:
+    """Metadata of all parts: of a digest that differs the digest of all, else all that is said."""
+    together = {}
+    for key in sorted({key for one in found for key in one}):
+        values = sorted({one[key] for one in found if key in one})
+        several = value_digest(values) if key.endswith("_digest") else ", ".join(values)
+        together[key] = values[0] if len(values) == 1 else several
+    return together
+
+
+def _with_folders(table: str, path: str, rows: pa.Table) -> pa.Table:
     """Rows of one file with the ``name=value`` parts of its folders as columns."""
-    rows = read(path)
     schema = TABLES[table].schema
     for part in Path(path).parts[:-1]:
         name, found, value = part.partition("=")

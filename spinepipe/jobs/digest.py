@@ -10,6 +10,7 @@ import ast
 import hashlib
 import json
 import platform
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.settings import relevant_settings
+from spinepipe.marks import KEY
 from spinepipe.studies.study import Study
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -173,17 +175,51 @@ def versions() -> dict[str, str]:
     return {"version_python": platform.python_version(), **found}
 
 
-def provenance(job: str, study: Study, cohort: Cohort) -> dict[str, str]:
-    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study.
+def digest_of(
+    job: str,
+    study: Study,
+    cohort: Cohort,
+    specimens: Sequence[str] | None = None,
+    others: Sequence[str] = (),
+) -> str:
+    """The mark of a file written by ``spinepipe.jobs.<job>``: all that it hangs on.
 
-    ``config_digest`` covers the settings that the job depends on, no others.
+    Parameters
+    ----------
+    specimens : those that the job reads; none of them, the cohort's header alone; None, all.
+    others : what else it reads that decides, such as the mark of another file.
+    """
+    return value_digest(
+        code_digest(f"spinepipe.jobs.{job}"),
+        relevant_settings(job, study),
+        _cohort_digest(cohort, specimens),
+        list(others),
+    )
+
+
+def provenance(
+    job: str,
+    study: Study,
+    cohort: Cohort,
+    specimens: Sequence[str] | None = None,
+    others: Sequence[str] = (),
+) -> dict[str, str]:
+    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study, its mark among it.
+
+    ``config_digest`` covers the settings that the job depends on, ``cohort_digest`` the specimens
+    that it reads, no others. Parameters as in `digest_of`.
     """
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
-        "cohort_digest": cohort.digest,
+        "cohort_digest": _cohort_digest(cohort, specimens),
         "config_digest": value_digest(relevant_settings(job, study)),
         "code_digest": code_digest(f"spinepipe.jobs.{job}"),
+        KEY: digest_of(job, study, cohort, specimens, others),
         **versions(),
     }
+
+
+def _cohort_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
+    return cohort.digest if specimens is None else cohort.digest_of(specimens)

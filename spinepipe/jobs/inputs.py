@@ -1,11 +1,12 @@
 """What many jobs of one worker read again and again, kept as long as the files are the same."""
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from spinepipe.cohort.specimen import (
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
+from spinepipe.marks import without_mark
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -30,6 +32,9 @@ from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 Stamp = tuple[str, int, int]
+_SPECIMENS = 128
+"""Whose poses are kept: jobs of different specimens come in any order."""
+
 AnyStudy = TypeVar("AnyStudy", bound=Study)
 
 
@@ -41,7 +46,7 @@ def stamp(path: str | Path) -> Stamp:
 
 @dataclass(frozen=True)
 class Poses:
-    """Sampled joint frames of all specimens: (specimen, pose) to frames or the reason for none."""
+    """Sampled joint frames: (specimen, pose) to frames or the reason for none."""
 
     frames: dict[tuple[str, int], tuple[Pose, ...]]
     refused: dict[tuple[str, int], str]
@@ -82,6 +87,24 @@ def study_of_kind(kind: type[AnyStudy], root: str, name: str) -> tuple[AnyStudy,
 
 
 @lru_cache(maxsize=4)
+def _ranking(where: Stamp) -> dict[str, list[dict[str, Any]]]:
+    return without_mark(json.loads(Path(where[0]).read_text("utf-8")))
+
+
+def ranking(path: str) -> dict[str, list[dict[str, Any]]]:
+    """Specimen to its best stiffness sets, from ``best.json``."""
+    return _ranking(stamp(path))
+
+
+def ranked_set(path: str, specimen: str, name: str) -> str:
+    """Stiffness (J or 1, 6) of a ranked set as JSON; empty where the specimen has none so named."""
+    for ranked in ranking(path).get(specimen, []):
+        if ranked["name"] == name:
+            return json.dumps(ranked["stiffness"])
+    return ""
+
+
+@lru_cache(maxsize=_SPECIMENS)
 def _poses(where: Stamp) -> Poses:
     frame = read_frame(where[0])
     origins = frame[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
@@ -108,7 +131,7 @@ def _poses(where: Stamp) -> Poses:
 
 
 def sampled_poses(path: str) -> Poses:
-    """Sampled joint frames of ``poses.parquet``."""
+    """Sampled joint frames of a specimen, from the file that `build_models` wrote."""
     return _poses(stamp(path))
 
 

@@ -35,6 +35,7 @@ def _whole(*names: str) -> dict[str, Any]:
 IRRELEVANT: dict[str, dict[str, Any]] = {
     "sample_landmarks": _whole(*_MODEL, *_SOLVING, *_GROUPING, *_PARTS),
     "build_models": _whole("calibration", *_SOLVING, *_GROUPING, *_PARTS),
+    "start_model": _whole("calibration", *_SOLVING, *_GROUPING, *_PARTS),
     "calibrate": _whole("poses", *_SOLVING, *_GROUPING, *_PARTS),
     "rank": _whole("block", *(_PARTS - {"success"})),
     "simulate": _whole("poses", "calibration", "stiffness", *_GROUPING, *_PARTS),

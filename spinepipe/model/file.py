@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
-from spinepipe.files import appearing
+from spinepipe.marks import write_marked
 from spinepipe.model.spine import ScopedEffect
 from spinepipe.problems import InputError, Problem
 
@@ -83,11 +83,10 @@ def _as_number(value: Any) -> Any:
         return value
 
 
-def write_model(model: ModelFile, path: str | Path) -> None:
-    """Write a model file; it appears whole or not at all."""
+def write_model(model: ModelFile, path: str | Path, digest: str = "") -> None:
+    """Write a model file, a result of a study with its digest; it appears whole or not at all."""
     text = yaml.safe_dump(model.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-    with appearing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_marked(text, path, digest)
 
 
 def read_model(path: str | Path) -> ModelFile:

@@ -6,6 +6,7 @@ from math import atan2, cos, hypot, sin
 
 import numpy as np
 
+from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model.spine import Body, SpineModel
@@ -62,7 +63,7 @@ def _inertial(body: Body, frame: Pose) -> list[str]:
 
     PyBullet's own search for principal axes stops at 1e-8, so they are found here.
     """
-    moments, axes = np.linalg.eigh(frame.rotation.T @ body.inertia @ frame.rotation)
+    moments, axes = eigh(frame.rotation.T @ body.inertia @ frame.rotation)
     axes[:, 0] *= np.linalg.det(axes)
     xx, yy = moments[:2].tolist()
     zz = min(float(moments[2]), (xx + yy) * (1.0 - INSIDE_LIMIT))

@@ -11,7 +11,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spinepipe.files import appearing
+from spinepipe.marks import write_marked
 
 BLACK, GREY, WHITE = "#000000", "#767676", "#FFFFFF"
 BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
@@ -106,8 +106,12 @@ def picture(figure: Figure, kind: str) -> bytes:
     return content.getvalue()
 
 
-def save(figure: Figure, path: str | Path) -> None:
+def save(figure: Figure, path: str | Path, digest: str = "") -> None:
     """Write a picture, SVG, PNG or PDF by its name; it appears whole or not at all.
+
+    Parameters
+    ----------
+    digest : what it hangs on, see `spinepipe.marks`; only results of a study have one.
 
     Raises
     ------
@@ -118,6 +122,4 @@ def save(figure: Figure, path: str | Path) -> None:
     kind = path.suffix.removeprefix(".")
     if kind not in _NO_DATE:
         raise ValueError(f"{path.name}: a picture is .svg, .png or .pdf")
-    content = picture(figure, kind)
-    with appearing(path) as temporary:
-        temporary.write_bytes(content)
+    write_marked(picture(figure, kind), path, digest)

@@ -55,6 +55,15 @@ class StudyFiles(ABC):
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
 
+    @abstractmethod
+    def job_of(self, table: str, path: str) -> str:
+        """The job, below `spinepipe.jobs`, that writes a file of which a table is made."""
+
+    @property
+    def by_specimen(self) -> tuple[str, ...]:
+        """Tables of this study with one job file per specimen, joined without blocks."""
+        return ()
+
     @property
     def others(self) -> tuple[str, ...]:
         """Results that are neither tables nor figures nor the report."""
@@ -85,11 +94,17 @@ class StudyFiles(ABC):
 
     def block_files(self, table: str) -> list[str]:
         """The files of which a table is made."""
+        if table in self.by_specimen:
+            return [self.specimen_file(table, name) for name in self.specimens]
         return [self.block_file(table, *block) for block in self.blocks(table)]
 
     def block_file(self, table: str, specimen: str, block: str) -> str:
         """The file of one block of a table."""
         return f"{self.folder}/blocks/{table}/specimen={specimen}/block={block}.parquet"
+
+    def specimen_file(self, table: str, specimen: str) -> str:
+        """The job file of a specimen, of a table that has one for each."""
+        return f"{self.folder}/{table}/specimen={specimen}.parquet"
 
     def results(self) -> list[str]:
         """What a reader of the study wants to have: report, tables, figures and the rest."""
@@ -102,7 +117,14 @@ class StudyFiles(ABC):
 
         Snakemake does not miss a deleted file once the table made of it exists.
         """
-        return [file for table in self.made_of_jobs for file in self.absent(table, joined=True)]
+        lost = [file for table in self.made_of_jobs for file in self.absent(table, joined=True)]
+        return lost + [
+            file
+            for table in self.by_specimen
+            if os.path.exists(f"{self.folder}/{table}.parquet")
+            for file in self.block_files(table)
+            if not os.path.exists(file)
+        ]
 
     def absent(self, table: str, joined: bool) -> list[str]:
         """Missing job files of a table; with `joined` of those blocks only that are in a table."""

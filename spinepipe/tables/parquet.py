@@ -104,17 +104,21 @@ def write(rows: pa.Table, path: str | Path, metadata: Mapping[str, str]) -> None
         pq.write_table(rows, temporary, **(_SMALL if rows.num_rows < SMALL_ROWS else _LARGE))
 
 
-def join(table: Table, parts: Sequence[pa.Table], path: str | Path) -> None:
-    """Write tables one after the other as one; their common metadata is kept."""
-    common = dict(parts[0].schema.metadata or {})
-    for part in parts[1:]:
-        other = part.schema.metadata or {}
-        common = {key: value for key, value in common.items() if other.get(key) == value}
+def metadata_of(rows: pa.Table) -> dict[str, str]:
+    """Metadata of a table that was read."""
+    found = rows.schema.metadata or {}
+    return {key.decode(): value.decode() for key, value in found.items()}
+
+
+def join(
+    table: Table, parts: Sequence[pa.Table], path: str | Path, metadata: Mapping[str, str]
+) -> None:
+    """Write tables one after the other as one, with metadata of its own."""
     names = [column.name for column in table.columns]
     rows = pa.concat_tables([part.select(names).replace_schema_metadata(None) for part in parts])
     rows = rows.cast(table.schema)
     _check_keys(table, rows)
-    write(rows, path, {key.decode(): value.decode() for key, value in common.items()})
+    write(rows, path, metadata)
 
 
 def read(path: str | Path) -> pa.Table:

@@ -27,6 +27,8 @@ from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
 from spinepipe.tables import to_arrow
 from spinepipe.world import Chain
 
+pytestmark = pytest.mark.numeric
+
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)
 """(6,) m and rad."""

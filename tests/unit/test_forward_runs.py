@@ -1,5 +1,6 @@
 """The published way of fitting: its runs, its derivatives, and the rows of fits that fail."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 from study_cases import STUDY, Size, project, results
 
-from spinepipe.calibrate import MeasuredCase, Problem
+from spinepipe.calibrate import MeasuredCase, Problem, forward_runs
 from spinepipe.calibrate import forward_runs as forward_cost
 from spinepipe.calibrate.forward_runs import (
     ForwardFit,
@@ -119,6 +120,18 @@ def test_errors_of_derivatives_are_relative(
 ) -> None:
     found = relative_error(*(None if v is None else np.array(v) for v in (gradient, exact)))
     assert found == (None if expected is None else pytest.approx(expected))
+
+
+def test_a_fit_whose_linear_algebra_gives_up_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gives_up(cost: Callable[[Array], float], start: Array, **_: object) -> None:
+        cost(start)
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(forward_runs, "minimize", gives_up)
+    found = fit_by_forward_runs(problem(), 0.1, SANE)
+    assert (found.status, found.message) == (Status.NOT_CONVERGED, "SVD did not converge")
+    assert not found.claims_success
+    np.testing.assert_array_equal(found.x, 0.0)
 
 
 def test_a_fit_that_runs_out_of_runs_says_so() -> None:

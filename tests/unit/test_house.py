@@ -7,7 +7,7 @@ figures, `tables` after `statics`, whose status they store, and `statistics` has
 import ast
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *("units", "problems", "files", "frames", "anatomy", "effects", "model", "world", "statics"),
+    *("units", "problems", "decomposition", "files", "frames", "anatomy"),
+    *("effects", "model", "world", "statics"),
     *("calibrate", "designs", "statistics", "sensitivity"),
     *("tables", "comparison", "cohort", "studies", "discrepancy", "report", "jobs", "cli"),
 )
@@ -47,6 +48,14 @@ REGISTRY_HOSTS = re.compile(
 MACHINE_PATHS = re.compile(
     r"(?<![\w.$}*])/(?:" + "|".join(("wo" + "rk", "ro" + "ot", "ho" + "me", "Us" + "ers")) + r")/\w"
 )
+DECOMPOSING = re.compile(
+    r"numpy\.linalg\.(svd|svdvals|lstsq|pinv|matrix_rank|cond|eigh)"
+    r"|scipy\.linalg\.(svd|svdvals|lstsq|pinv|pinvh|orth|null_space|polar|eigh|subspace_angles"
+    r"|orthogonal_procrustes)"
+    r"|scipy\.optimize\.(least_squares|lsq_linear|curve_fit)"
+    r"|numpy\.polyfit|numpy\.polynomial\.\w+\.\w+fit|scipy\.stats\.multivariate_normal"
+)
+"""Functions that take apart matrices by divide and conquer, which can give up."""
 PINNED = re.compile(r"[A-Za-z0-9._-]+(\[[^\]]+\])?==\S+")
 HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}")
 
@@ -75,6 +84,39 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
                 yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
             else:
                 yield node.lineno, base
+
+
+def decompositions(tree: ast.Module) -> list[str]:
+    """``line n: full name`` of every use of `DECOMPOSING`, and of norms by singular values."""
+    known: dict[str, str] = {}
+    found: set[tuple[int, str]] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                name = alias.asname or alias.name.split(".")[0]
+                known[name] = alias.name if alias.asname else name
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                name = known[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+                found |= {(node.lineno, name)} if DECOMPOSING.fullmatch(name) else set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and DECOMPOSING.fullmatch(name := full(node, known)):
+            found.add((node.lineno, name))
+        elif isinstance(node, ast.Call) and full(node.func, known).endswith("linalg.norm"):
+            words = {word.arg: word.value for word in node.keywords}
+            order = [*node.args[1:2], *(words[name] for name in ("ord",) if name in words)]
+            if "axis" not in words and order and ast.unparse(order[0]) in ("2", "-2", "'nuc'"):
+                found.add((node.lineno, f"numpy.linalg.norm of order {ast.unparse(order[0])}"))
+    return [f"line {line}: {name}" for line, name in sorted(found)]
+
+
+def full(node: ast.expr, known: Mapping[str, str]) -> str:
+    """The full name of an expression of dots only; empty for any other."""
+    if isinstance(node, ast.Name):
+        return known.get(node.id, node.id)
+    if isinstance(node, ast.Attribute) and (before := full(node.value, known)):
+        return f"{before}.{node.attr}"
+    return ""
 
 
 def tracked() -> list[str]:
@@ -133,6 +175,38 @@ def test_only_world_imports_pybullet() -> None:
         if name.split(".")[0].startswith("pybullet")
     }
     assert users == {f"{PACKAGE}.world"}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import numpy as np\nnp.linalg.svd(a)", ["line 2: numpy.linalg.svd"]),
+        ("import numpy\nnumpy.linalg.pinv(a)", ["line 2: numpy.linalg.pinv"]),
+        ("import numpy.linalg\nnumpy.linalg.cond(a)", ["line 2: numpy.linalg.cond"]),
+        ("from numpy import linalg as la\n\nla.lstsq(a, b)", ["line 3: numpy.linalg.lstsq"]),
+        ("from numpy.linalg import eigh as e", ["line 1: numpy.linalg.eigh"]),
+        ("from scipy.linalg import det, polar", ["line 1: scipy.linalg.polar"]),
+        ("from scipy import optimize\noptimize.nnls(a)", []),
+        ("from scipy.optimize import lsq_linear", ["line 1: scipy.optimize.lsq_linear"]),
+        ("import numpy as np\nnp.polyfit(a, b, 1)", ["line 2: numpy.polyfit"]),
+        ("import numpy as np\nnp.linalg.norm(a)\nnp.linalg.solve(a, b)\nsvd(a)", []),
+        ("import numpy as np\nnp.linalg.norm(a, 2)", ["line 2: numpy.linalg.norm of order 2"]),
+        (
+            "import numpy as np\nnp.linalg.norm(a, ord='nuc')",
+            ["line 2: numpy.linalg.norm of order 'nuc'"],
+        ),
+        ("import numpy as np\nnp.linalg.norm(a, ord=2, axis=1)", []),
+    ],
+)
+def test_decompositions_are_seen_by_whatever_name(text: str, found: list[str]) -> None:
+    assert decompositions(ast.parse(text)) == found
+
+
+@pytest.mark.parametrize("path", MODULES, ids=dotted)
+def test_only_one_module_decomposes(path: Path) -> None:
+    """Others would fail on some processors: see `spinepipe.decomposition`."""
+    if dotted(path) != f"{PACKAGE}.decomposition":
+        assert decompositions(ast.parse(path.read_bytes())) == []
 
 
 def test_no_tracked_file_names_a_package_registry() -> None:

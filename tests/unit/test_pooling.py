@@ -30,6 +30,8 @@ from spinepipe.statics import System, follow, free_parameters, moved
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
+pytestmark = pytest.mark.numeric
+
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)
 """(6,) m and rad."""

@@ -9,7 +9,7 @@ rule aggregate_block:
     log:
         f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
     params:
-        digest=digests("collect"),
+        digest=block_digest,
     run:
         collect(rule, wildcards, input, output, log)
 
@@ -22,6 +22,6 @@ rule aggregate_table:
     log:
         f"{LOGS}/{{table}}.log",
     params:
-        digest=digests("collect"),
+        digest=table_digest,
     run:
         collect(rule, wildcards, input, output, log)

@@ -5,13 +5,9 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from spinepipe.studies import read as studies
-from spinepipe.jobs.cohort_stiffness.base_model import given_digest
-from spinepipe.jobs.digest import code_digest, value_digest
-from spinepipe.jobs.layout import METHODS
-from spinepipe.jobs.layouts import JOINED, files_of
-from spinepipe.jobs.settings import relevant_settings
+from spinepipe.jobs.expected import Expected
 from spinepipe.problems import InputError
+from spinepipe.studies import read as studies
 
 ROOT = os.getcwd()
 RESULTS = "results/{study}"
@@ -76,8 +72,13 @@ def load(name):
 
 @cache
 def layout(name):
-    study, cohort = load(name)
-    return files_of(study, cohort)
+    return expected(name).files
+
+
+@cache
+def expected(name):
+    """What tells the marks that results of a study must have."""
+    return Expected(ROOT, *load(name))
 
 
 def tables(*names):
@@ -85,21 +86,22 @@ def tables(*names):
     return lambda wildcards: layout(wildcards.study).table_files(names)
 
 
-@cache
-def digests(job, name=None):
-    """What must stay the same for the result of a job to stay: code, settings, measured data."""
-    code = code_digest(f"spinepipe.jobs.{job}")
-    if name is None:
-        return code
-    study, cohort = load(name)
-    settings = relevant_settings(job, study)
-    given = [given_digest(ROOT, study)] if study.kind == "cohort_stiffness" else []
-    return value_digest(code, settings, cohort.digest, *given)
-
-
 def digest(job):
-    """Params function: the digest of a job for the study at hand."""
-    return lambda wildcards: digests(job, wildcards.study)
+    """Params function: the mark that the files of a job for the study at hand must have."""
+    return lambda wildcards: expected(wildcards.study).of_job(
+        job, dict(wildcards.items())
+    )
+
+
+def block_digest(wildcards):
+    """Params function: the mark of a block of a table."""
+    place = wildcards.table, wildcards.specimen, wildcards.block
+    return expected(wildcards.study).of_block(*place)
+
+
+def table_digest(wildcards):
+    """Params function: the mark of a table that is joined from others."""
+    return expected(wildcards.study).of_table(wildcards.table)
 
 
 def blocks_of_table(wildcards):
@@ -126,10 +128,14 @@ def blocks_of_specimen(table):
 
 
 def stiffness_source(wildcards):
-    """Where a simulation takes its stiffness from: its own calibration or the ranking."""
+    """Where a simulation takes its stiffness from: its own calibration or the ranking.
+
+    Of the ranking its own set alone counts, which is part of its mark.
+    """
     folder = f"results/{wildcards.study}"
     if wildcards.stiffness != "calibrated":
-        return {"best": f"{folder}/best.json"}
+        ranked = checkpoints.rank_models.get(study=wildcards.study)
+        return {"best": ancient(ranked.output[0])}
     file = f"specimen={wildcards.specimen}/pose={wildcards.pose}.parquet"
     return {"calibration": f"{folder}/calibrations/{file}"}
 

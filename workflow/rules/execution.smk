@@ -128,7 +128,13 @@ def run_job(rule, job, wildcards, input, output, log, **others):
 def collect(rule, wildcards, input, output, log):
     """Join the rows of many files into one table."""
     table = wildcards.table
-    arguments = {"table": table, "inputs": plain(input), "output": plain(output[0])}
+    marks = [expected(wildcards.study).of_part(table, path) for path in plain(input)]
+    arguments = {
+        "table": table,
+        "inputs": plain(input),
+        "expected": marks,
+        "output": plain(output[0]),
+    }
     execute(rule, "collect", wildcards, log, arguments)
 
 

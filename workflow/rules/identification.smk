@@ -15,7 +15,7 @@ rule bootstrap:
 
 rule fit_by_method:
     input:
-        poses=f"{RESULTS}/poses.parquet",
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
         output=f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet",
     log:

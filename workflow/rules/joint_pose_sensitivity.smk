@@ -3,11 +3,22 @@
 POSES = results_of("joint_pose_sensitivity")
 
 
+rule start_model:
+    output:
+        output=f"{POSES}/model.yaml",
+    log:
+        f"{LOGS}/start_model.log",
+    params:
+        digest=digest("start_model"),
+    run:
+        run_job(rule, "start_model", wildcards, input, output, log)
+
+
 rule sample_landmarks:
     output:
-        output=f"{POSES}/landmarks.parquet",
+        output=f"{POSES}/landmarks/specimen={{specimen}}.parquet",
     log:
-        f"{LOGS}/sample_landmarks.log",
+        f"{LOGS}/sample_landmarks/specimen={{specimen}}.log",
     params:
         digest=digest("sample_landmarks"),
     run:
@@ -16,12 +27,11 @@ rule sample_landmarks:
 
 rule build_models:
     input:
-        landmarks=f"{RESULTS}/landmarks.parquet",
+        landmarks=f"{RESULTS}/landmarks/specimen={{specimen}}.parquet",
     output:
-        output=f"{POSES}/poses.parquet",
-        model=f"{POSES}/model.yaml",
+        output=f"{POSES}/poses/specimen={{specimen}}.parquet",
     log:
-        f"{LOGS}/build_models.log",
+        f"{LOGS}/build_models/specimen={{specimen}}.log",
     params:
         digest=digest("build_models"),
     run:
@@ -30,7 +40,7 @@ rule build_models:
 
 rule calibrate:
     input:
-        poses=f"{RESULTS}/poses.parquet",
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
         output=f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
     log:
@@ -61,7 +71,7 @@ checkpoint rank_models:
 rule simulate:
     input:
         unpack(stiffness_source),
-        poses=f"{RESULTS}/poses.parquet",
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
         output=f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
     log:

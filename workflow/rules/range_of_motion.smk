@@ -7,9 +7,9 @@ MOTIONS = results_of("range_of_motion")
 
 rule sample_frames:
     output:
-        output=f"{MOTIONS}/frames.parquet",
+        output=f"{MOTIONS}/frames/specimen={{specimen}}.parquet",
     log:
-        f"{LOGS}/sample_frames.log",
+        f"{LOGS}/sample_frames/specimen={{specimen}}.log",
     params:
         digest=digest("range_of_motion.sample_frames"),
     run:
@@ -29,7 +29,7 @@ rule draw_stiffness:
 
 rule move:
     input:
-        frames=f"{RESULTS}/frames.parquet",
+        frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
         output=f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,[0-9]+}}.parquet",

@@ -6,6 +6,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.style import save, style
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure
@@ -35,4 +36,4 @@ def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: st
     with style():
         drawn = DRAW[figure](settings, cohort, rows)
         for path in (svg, png):
-            save(drawn, path)
+            save(drawn, path, digest_of("cohort_stiffness.figures", settings, cohort))

@@ -63,7 +63,7 @@ def run(
     labelled = [
         {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
     ]
-    made = origin("fit", root, settings, cohort)
+    made = origin("fit", root, settings, cohort, [specimen])
     write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
     write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, made)
     write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)

@@ -39,6 +39,9 @@ COHORT_FIGURES: dict[str, tuple[str, ...]] = {
 EVERYONE, POOLED_BLOCK = "everyone", "pooled"
 """Place of the block of the pooled fits, which are of no single specimen."""
 
+_MADE_BY = {"literature": "literature", "fits": "fit", "left_out": "left_out", "pooled": "pool"}
+"""The job that writes the files in each folder."""
+
 _SINGLE_BLOCK = "000"
 
 
@@ -84,6 +87,11 @@ class CohortLayout(StudyFiles):
     def load_sets(self) -> tuple[str, ...]:
         """What stiffness is fitted to."""
         return load_sets(self.study, self.tests)
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        folder = path.removeprefix(f"{self.folder}/").split("/")[0]
+        return f"cohort_stiffness.{_MADE_BY[folder]}"
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per specimen, and one of the pooled fits."""

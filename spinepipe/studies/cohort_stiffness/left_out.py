@@ -8,6 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import read_mark
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.claims import joined
 from spinepipe.studies.cohort_stiffness.fit import IN_FOLDERS
@@ -52,7 +53,9 @@ def run(
         for row in seen
         if row["test"] in within
     ]
-    made = origin("left_out", root, settings, cohort)
+    made = origin(
+        "left_out", root, settings, cohort, [specimen], [read_mark(path) for path in others]
+    )
     write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
     write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
 

@@ -185,7 +185,7 @@ def run(
         seen += [{**row, **common, "stage": "literature"} for row in found]
     k = start_stiffness(settings, cohort, "literature")
     signs = sign_rows(cohort, specimen, tests, k, others)
-    made = origin("literature", root, settings, cohort)
+    made = origin("literature", root, settings, cohort, [specimen])
     write(from_rows(STIFFNESS.without("specimen"), values), stiffness, made)
     write(from_rows(ERRORS.without("specimen"), seen), errors, made)
     write(from_rows(SIGN_CHECKS.without("specimen"), signs), sign_checks, made)

@@ -22,10 +22,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import Stamp, on_bushings, stamp, stiffness_of_joints
+from spinepipe.jobs.model_mark import base_marks
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
-from spinepipe.studies.base_model import beside_bushings, made_by, own_values
+from spinepipe.studies.base_model import beside_bushings, own_values
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.parts import Damping
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
@@ -61,21 +62,19 @@ def seen_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) 
     return SEEN if model and own_values(model, specimen, cohort.joint_names) else ""
 
 
-def given_digest(root: str, study: CohortStiffness) -> str:
-    """Digest of a model file that no study of this project makes, else empty.
-
-    A file that is made in the run that uses it has no content when digests are taken; Snakemake
-    sees by itself that it is new.
-    """
-    if study.base is None or made_by(study.base.path(Path(root)), Path(root)):
-        return ""
-    return _digest(root, study)
-
-
-def origin(job: str, root: str, study: CohortStiffness, cohort: Cohort) -> dict[str, str]:
+def origin(
+    job: str,
+    root: str,
+    study: CohortStiffness,
+    cohort: Cohort,
+    specimens: Sequence[str] | None = None,
+    others: Sequence[str] = (),
+) -> dict[str, str]:
     """Metadata of a file, see `provenance`, with the digest of the model file."""
-    whole = provenance(f"cohort_stiffness.{job}", study, cohort)
-    return whole if study.base is None else {**whole, "base_model_digest": _digest(root, study)}
+    base = base_marks(root, study.base and study.base.model)
+    job = f"cohort_stiffness.{job}"
+    whole = provenance(job, study, cohort, specimens, [*base, *others])
+    return {**whole, "base_model_digest": _digest(root, study)} if base else whole
 
 
 def _digest(root: str, study: CohortStiffness) -> str:

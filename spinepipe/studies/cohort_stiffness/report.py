@@ -1,11 +1,11 @@
 """Job: the report of a cohort study, one HTML file."""
 
 from dataclasses import replace
-from pathlib import Path
 
-from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import write_marked
 from spinepipe.report.page.document import Results
 from spinepipe.studies.cohort_stiffness.page import READ, cohort_page
 from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT
@@ -21,8 +21,7 @@ def run(
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     results = results_of(READ, tables, figures, captions)
     page = cohort_page(settings, cohort, _with_base(settings, results))
-    with appearing(Path(output)) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_marked(page, output, digest_of("cohort_stiffness.report", settings, cohort))
 
 
 def _with_base(study: CohortStiffness, results: Results) -> Results:

@@ -17,6 +17,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.model_mark import base_marks
+from spinepipe.marks import KEY, with_mark
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
@@ -212,7 +214,7 @@ def run(
     settings, cohort = study_of_kind(Discrepancy, root, study)
     store = Store(Path(verdict).parent / STORE, f"spinepipe.jobs.{JOB}")
     results = searched(settings, cohort, root, store)
-    metadata = provenance(JOB, settings, cohort)
+    metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
     files = {
         gap: GAP,
         candidates: CANDIDATES,
@@ -222,12 +224,11 @@ def run(
     }
     for path, table in files.items():
         write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
-    write_model(results.model_base, model_base)
-    write_model(results.model_with_effects, model_with_effects)
+    write_model(results.model_base, model_base, metadata[KEY])
+    write_model(results.model_with_effects, model_with_effects, metadata[KEY])
+    told = with_mark(dict(results.verdict), metadata[KEY])
     with appearing(verdict) as temporary:
-        temporary.write_text(
-            json.dumps(results.verdict, indent=1, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        temporary.write_text(json.dumps(told, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     store.forget_the_rest()
 
 

@@ -61,6 +61,10 @@ class DiscrepancyFiles(StudyFiles):
         """No table is made of job files."""
         return ()
 
+    def job_of(self, table: str, path: str) -> str:
+        """None: no table is made of job files."""
+        raise ValueError(f"{table} is not made of job files")
+
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """None: no table is made of job files."""
         return []

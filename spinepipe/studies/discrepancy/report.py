@@ -1,10 +1,9 @@
 """Job: the report of a search for missing effects, one HTML file."""
 
-from pathlib import Path
-
-from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import write_marked
 from spinepipe.studies.discrepancy.page import READ, discrepancy_page
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import read_verdict
@@ -23,5 +22,4 @@ def run(
     settings, cohort = study_of_kind(Discrepancy, root, study)
     results = results_of(READ, tables, figures, captions)
     page = discrepancy_page(settings, cohort, results, read_verdict(verdict))
-    with appearing(Path(output)) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_marked(page, output, digest_of("discrepancy.report", settings, cohort))

@@ -1,8 +1,9 @@
 """A store of the pieces of a search: each is a content-hashed task, done once and kept.
 
-A killed search finds what it had done; a repeated one only looks it up. The tasks are pydra's,
-run in this process: they are known by a digest of code and arguments, and what they work on is
-handed to them by that digest. The folder may be deleted at any time: it only saves time.
+A killed search finds what it had done; a repeated one only looks it up. Pieces are known by a
+digest of code and arguments, and kept as data (see `codec` and `kept`). What is missing is run as
+a task of pydra in this process, in a scratch folder of its own that nobody reads afterwards. The
+folder of the store may be deleted at any time: it only saves time.
 
 How the pieces of a search are run: at once, or through a store of what was done before.
 
@@ -17,12 +18,13 @@ store would not be known again.
 
 import hashlib
 import os
-import shutil
 from collections.abc import Callable, Mapping
 from collections.abc import Set as AnySet
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
 from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
 from types import BuiltinFunctionType, FunctionType
 from typing import Any, ParamSpec, Protocol, TypeVar
 
@@ -31,6 +33,8 @@ from pydra.compose import python
 from pydra.engine.submitter import Submitter
 
 from spinepipe.jobs.digest import code_digest, versions
+from spinepipe.studies.discrepancy.codec import decoded, encoded
+from spinepipe.studies.discrepancy.kept import Kept
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -62,22 +66,44 @@ def content_digest(value: Any) -> bytes:
     TypeError
         For anything else.
     """
-    if isinstance(value, Enum | type | FunctionType | BuiltinFunctionType):
-        return _named(value)
-    if isinstance(value, PLAIN):
-        return _joined(type(value).__name__, repr(value).encode())
-    if isinstance(value, np.ndarray | np.generic):
-        return _array(np.asarray(value))
-    if isinstance(value, Mapping):
-        return _joined("mapping", *map(content_digest, value.items()))
-    if isinstance(value, tuple | list):
-        return _joined("sequence", *map(content_digest, value))
-    if isinstance(value, AnySet):
-        return _joined("set", *sorted(map(content_digest, value)))
-    if is_dataclass(value):
-        of_fields = (content_digest(getattr(value, field.name)) for field in fields(value))
-        return _joined("dataclass", _named(type(value)), *of_fields)
-    raise TypeError(f"what a {type(value).__qualname__} holds cannot be told")
+    return _Digests().of(value)
+
+
+class _Digests:
+    """Digests of one value and its parts; a dataclass that it holds twice is looked at once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, bytes] = {}
+
+    def of(self, value: Any) -> bytes:
+        """The digest of a part; parts stay alive while the whole is looked at."""
+        if isinstance(value, Enum | type | FunctionType | BuiltinFunctionType):
+            return _named(value)
+        if isinstance(value, PLAIN):
+            return _joined(type(value).__name__, repr(value).encode())
+        if isinstance(value, np.ndarray | np.generic):
+            return _array(np.asarray(value))
+        if isinstance(value, tuple | list):
+            return _joined("sequence", *map(self.of, value))
+        if is_dataclass(value):
+            if id(value) not in self._known:
+                self._known[id(value)] = self._dataclass(value)
+            return self._known[id(value)]
+        if isinstance(value, Mapping):
+            return _joined("mapping", *map(self.of, value.items()))
+        if isinstance(value, AnySet):
+            return _joined("set", *sorted(map(self.of, value)))
+        raise TypeError(f"what a {type(value).__qualname__} holds cannot be told")
+
+    def _dataclass(self, value: Any) -> bytes:
+        name, names = _declared(type(value))
+        return _joined("dataclass", name, *(self.of(getattr(value, one)) for one in names))
+
+
+@cache
+def _declared(kind: type) -> tuple[bytes, tuple[str, ...]]:
+    """A dataclass' name and those of its fields."""
+    return _named(kind), tuple(field.name for field in fields(kind))
 
 
 def _joined(kind: str, *parts: bytes) -> bytes:
@@ -101,21 +127,18 @@ def _array(array: np.ndarray) -> bytes:
 os.environ.setdefault("NO_ET", "1")  # pydra reports its use over the network unless told not to
 
 
-_WAITING: dict[str, Callable[[], Any]] = {}
-
-_DONE, _TASK = "_result.pklz", "_job.pklz"
-"""Files of pydra: a result, and the task with its result once more."""
+_WAITING: dict[str, Callable[[], bytes]] = {}
 
 
 @python.define(outputs=["result"])  # type: ignore[untyped-decorator]
-def Piece(token: str) -> Any:
-    """The piece of that digest; its result is kept under it."""
+def Piece(token: str) -> bytes:
+    """The piece of that digest, as it is kept."""
     from spinepipe.studies.discrepancy.store import waiting
 
     return waiting(token)()
 
 
-def waiting(token: str) -> Callable[[], Any]:
+def waiting(token: str) -> Callable[[], bytes]:
     """What a digest stands for, in the process that is about to run it."""
     return _WAITING[token]
 
@@ -123,46 +146,52 @@ def waiting(token: str) -> Callable[[], Any]:
 class Store:
     """Runs functions of plain data once per content of code and arguments.
 
-    Only one process may use a folder at a time, which Snakemake sees to.
+    Several processes may use a folder at the same time; none waits for another.
     """
 
     def __init__(self, folder: str | Path, module: str) -> None:
-        """``module`` is the job whose code, with all it imports, the results hang on."""
-        self._folder = Path(folder).absolute()
+        """``module`` is the job whose code, with all it imports, the results hang on.
+
+        Raises
+        ------
+        NotADirectoryError
+            Where something else than a folder has that name.
+        """
+        self._kept = Kept(Path(folder).absolute())
         self._made_by = f"{code_digest(module)} {sorted(versions().items())}".encode()
         self._asked: set[str] = set()
 
     def __call__(self, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """The function's result, computed now or before; what it raises is passed on."""
+        """The function's result, computed now or before; what it raises is passed on.
+
+        Raises
+        ------
+        TypeError
+            For arguments of which no digest can be taken, or results that cannot be kept as data.
+        """
         content = content_digest((function, args, sorted(kwargs.items())))
         token = hashlib.sha256(self._made_by + content).hexdigest()
         self._asked.add(token)
-        place = self._folder / token
-        if not list(place.glob(f"*/{_DONE}")):  # else a killed run's lock would be waited for
-            shutil.rmtree(place, ignore_errors=True)
-        _WAITING[token] = lambda: function(*args, **kwargs)
-        try:
-            found: R = _done(token, place)
-        except BaseException:
-            shutil.rmtree(place, ignore_errors=True)
-            raise
-        finally:
-            del _WAITING[token]
+        data = self._kept.read(token)
+        if data is None:
+            data = _computed(token, lambda: encoded(function(*args, **kwargs)))
+            self._kept.write(token, data)
+        found: R = decoded(data)  # now too, so that a search made again goes on with the same
         return found
 
     def forget_the_rest(self) -> None:
         """Delete pieces that nobody asked for since the store was opened: other code or data."""
-        for place in self._folder.iterdir() if self._folder.is_dir() else ():
-            if place.name not in self._asked:
-                shutil.rmtree(place, ignore_errors=True)
+        self._kept.sweep(self._asked)
 
 
-def _done(token: str, place: Path) -> Any:
-    """The result of a piece, from its folder or put there."""
-    place.mkdir(parents=True, exist_ok=True)
-    os.environ["PYDRA_HASH_CACHE"] = str(place / "hashes")  # else in the user's home
-    with Submitter(cache_root=place, worker="debug") as submitter:
-        result = submitter(Piece(token=token))
-    for copy in place.glob(f"*/{_TASK}"):
-        copy.unlink()
-    return result.outputs.result
+def _computed(token: str, piece: Callable[[], bytes]) -> bytes:
+    """The piece, run by pydra; what pydra writes for it is gone afterwards."""
+    _WAITING[token] = piece
+    try:
+        with TemporaryDirectory(prefix="spinepipe-", ignore_cleanup_errors=True) as scratch:
+            os.environ["PYDRA_HASH_CACHE"] = str(Path(scratch, "hashes"))  # else in the home
+            with Submitter(cache_root=scratch, worker="debug") as submitter:
+                result: bytes = submitter(Piece(token=token)).outputs.result
+    finally:
+        del _WAITING[token]
+    return result

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.style import save, style
 from spinepipe.studies.global_sensitivity.figures.convergence import convergence_figure
@@ -22,9 +23,9 @@ DRAW: dict[str, Callable[..., Figure]] = {
 
 def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: str) -> None:
     """Draw a figure, one of `DRAW`, from the files of its tables."""
-    _, cohort = study_of_kind(GlobalSensitivity, root, study)
+    settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     rows = read_frames(tables).values()
     with style():
         drawn = DRAW[figure](cohort, *rows)
         for path in (svg, png):
-            save(drawn, path)
+            save(drawn, path, digest_of("global_sensitivity.figures", settings, cohort))

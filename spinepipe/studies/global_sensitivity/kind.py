@@ -12,6 +12,13 @@ OF_JOBS = ("responses", "calibrated", "indices", "convergence")
 
 _BY_SPECIMEN = ("indices", "convergence")
 
+_MADE_BY = {
+    "responses": "respond",
+    "calibrated": "calibrate",
+    **dict.fromkeys(_BY_SPECIMEN, "analyse"),
+}
+"""The job that writes the files of each of them."""
+
 SENSITIVITY_FIGURES: dict[str, tuple[str, ...]] = {
     "factor_indices": ("indices",),
     "index_convergence": ("convergence", "indices"),
@@ -52,6 +59,10 @@ class SensitivityFiles(StudyFiles):
     def made_of_jobs(self) -> tuple[str, ...]:
         """The tables that are made of job files."""
         return tuple(name for name in OF_JOBS if name in self.tables)
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        return f"global_sensitivity.{_MADE_BY[table]}"
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""

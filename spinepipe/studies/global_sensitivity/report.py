@@ -1,10 +1,9 @@
 """Job: the report of a global sensitivity study, one HTML file."""
 
-from pathlib import Path
-
-from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import write_marked
 from spinepipe.studies.global_sensitivity.page import READ, sensitivity_page
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
@@ -16,5 +15,4 @@ def run(
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     results = results_of(READ, tables, figures, captions)
     page = sensitivity_page(settings, cohort, results)
-    with appearing(Path(output)) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_marked(page, output, digest_of("global_sensitivity.report", settings, cohort))

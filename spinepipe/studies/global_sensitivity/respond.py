@@ -31,7 +31,8 @@ def run(root: str, study: str, design: str, specimen: str, batch: str, output: s
         for test, cases in zip(one.start.tests, one.varied.cases, strict=True)
     ]
     columns = _columns(one, cohort.joint_names, solved)
-    made_by = provenance("global_sensitivity.respond", settings, cohort)
+    size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
+    made_by = provenance("global_sensitivity.respond", settings, cohort, [specimen], size)
     write(to_arrow(TABLE, columns), output, made_by)
 
 

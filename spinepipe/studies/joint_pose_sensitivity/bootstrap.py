@@ -52,7 +52,7 @@ def run(
     else:
         rows = _fitted(cohort, problem, found)
     table = from_rows(BOOTSTRAP, [{**common, **row} for row in rows])
-    write(table, output, provenance("bootstrap", settings, cohort))
+    write(table, output, provenance("bootstrap", settings, cohort, [specimen]))
 
 
 def sampled(

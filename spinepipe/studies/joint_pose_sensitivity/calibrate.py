@@ -24,7 +24,11 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
     rows = _rows(root, settings, specimen, int(pose), poses)
     names = [column.name for column in CALIBRATIONS.columns]
     columns = {name: [row[name] for row in rows] for name in names}
-    write(to_arrow(CALIBRATIONS, columns), output, provenance("calibrate", settings, cohort))
+    write(
+        to_arrow(CALIBRATIONS, columns),
+        output,
+        provenance("calibrate", settings, cohort, [specimen]),
+    )
 
 
 def _rows(

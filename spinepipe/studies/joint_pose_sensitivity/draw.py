@@ -6,6 +6,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.report.style import save, style
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import agreement_figure
@@ -46,4 +47,4 @@ def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: st
     with style():
         drawn = DRAW[figure](settings, cohort, rows)
         for path in (svg, png):
-            save(drawn, path)
+            save(drawn, path, digest_of("figures", settings, cohort))

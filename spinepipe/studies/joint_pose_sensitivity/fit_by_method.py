@@ -52,7 +52,7 @@ def run(
         refused = Status.REFUSED.value
         row.update(evaluations=0, claims_success=False, status=refused, message=str(error))
     table = from_rows(METHOD_FITS, [row])
-    write(table, output, provenance("fit_by_method", settings, cohort))
+    write(table, output, provenance("fit_by_method", settings, cohort, [specimen]))
 
 
 def _fit(settings: JointPoseSensitivity, problem: Problem, method: str) -> dict[str, Any]:

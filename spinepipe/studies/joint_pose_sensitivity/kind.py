@@ -51,8 +51,22 @@ _JOBS = {
 }
 """Folder of the job files of each table that is made of them."""
 
-OF_JOBS = tuple(_JOBS)
+BY_SPECIMEN = ("landmarks", "poses")
+"""Tables joined from one file per specimen."""
+
+OF_JOBS = (*_JOBS, *BY_SPECIMEN)
 """Tables joined from job files."""
+
+_MADE_BY = {
+    "landmarks": "sample_landmarks",
+    "poses": "build_models",
+    "calibrations": "calibrate",
+    "simulations": "simulate",
+    "bootstrap": "bootstrap",
+    "method_fits": "fit_by_method",
+    "precision_errors": "landmark_errors",
+}
+"""The job that writes the files of each of them."""
 
 _MOST_FILES_PER_BLOCK = 300
 _FILES_PER_BLOCK = 100
@@ -114,7 +128,16 @@ class Layout(StudyFiles):
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The tables of this study that are made of job files."""
-        return tuple(name for name in OF_JOBS if self._count(name))
+        return tuple(name for name in _JOBS if self._count(name))
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        return _MADE_BY[table]
+
+    @property
+    def by_specimen(self) -> tuple[str, ...]:
+        """What is sampled."""
+        return BY_SPECIMEN
 
     @property
     def others(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ def run(root: str, study: str, specimen: str, sd_mm: str, output: str) -> None:
         key = {"specimen": specimen, "sd_mm": float(sd_mm), "pose": pose}
         for name, ended in _errors(root, settings, cohort, specimen, points, nominal).items():
             rows.append({**key, "stiffness": name, **ended})
-    metadata = provenance("landmark_errors", settings, cohort)
+    metadata = provenance("landmark_errors", settings, cohort, [specimen])
     write(from_rows(PRECISION_ERRORS, rows), output, metadata)
 
 

@@ -1,8 +1,8 @@
-"""Job: joint poses of every sampled landmark set, and the study's base model file.
+"""Job: joint poses of every sampled landmark set of one specimen.
 
 What describes a sampled joint pose as a factor: its angles, and how far its origins are off.
 
-Job: landmark sets of all specimens of a study, sampled around their palpated positions.
+Job: landmark sets of one specimen, sampled around their palpated positions.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,23 +16,22 @@ from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.designs import sample_landmarks
 from spinepipe.frames import zxy_angles
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import start_stiffness, study_and_cohort
-from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
+from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import LANDMARKS, POSES
 from spinepipe.tables import read_frame, to_arrow, write
-from spinepipe.units import MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
+from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 
-def build(root: str, study: str, landmarks: str, output: str, model: str) -> None:
-    """Write ``poses.parquet`` and ``model.yaml``."""
+def build(root: str, study: str, landmarks: str, specimen: str, output: str) -> None:
+    """Write the rows of one specimen."""
     settings, cohort = study_and_cohort(root, study)
     rows = [row for rows in _poses(cohort, read_frame(landmarks)) for row in rows]
     names = [column.name for column in POSES.columns]
     columns = {name: [row[name] for row in rows] for name in names}
-    write(to_arrow(POSES, columns), output, provenance("build_models", settings, cohort))
-    write_model(base_model(settings), model)
+    made_by = provenance("build_models", settings, cohort, [specimen])
+    write(to_arrow(POSES, columns), output, made_by)
 
 
 def _poses(cohort: Cohort, landmarks: pd.DataFrame) -> Iterator[list[dict[str, Any]]]:
@@ -65,15 +64,6 @@ def _joints(cohort: Cohort, specimen: str, pose: int, points: Any) -> list[dict[
 
 _ORIGIN = ("x_mm", "y_mm", "z_mm")
 _ANGLES = tuple(f"{name}_deg" for name in ROTATIONS)
-
-
-def base_model(study: JointPoseSensitivity) -> ModelFile:
-    """The model every calibration of the study starts from."""
-    values = dict(zip(STIFFNESS_COLUMNS, start_stiffness(study).tolist(), strict=True))
-    entry = EffectEntry(
-        effect="linear_bushing", scope=Scope(), values=(Values(specimen="*", joint="*", **values),)
-    )
-    return ModelFile(model=study.study, cohort=study.cohort, effects=(entry,))
 
 
 ORIGIN_DISTANCE = "origin_distance"
@@ -110,29 +100,27 @@ def pose_factors(poses: pd.DataFrame) -> pd.DataFrame:
     return found.rename_axis("pose")
 
 
-def sample(root: str, study: str, output: str) -> None:
-    """Write ``landmarks.parquet``."""
+def sample(root: str, study: str, specimen: str, output: str) -> None:
+    """Write the rows of one specimen."""
     settings, cohort = study_and_cohort(root, study)
     assert cohort.landmarks is not None
-    parts = [
-        _specimen(settings, specimen, rows)
-        for specimen, rows in cohort.landmarks.groupby("specimen", sort=False)
-    ]
-    frame = pd.concat(parts, ignore_index=True)
+    own = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
+    frame = _sampled(settings, specimen, own)
     columns = {column.name: frame[column.name].to_list() for column in LANDMARKS.columns}
-    write(to_arrow(LANDMARKS, columns), output, provenance("sample_landmarks", settings, cohort))
+    made_by = provenance("sample_landmarks", settings, cohort, [specimen])
+    write(to_arrow(LANDMARKS, columns), output, made_by)
 
 
-def _specimen(settings: JointPoseSensitivity, specimen: object, rows: pd.DataFrame) -> pd.DataFrame:
+def _sampled(settings: JointPoseSensitivity, specimen: str, rows: pd.DataFrame) -> pd.DataFrame:
     """Landmark sets of one specimen, pose by pose."""
     points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float)
     own = rows["sd_mm"].fillna(0.0).to_numpy(float)
     sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
-    sampled, poses = sample_landmarks(points, sd, settings.poses, settings.seed, str(specimen))
+    sampled, poses = sample_landmarks(points, sd, settings.poses, settings.seed, specimen)
     flat, n = sampled.reshape(-1, 3), len(rows)
     return pd.DataFrame(
         {
-            "specimen": str(specimen),
+            "specimen": specimen,
             "pose": np.repeat(np.asarray(poses), n),
             "vertebra": np.tile(rows["vertebra"].to_numpy(), len(poses)),
             "landmark": np.tile(rows["landmark"].to_numpy(), len(poses)),

@@ -6,7 +6,9 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.marks import with_mark
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
@@ -22,8 +24,9 @@ def run(root: str, study: str, calibrations: str, success: str, output: str) -> 
         specimen: _best(settings, frame[frame["specimen"] == specimen])
         for specimen in cohort.specimen_names
     }
+    data = with_mark(best, digest_of("rank", settings, cohort))
     with appearing(output) as temporary:
-        temporary.write_text(json.dumps(best, indent=1), encoding="utf-8")
+        temporary.write_text(json.dumps(data, indent=1), encoding="utf-8")
 
 
 def _best(settings: JointPoseSensitivity, frame: pd.DataFrame) -> list[dict[str, Any]]:

@@ -1,10 +1,9 @@
 """Job: the report of a study, one HTML file."""
 
-from pathlib import Path
-
-from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.marks import write_marked
 from spinepipe.studies.joint_pose_sensitivity.page import READ, study_page
 
 
@@ -14,5 +13,4 @@ def run(
     """Write the page from the files of all tables, pictures (SVG) and captions."""
     settings, cohort = study_and_cohort(root, study)
     page = study_page(settings, cohort, results_of(READ, tables, figures, captions))
-    with appearing(Path(output)) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_marked(page, output, digest_of("report", settings, cohort))

@@ -1,9 +1,7 @@
 """Job: the tests of the published study on poses, stiffness and errors, with corrected p-values."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +9,7 @@ import pandas as pd
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import (
     chi_squared_normality,
@@ -41,7 +39,7 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
     errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
-    ranking = json.loads(Path(best).read_text("utf-8"))
+    ranked_sets = ranking(best)
     rows: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
         judged = frames["success"]
@@ -52,7 +50,7 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
         }
         fits = frames["calibrations"]
         fits = fits[(fits["specimen"] == specimen) & fits["pose"].isin(kept)]
-        data = Specimen(settings, kept, own["poses"], fits, own["errors"], ranking[specimen])
+        data = Specimen(settings, kept, own["poses"], fits, own["errors"], ranked_sets[specimen])
         rows += [{**row, "specimen": specimen} for row in corrected_rows(data.tests())]
     write(from_rows(STATISTICS, rows), output, provenance("statistics", settings, cohort))
 

@@ -3,8 +3,6 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +12,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import (
     SpecimenInputs,
-    Stamp,
     bushing_model,
+    ranked_set,
     sampled_poses,
     specimen_inputs,
-    stamp,
     study_and_cohort,
 )
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
@@ -64,7 +61,9 @@ def run(
         for row in _case_rows(case, motion, _zeroed(steps) if cohort.zeroed_at_step_0 else steps)
     ]
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-    write(to_arrow(TABLE, columns), output, provenance("simulate", settings, cohort))
+    given = [] if calibration else [ranked_set(best, specimen, stiffness)]
+    made_by = provenance("simulate", settings, cohort, [specimen], given)
+    write(to_arrow(TABLE, columns), output, made_by)
 
 
 def _stiffness(calibration: str, best: str, specimen: str, name: str) -> tuple[Array | None, str]:
@@ -75,16 +74,10 @@ def _stiffness(calibration: str, best: str, specimen: str, name: str) -> tuple[A
         if np.isfinite(values).all():
             return values, ""
         return None, f"not calibrated: {rows['message'].iloc[0]}"
-    for ranked in _ranking(stamp(best)).get(specimen, []):
-        if ranked["name"] == name:
-            return np.array(ranked["stiffness"]), ""
+    ranked = ranked_set(best, specimen, name)
+    if ranked:
+        return np.array(json.loads(ranked)), ""
     return None, f"fewer fits in the reduced dataset than {name} asks for"
-
-
-@lru_cache(maxsize=4)
-def _ranking(where: Stamp) -> dict[str, list[dict[str, Any]]]:
-    found: dict[str, list[dict[str, Any]]] = json.loads(Path(where[0]).read_text("utf-8"))
-    return found
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
 """Job: medians and spreads of stiffness, errors and joint poses, as papers print them."""
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +9,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.errors import (
     UNITS,
     absolute_error,
@@ -45,8 +43,8 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
 
 
 def _best_poses(best: str) -> pd.DataFrame:
-    ranking = json.loads(Path(best).read_text("utf-8"))
-    keys = [(specimen, ranked["pose"]) for specimen, sets in ranking.items() for ranked in sets]
+    ranked_sets = ranking(best)
+    keys = [(specimen, ranked["pose"]) for specimen, sets in ranked_sets.items() for ranked in sets]
     return pd.DataFrame(keys, columns=["specimen", "pose"])
 
 

@@ -1,9 +1,7 @@
 """Job: joint pose against stiffness, by shares of variance and by a regression tree."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ import pandas as pd
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
 from spinepipe.studies.joint_pose_sensitivity.errors import (
     absolute_error,
@@ -34,7 +32,7 @@ def run(root: str, study: str, tables: list[str], best: str, shares: str, import
     errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
     kept = frames["success"].loc[frames["success"]["reduced"], ["specimen", "pose"]]
     errors = errors.merge(kept, on=["specimen", "pose"])
-    ranking = json.loads(Path(best).read_text("utf-8"))
+    ranked_sets = ranking(best)
     divided: list[dict[str, Any]] = []
     grown: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
@@ -46,7 +44,7 @@ def run(root: str, study: str, tables: list[str], best: str, shares: str, import
             key = {"specimen": specimen, "joint": joint, "coordinate": coordinate}
             divided += [{**key, **row} for row in _shares(grid)]
             seed = specimen_seed(settings.seed, f"tree/{specimen}/{joint}/{coordinate}")
-            sets = {one["name"]: np.array(one["stiffness"]) for one in ranking[specimen]}
+            sets = {one["name"]: np.array(one["stiffness"]) for one in ranked_sets[specimen]}
             tree = Grown(settings, cohort.joint_names, parameters, sets, seed)
             grown += [{**key, **row} for row in tree.rows(grid)]
     origin = provenance("two_factor", settings, cohort)

@@ -1,4 +1,4 @@
-"""Job: joint frames of all specimens, the cohort's own and those sampled around them.
+"""Job: joint frames of one specimen, the cohort's own and those sampled around them.
 
 Job: the stiffness sets that all specimens are moved with.
 """
@@ -33,21 +33,20 @@ def draw_stiffness(root: str, study: str, output: str) -> None:
         "joint": list(joints) * len(factors),
         **dict(zip(STIFFNESS_COLUMNS, values.T.tolist(), strict=True)),
     }
-    made_by = provenance("range_of_motion.draw_stiffness", settings, cohort)
+    made_by = provenance("range_of_motion.draw_stiffness", settings, cohort, ())
     write(to_arrow(STIFFNESS_SETS, columns), output, made_by)
 
 
-def sample_frames(root: str, study: str, output: str) -> None:
-    """Write ``frames.parquet``."""
+def sample_frames(root: str, study: str, specimen: str, output: str) -> None:
+    """Write the rows of one specimen."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
-    parts = [_specimen(settings, cohort, specimen) for specimen in cohort.specimen_names]
-    frame = pd.concat(parts, ignore_index=True)
+    frame = _sampled(settings, cohort, specimen)
     columns = {column.name: frame[column.name].to_list() for column in FRAMES.columns}
-    made_by = provenance("range_of_motion.sample_frames", settings, cohort)
+    made_by = provenance("range_of_motion.sample_frames", settings, cohort, [specimen])
     write(to_arrow(FRAMES, columns), output, made_by)
 
 
-def _specimen(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> pd.DataFrame:
+def _sampled(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> pd.DataFrame:
     own = joint_frames(cohort, specimen)
     translation_m, rotation_rad = _sds(settings, cohort)
     poses = sample_joint_frames(

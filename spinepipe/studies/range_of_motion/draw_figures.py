@@ -1,5 +1,6 @@
 """Job: one figure of a range-of-motion study, as SVG and as PNG."""
 
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.style import save, style
 from spinepipe.studies.range_of_motion.figures import levels_figure, variance_figure
@@ -12,9 +13,9 @@ DRAW = {"range_of_motion": levels_figure, "rom_variance": variance_figure}
 
 def run(root: str, study: str, figure: str, tables: list[str], svg: str, png: str) -> None:
     """Draw a figure, one of `DRAW`, from the file of its table."""
-    _, cohort = study_of_kind(RangeOfMotion, root, study)
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
     (rows,) = read_frames(tables).values()
     with style():
         drawn = DRAW[figure](cohort, rows)
         for path in (svg, png):
-            save(drawn, path)
+            save(drawn, path, digest_of("range_of_motion.figures", settings, cohort))

@@ -7,10 +7,16 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.study_files import StudyFiles
 
-OF_JOBS = ("range_of_motion",)
+_JOBS = ("range_of_motion",)
 """Tables joined from job files, one for each specimen, pose and stiffness set."""
 
-TABLES = ("frames", "stiffness_sets", *OF_JOBS, "rom_summary", "rom_variance")
+BY_SPECIMEN = ("frames",)
+"""Tables joined from one file per specimen."""
+
+OF_JOBS = (*_JOBS, *BY_SPECIMEN)
+"""Tables joined from job files."""
+
+TABLES = ("frames", "stiffness_sets", *_JOBS, "rom_summary", "rom_variance")
 
 ROM_FIGURES: dict[str, tuple[str, ...]] = {
     "range_of_motion": ("rom_summary",),
@@ -45,7 +51,16 @@ class RangeOfMotionFiles(StudyFiles):
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The table that is made of job files."""
-        return OF_JOBS
+        return _JOBS
+
+    @property
+    def by_specimen(self) -> tuple[str, ...]:
+        """The drawn frames."""
+        return BY_SPECIMEN
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        return "range_of_motion." + ("sample_frames" if table in BY_SPECIMEN else "simulate")
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""

@@ -1,10 +1,9 @@
 """Job: the report of a range-of-motion study, one HTML file."""
 
-from pathlib import Path
-
-from spinepipe.files import appearing
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.draw import results_of
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import write_marked
 from spinepipe.studies.range_of_motion.page import READ, range_of_motion_page
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
@@ -16,5 +15,4 @@ def run(
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     results = results_of(READ, tables, figures, captions)
     page = range_of_motion_page(settings, cohort, results)
-    with appearing(Path(output)) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_marked(page, output, digest_of("range_of_motion.report", settings, cohort))

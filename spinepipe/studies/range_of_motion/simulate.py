@@ -25,10 +25,13 @@ from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
 
+_SPECIMENS = 128
+"""Whose frames are kept: jobs of different specimens come in any order."""
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnFrames:
-    """Joint frames of all specimens and poses.
+    """Joint frames of all poses.
 
     Attributes
     ----------
@@ -50,11 +53,11 @@ class DrawnFrames:
 
 
 def drawn_frames(path: str) -> DrawnFrames:
-    """Frames of ``frames.parquet``."""
+    """Frames of a specimen, from the file that `sample_frames` wrote."""
     return _frames(stamp(path))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=_SPECIMENS)
 def _frames(where: Stamp) -> DrawnFrames:
     table = read_frame(where[0])
     n = table["joint"].nunique()
@@ -114,7 +117,7 @@ def run(
         ]
     columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
     columns["stiffness"] = [int(stiffness)] * len(columns["test"])
-    made_by = provenance("range_of_motion.simulate", settings, cohort)
+    made_by = provenance("range_of_motion.simulate", settings, cohort, [specimen])
     write(to_arrow(TABLE, columns), output, made_by)
 
 

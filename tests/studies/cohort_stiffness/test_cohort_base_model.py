@@ -20,7 +20,7 @@ from spinepipe.effects import register, registry
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
 from spinepipe.studies import read as studies
-from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN, given_digest
+from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN
 from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 

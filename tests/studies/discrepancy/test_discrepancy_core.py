@@ -52,6 +52,8 @@ from spinepipe.studies.discrepancy.search.screen import (
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
+pytestmark = pytest.mark.numeric
+
 Array = NDArray[np.float64]
 
 NO_NUISANCE = NuisancePriors(*[0.0] * 8)

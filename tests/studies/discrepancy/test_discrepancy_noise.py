@@ -13,6 +13,8 @@ from spinepipe.studies.discrepancy.search.noise import Noise, estimated_noise, w
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
 
+pytestmark = pytest.mark.numeric
+
 Array = NDArray[np.float64]
 
 SD = np.array([1e-4, 3e-4, 2e-4, 2e-3, 1e-3, 4e-3])

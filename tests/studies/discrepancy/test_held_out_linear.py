@@ -17,6 +17,8 @@ from spinepipe.studies.discrepancy.proof.folds import (
 )
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
+pytestmark = pytest.mark.numeric
+
 TESTS = ("flexion", "bending")
 SHARED, OWN, NUISANCES = 2, 2, 3
 SD = noise().sd[3]

@@ -1,19 +1,22 @@
 """The store of a search's pieces: each is computed once, whatever ends the process in between."""
 
+import io
 import os
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
-from enum import StrEnum
-from functools import cached_property
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from spinepipe.effects import Spread
+from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy import store as store_module
+from spinepipe.studies.discrepancy.kept import MARK, SUFFIX
+from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.store import Store, content_digest
 
 MODULE = "spinepipe.jobs.discrepancy.search"
@@ -22,24 +25,13 @@ CALLS: list[Any] = []
 """What was really computed."""
 
 
-class Side(StrEnum):
-    """A choice."""
-
-    LEFT = "left"
+CASE = LoadCase("flexion", 1, ())
+WORDS = frozenset({"flexion", "extension", "bending", "rotation"})
 
 
-@dataclass(frozen=True)
-class Held:
-    """Plain data that a piece works on."""
-
-    values: np.ndarray
-    side: Side = Side.LEFT
-    names: frozenset[str] = frozenset({"flexion", "extension", "bending", "rotation"})
-
-    @cached_property
-    def total(self) -> float:
-        """Filled only where somebody asked for it."""
-        return float(self.values.sum())
+def of(*values: float) -> Repeats:
+    """Plain data that a piece works on; its mean is a property that is kept once it was asked."""
+    return Repeats(CASE, np.reshape(values, (1, 1, 1, len(values))))
 
 
 @pytest.fixture(autouse=True)
@@ -47,14 +39,10 @@ def nothing_computed_yet() -> None:
     CALLS.clear()
 
 
-def scaled(held: Held, factor: float = 2.0) -> Held:
+def scaled(held: Repeats, factor: float = 2.0, words: frozenset[str] = WORDS) -> Repeats:
     """A piece that counts how often it is computed."""
     CALLS.append(factor)
-    return Held(factor * held.values)
-
-
-def of(*values: float) -> Held:
-    return Held(np.array(values))
+    return Repeats(held.case, factor * held.cycles)
 
 
 def test_the_same_content_is_computed_once(tmp_path: Path) -> None:
@@ -62,8 +50,7 @@ def test_the_same_content_is_computed_once(tmp_path: Path) -> None:
         store = Store(tmp_path, MODULE)
         for _ in range(2):
             found = store(scaled, of(1.0, 2.5), factor=3.0)
-            np.testing.assert_array_equal(found.values, [3.0, 7.5])
-            assert found.total == 10.5
+            np.testing.assert_array_equal(found.mean.ravel(), [3.0, 7.5])
     assert CALLS == [3.0]
 
 
@@ -98,15 +85,41 @@ def test_what_a_piece_raises_is_passed_on_and_nothing_is_kept(tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == []
 
 
+def wordless(_: Repeats) -> object:
+    """A piece whose result is no plain data."""
+    return object()
+
+
+def test_a_result_that_is_no_plain_data_is_refused_and_not_kept(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="cannot be kept as data"):
+        Store(tmp_path, MODULE)(wordless, of(1.0))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_data_is_kept_and_pydra_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "scratch").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "scratch"))
+    Store(tmp_path / "store", MODULE)(scaled, of(1.0))
+    (piece,) = (path for path in tmp_path.rglob("*") if path.is_file())
+    assert (piece.parent.name, piece.suffix) == ("store", SUFFIX)
+    assert piece.read_bytes().startswith(MARK)
+    with np.load(io.BytesIO(piece.read_bytes()[len(MARK) + 65 :]), allow_pickle=False) as file:
+        assert sorted(file.files) == ["<f8", "structure"]
+        np.testing.assert_array_equal(file["<f8"], [2.0])
+    assert list((tmp_path / "scratch").iterdir()) == []
+
+
 def search_of(store: Store, pieces: int, ends_at: int | None = None) -> float:
     """Pieces that each work on what the one before has found, like the rounds of a search."""
     held = of(1.0, 2.0)
     for number in range(pieces):
-        assert held.total > 0.0  # fills the cached property of what the next piece works on
+        assert held.mean.sum() > 0.0  # fills the cached property of what the next piece works on
         if number == ends_at:
             raise KeyboardInterrupt
         held = store(scaled, held, 1.0 + number)
-    return held.total
+    return float(held.cycles.sum())
 
 
 def test_a_search_that_was_cut_off_goes_on_where_it_was(tmp_path: Path) -> None:
@@ -119,6 +132,31 @@ def test_a_search_that_was_cut_off_goes_on_where_it_was(tmp_path: Path) -> None:
     assert len(CALLS) == 6
 
 
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "a flipped bit": lambda whole: whole[:-300] + bytes([whole[-300] ^ 1]) + whole[-299:],
+    "cut off": lambda whole: whole[: len(whole) // 2],
+    "empty": lambda whole: b"",
+    "garbage": lambda whole: b"\x80\x05garbage" * 100,
+    "another format": lambda whole: whole.replace(MARK, MARK.replace(b"1", b"0"), 1),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_piece_counts_as_not_there(
+    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    expected = search_of(Store(tmp_path, MODULE), 3)
+    whole = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for path, content in whole.items():
+        CALLS.clear()
+        caplog.clear()
+        path.write_bytes(DAMAGES[damage](content))
+        assert search_of(Store(tmp_path, MODULE), 3) == expected
+        assert len(CALLS) == 1
+        assert [line.split(":")[0] for line in caplog.messages] == [str(path)]
+        assert {one: one.read_bytes() for one in tmp_path.iterdir()} == whole
+
+
 def test_pieces_of_other_code_or_data_are_forgotten(tmp_path: Path) -> None:
     Store(tmp_path, MODULE)(scaled, of(5.0))
     store = Store(tmp_path, MODULE)
@@ -129,6 +167,20 @@ def test_pieces_of_other_code_or_data_are_forgotten(tmp_path: Path) -> None:
     assert CALLS == [2.0, 1.0, 2.0]
 
 
+def test_a_store_that_is_a_link_works_and_loses_nothing(tmp_path: Path) -> None:
+    """As a link to a faster disk, which other studies may use as well."""
+    (tmp_path / "behind").mkdir()
+    (tmp_path / "behind" / "thesis.tex").write_text("years of work")
+    (tmp_path / "store").symlink_to(tmp_path / "behind")
+    Store(tmp_path / "behind", MODULE)(scaled, of(5.0))
+    for _ in range(2):
+        store = Store(tmp_path / "store", MODULE)
+        search_of(store, 2)
+        store.forget_the_rest()
+    assert CALLS == [2.0, 1.0, 2.0]
+    assert len(list((tmp_path / "behind").iterdir())) == 4
+
+
 def test_a_store_that_was_never_used_has_nothing_to_forget(tmp_path: Path) -> None:
     Store(tmp_path / "none", MODULE).forget_the_rest()
     assert not (tmp_path / "none").exists()
@@ -136,7 +188,7 @@ def test_a_store_that_was_never_used_has_nothing_to_forget(tmp_path: Path) -> No
 
 def test_content_is_what_a_value_holds() -> None:
     plain, filled = of(1.0, 2.0), of(1.0, 2.0)
-    assert filled.total == 3.0
+    assert filled.mean.sum() == 3.0
     one, same = "extension", "".join(["exten", "sion"])
     pairs: list[tuple[Any, Any]] = [
         (plain, filled),
@@ -156,8 +208,8 @@ def test_content_tells_apart() -> None:
         False,
         "",
         b"",
-        "left",
-        Side.LEFT,
+        "shared",
+        Spread.SHARED,
         (),
         {},
         [1, [2]],
@@ -174,7 +226,7 @@ def test_content_tells_apart() -> None:
         {1, 2},
         len,
         max,
-        Held,
+        Repeats,
         scaled,
     ]
     assert len({content_digest(value) for value in values}) == len(values)
@@ -186,7 +238,7 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
             Store(tmp_path, MODULE)(len, [value])
 
 
-def process(folder: Path, what: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
+def started(folder: Path, what: str, seed: str = "0") -> subprocess.Popen[str]:
     """A process of its own that runs ``what`` with a store in that folder."""
     program = (
         f"import os, signal, sys, test_store\n"
@@ -198,27 +250,46 @@ def process(folder: Path, what: str, seed: str = "0") -> subprocess.CompletedPro
     for place in places.values():
         Path(place).mkdir(exist_ok=True)
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    return subprocess.run(
+    return subprocess.Popen(
         [sys.executable, "-c", program],
         env={**os.environ, **places, "PYTHONPATH": paths, "PYTHONHASHSEED": seed},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        timeout=120,
-        check=False,
     )
+
+
+def ended(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    """Its exit code and what it said; one that waits for something for ever fails the test."""
+    try:
+        said, complained = process.communicate(timeout=300)
+    finally:
+        process.kill()
+    return process.returncode, said.strip(), complained
 
 
 def test_another_process_finds_the_piece_and_nothing_is_said_or_left(tmp_path: Path) -> None:
     """Sets of words are ordered by the seed of hashing, which differs from process to process."""
     for seed, computed in (("1", "[4.0]"), ("2", "[]")):
-        done = process(tmp_path, "store(scaled, of(1.0), 4.0); print(CALLS)", seed)
-        assert (done.returncode, done.stdout.strip(), done.stderr) == (0, computed, "")
+        search = "store(scaled, of(1.0), 4.0, WORDS); print(CALLS)"
+        assert ended(started(tmp_path, search, seed)) == (0, computed, "")
     outside = [path for path in tmp_path.rglob("*") if "store" not in path.parts]
     assert sorted(path.name for path in outside if path.is_file()) == []
     assert os.environ["NO_ET"] == "1"
 
 
-def killed(held: Held) -> Held:
+def test_what_is_thrown_away_is_said_in_one_line(tmp_path: Path) -> None:
+    search = "store(scaled, of(1.0), 4.0); print(CALLS)"
+    assert ended(started(tmp_path, search))[:2] == (0, "[4.0]")
+    (piece,) = (tmp_path / "store").iterdir()
+    piece.write_bytes(b"garbage")
+    code, said, complained = ended(started(tmp_path, search))
+    assert (code, said) == (0, "[4.0]")
+    assert complained.startswith(f"{piece}: ")
+    assert complained.count("\n") == 1
+
+
+def killed(held: Repeats) -> Repeats:
     """A piece in the midst of which the power goes off, the first time."""
     if "DIES" in os.environ:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -228,8 +299,33 @@ def killed(held: Held) -> Held:
 def test_a_killed_process_leaves_nothing_that_one_waits_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Pydra's lock is left in the scratch folder of the piece, where nobody looks again."""
     search = "held = store(scaled, of(1.0), 4.0); store(killed, held); print(CALLS)"
     monkeypatch.setenv("DIES", "1")
-    assert process(tmp_path, search).returncode == -signal.SIGKILL
+    assert ended(started(tmp_path, search))[0] == -signal.SIGKILL
+    assert len(list((tmp_path / "TMPDIR").rglob("*.lock"))) == 1
+    assert len(list((tmp_path / "store").iterdir())) == 1
     monkeypatch.delenv("DIES")
-    assert process(tmp_path, search).stdout.strip() == "[9.0]"
+    assert ended(started(tmp_path, search)) == (0, "[9.0]", "")
+
+
+def test_a_piece_whose_writing_was_cut_off_is_computed_again(tmp_path: Path) -> None:
+    search = "held = store(scaled, of(1.0), 4.0); {}store(scaled, held, 5.0); print(CALLS)"
+    dies = "os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL); "
+    assert ended(started(tmp_path, search.format(dies)))[0] == -signal.SIGKILL
+    names = sorted(path.name for path in (tmp_path / "store").iterdir())
+    assert [name.startswith(".") for name in names] == [True, False]
+    again = search.format("") + "; store.forget_the_rest()"
+    assert ended(started(tmp_path, again)) == (0, "[5.0]", "")
+    left = sorted(path.name for path in (tmp_path / "store").iterdir())
+    assert len(left) == 2
+    assert names[0] not in left
+
+
+def test_two_runs_at_once_come_to_the_same(tmp_path: Path) -> None:
+    """Neither waits for the other; at worst both compute a piece."""
+    search = "print(search_of(store, 6))"
+    both = [started(tmp_path, search) for _ in range(2)]
+    assert [ended(one) for one in both] == [(0, "2160.0", "")] * 2
+    assert search_of(Store(tmp_path / "store", MODULE), 6) == 2160.0
+    assert CALLS == []

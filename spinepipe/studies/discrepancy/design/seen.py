@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import orth
 
+from spinepipe.decomposition import orth
 from spinepipe.effects.contract import Array
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -116,7 +116,7 @@ def orthonormal(columns: Array) -> Array:
     """(N, p) orthonormal basis of columns, each counted by its direction alone."""
     sizes = np.linalg.norm(columns, axis=0)
     there = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
-    return np.asarray(orth(there, rcond=SEEN)) if there.size else np.zeros((len(columns), 0))
+    return orth(there, rcond=SEEN) if there.size else np.zeros((len(columns), 0))
 
 
 def _without(basis: Array, columns: Array) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.suspected import (
     SuspectedError,
@@ -151,7 +152,7 @@ def _rough(residual: Array, moments: Array) -> Array:
             coordinate = COORDINATES.index(ROTATIONS[number])
             there = np.isfinite(residual[:, joint, coordinate])
             values, basis = residual[there, joint, coordinate], curves[there]
-            solution, _, rank, _ = np.linalg.lstsq(basis, values)
+            solution, rank = lstsq(basis, values)
             left = values - basis @ solution
             found[:, joint, coordinate] = left @ left, len(values) - rank
     return found

@@ -17,6 +17,7 @@ from itertools import combinations
 
 import numpy as np
 
+from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     bad_markers,
@@ -109,7 +110,7 @@ def _one_step(supposed: Hypothesis, setting: Setting, name: str) -> float:
     ]
     white = setting.whitenings[name]
     residual, jacobian = white(errors), white(predicted.by_x)
-    step, *_ = np.linalg.lstsq(jacobian, residual)
+    step, _ = lstsq(jacobian, residual)
     left = residual - jacobian @ step
     return float(left @ left)
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
-from scipy.optimize import lsq_linear
 
+from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.proof.folds import Chosen, Flags, Part
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -241,8 +241,7 @@ def _bounded(matrix: Array, drive: Array, low: Array, high: Array) -> Array:
     found: Array = scale * solve_triangular(lower.T, target)
     if np.all((low <= found) & (found <= high)):
         return found
-    inside = lsq_linear(lower.T, target, bounds=(low / scale, high / scale), method="bvls")
-    bounded: Array = scale * inside.x
+    bounded: Array = scale * bounded_lstsq(lower.T, target, (low / scale, high / scale))
     return bounded
 
 

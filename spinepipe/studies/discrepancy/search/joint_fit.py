@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
@@ -164,12 +164,11 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
         assert found is not None
         return found[1]
 
-    result = least_squares(
+    result = bounded_least_squares(
         residual,
         start,
-        jac=jacobian,
-        bounds=(low, high),
-        method="dogbox",
+        jacobian,
+        (low, high),
         x_scale=np.array([_scale(u) for u in hypothesis.unknowns]),
         ftol=SETTLED,
         xtol=1e-6,

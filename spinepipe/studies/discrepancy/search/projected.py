@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.decomposition import pinvh, svd
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
@@ -80,7 +81,7 @@ def _basis(columns: Array) -> Array:
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    left, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    left, sizes, _ = svd(scaled)
     seen: Array = left[:, sizes > SEEN * max(sizes.max(initial=0.0), SEEN)]
     return seen
 
@@ -136,7 +137,7 @@ class Linearised:
         """
         if not coupled.shape[1]:
             return gram, moments
-        gain = coupled @ np.linalg.pinv(self.gram_shared, rcond=1e-10, hermitian=True)
+        gain = coupled @ pinvh(self.gram_shared, rcond=1e-10)
         return gram - gain @ coupled.T, moments - gain @ self.moments_shared
 
 

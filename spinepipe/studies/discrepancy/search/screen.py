@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
+from spinepipe.decomposition import eigh
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
@@ -43,7 +44,7 @@ class Group:
     @classmethod
     def of(cls, gram: Array, signs: Array) -> "Group":
         """The group with F'F (k, k)."""
-        values, vectors = np.linalg.eigh(gram)
+        values, vectors = eigh(gram)
         return cls(np.maximum(values, 0.0), vectors, signs)
 
     def log_evidence(self, moments: Array) -> Array:

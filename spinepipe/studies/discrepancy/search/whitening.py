@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.readings import Repeats
@@ -86,7 +87,7 @@ def whitening(tests: Sequence[Repeats], noise: Noise) -> Whitening:
 
 def with_nuisances(plain: Whitening, moved: Sequence[Array]) -> Whitening:
     """The whitening with nuisances; ``moved`` (T, J, 6, k) per test by one prior SD of each."""
-    directions, sizes, _ = np.linalg.svd(plain.noise_only(moved), full_matrices=False)
+    directions, sizes, _ = svd(plain.noise_only(moved))
     seen = sizes > 1e-3
     shrink = 1.0 / np.sqrt(1.0 + sizes[seen] ** 2) - 1.0
     return Whitening(plain.used, plain.roots, directions[:, seen], shrink)
