@@ -14,34 +14,20 @@ include: "workflow/rules/execution.smk"
 
 
 SELECTION = selection()
-warm_up()
+warm_up(modules_of_many(KINDS_IN_USE))
 
 
 wildcard_constraints:
     study="[a-z0-9_]+",
     specimen="[^/=]+",
-    pose="[0-9]{4,5}",
-    stiffness="calibrated|best[0-9]{2}",
-    table="|".join(JOINED),
-    bootstrap="start|damping",
-    loading="equilibrium|quasi_static|dynamic",
-    set="[0-9]{3,4}",
-    method="|".join(METHODS),
-    sd_mm="[0-9.e+-]+",
-    block="[0-9]{3,5}|pooled",
-    batch="[0-9]{5,7}",
-    representation="[a-z_]+",
-    fitted_to="[^/=]+",
-    without="[^/=]+",
 
 
-include: "workflow/rules/aggregation.smk"
-include: "workflow/rules/joint_pose_sensitivity.smk"
-include: "workflow/rules/identification.smk"
-include: "workflow/rules/range_of_motion.smk"
-include: "workflow/rules/cohort_stiffness.smk"
-include: "workflow/rules/discrepancy.smk"
-include: "workflow/rules/global_sensitivity.smk"
+include: "workflow/rules/generic.smk"
+
+
+for kind in KINDS_IN_USE:
+
+    include: f"workflow/rules/{kind}.smk"
 
 
 rule all:

@@ -23,3 +23,13 @@ def appearing(path: str | Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+Stamp = tuple[str, int, int]
+"""Name, size and time of change of a file."""
+
+
+def stamp(path: str | Path) -> Stamp:
+    """Name, size and time of change of a file: a key that a change of the file changes."""
+    status = Path(path).stat()
+    return str(path), status.st_size, status.st_mtime_ns

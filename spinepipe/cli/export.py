@@ -1,21 +1,13 @@
 """`spinepipe export`: a specimen's model as an OpenSim file."""
 
 import argparse
+from importlib import import_module
 from pathlib import Path
 
-import numpy as np
-
 from spinepipe.cli.find import specimen_of, study_names, unknown
-from spinepipe.cohort.specimen import joint_frames
-from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose
-from spinepipe.jobs.inputs import bushing_model, sampled_poses, start_stiffness
-from spinepipe.problems import InputError, Problem
-from spinepipe.status import Status
+from spinepipe.problems import InputError, Problem, one_of
 from spinepipe.studies import read as studies
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.tables import read_frame
-from spinepipe.units import STIFFNESS_COLUMNS
+from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,65 +32,22 @@ def run(options: argparse.Namespace) -> int:
     if options.study not in study_names(options.root):
         raise InputError([unknown("study", options.study, study_names(options.root))])
     study, cohort = studies.check(options.root, options.study)
-    assert isinstance(study, JointPoseSensitivity)
+    exports = kind_of(study.kind).exports
+    if exports is None:
+        able = one_of([name for name, kind in every_kind().items() if kind.exports])
+        allowed, remedy = f"a study of kind {able}", "choose such a study"
+        raise InputError([_problem("STUDY", f"kind {study.kind}", allowed, remedy)])
     specimen = specimen_of(cohort, options.specimen)
     results = options.root / "results" / study.study
-    stiffness, origin = start_stiffness(study), "start of the study"
-    if options.pose is None:
-        frames, pose = joint_frames(cohort, specimen), "nominal"
-    else:
-        frames, pose = _sampled(results, specimen, options.pose), f"{options.pose:04d}"
-        calibrated = _calibrated(results, specimen, options.pose)
-        if calibrated is not None:
-            stiffness, origin = calibrated, "calibrated for this pose"
+    module, _, function = exports.partition(":")
+    model_of = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
+    model, words = model_of(study, cohort, specimen, options.pose, results)
     from spinepipe.model.osim import write_osim
 
-    model = bushing_model(study, cohort, specimen, frames, stiffness)
     options.output.parent.mkdir(parents=True, exist_ok=True)
     write_osim(model, options.output)
-    print(f"{options.output}: specimen {specimen}, joint pose {pose}, stiffness: {origin}")
+    print(f"{options.output}: specimen {specimen}, {words}")
     return 0
-
-
-def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
-    """Joint frames of a sampled pose.
-
-    Raises
-    ------
-    InputError
-        When there are no results yet, no such pose, or its landmarks define no frame.
-    """
-    path = results / "poses.parquet"
-    if not path.is_file():
-        remedy = f"run `snakemake {_relative(path)}` first, or leave --pose out"
-        raise InputError([_problem("--pose", f"no {_relative(path)}", "a computed study", remedy)])
-    poses = sampled_poses(str(path))
-    frames, reason = poses.of(specimen, pose)
-    if frames is None:
-        known = [number for name, number in poses.frames if name == specimen]
-        allowed = f"0 to {max(known)}" if known else "none"
-        found = f"pose {pose}" + (f", refused: {reason}" if reason else "")
-        raise InputError([_problem("--pose", found, allowed, "choose another pose")])
-    return frames
-
-
-def _calibrated(results: Path, specimen: str, pose: int) -> Array | None:
-    """(1 or J, 6) stiffness fitted for a pose, or None where there is none to use."""
-    whole = results / "calibrations.parquet"
-    single = results / "calibrations" / f"specimen={specimen}" / f"pose={pose:04d}.parquet"
-    path = next((path for path in (single, whole) if path.is_file()), None)
-    if path is None:
-        return None
-    rows = read_frame(path)
-    rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]
-    if not len(rows) or not Status(rows["status"].iloc[0]).usable:
-        return None
-    values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
-    return values if np.isfinite(values).all() else None
-
-
-def _relative(path: Path) -> str:
-    return "/".join(path.parts[-3:])
 
 
 def _problem(column: str, found: str, allowed: str, remedy: str) -> Problem:

@@ -7,8 +7,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies import read as studies
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.study import COHORTS
+from spinepipe.studies.study import COHORTS, Study
 
 STUDIES = Path("config") / "studies"
 
@@ -23,7 +22,7 @@ def cohort_names(root: Path) -> list[str]:
     return sorted(path.name for path in (root / COHORTS).glob("*") if path.is_dir())
 
 
-def study_or_cohort(name: str, root: Path) -> tuple[JointPoseSensitivity | None, Cohort]:
+def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
     """A study with its cohort, or a cohort alone; a study comes first if both have the name.
 
     Raises
@@ -32,8 +31,7 @@ def study_or_cohort(name: str, root: Path) -> tuple[JointPoseSensitivity | None,
         When there is neither, or with every problem found in them.
     """
     if name in study_names(root):
-        study, cohort = studies.check(root, name)
-        return (study if isinstance(study, JointPoseSensitivity) else None), cohort
+        return studies.check(root, name)
     if name in cohort_names(root):
         return None, cohorts.read(root / COHORTS / name)
     if (root / name).is_dir() and "/" in name:

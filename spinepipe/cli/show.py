@@ -1,6 +1,7 @@
 """`spinepipe show`: one specimen as text and as a picture."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
@@ -8,6 +9,7 @@ from spinepipe.problems import InputError, Problem
 from spinepipe.report.specimen import draw_specimen, view_of
 from spinepipe.report.specimen_text import describe
 from spinepipe.report.style import save, style
+from spinepipe.studies.study import Study
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -36,9 +38,15 @@ def run(options: argparse.Namespace) -> int:
         raise InputError([problem])
     study, cohort = study_or_cohort(options.name, options.root)
     specimen = specimen_of(cohort, options.specimen)
-    view = view_of(cohort, specimen, study)
+    view = view_of(cohort, specimen, *_loading(study))
     print(describe(cohort, view))
     with style():
         save(draw_specimen(cohort, view), output)
     print(f"\npicture: {output}")
     return 0
+
+
+def _loading(study: Study | None) -> tuple[Sequence[str] | None, Sequence[float]]:
+    """Tests that a study chooses, and by how many mm it moves their loads, where it does so."""
+    shift = getattr(study, "load_point_shift_mm", None)
+    return getattr(study, "tests", None), (0.0, 0.0, 0.0) if shift is None else shift.in_order()

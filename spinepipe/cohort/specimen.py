@@ -11,7 +11,7 @@ import pandas as pd
 
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.decomposition import eigh
-from spinepipe.effects import Wrench
+from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, joint_pose, reexpress, rotation_zxy
 from spinepipe.model import (
@@ -253,3 +253,21 @@ def in_frames(
         moved = reexpress(np.nan_to_num(q[step, joint]), nominal[joint], sampled[joint])
         q[step, joint] = np.where(known, moved, np.nan)
     return MeasuredMotion(motion.test, motion.cycle, q)
+
+
+def on_bushings(
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+    damping: Array,
+    others: tuple[ScopedEffect, ...] = (),
+) -> SpineModel:
+    """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6).
+
+    The bushings are its first effect, ``others`` come after them.
+    """
+    n = len(cohort.joint_names)
+    values = np.broadcast_to(stiffness, (n, 6)).copy()
+    bushing = ScopedEffect(create("linear_bushing"), tuple(range(n)), values)
+    return spine_model(cohort, specimen, frames, (bushing, *others), damping)

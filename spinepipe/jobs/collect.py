@@ -7,7 +7,8 @@ import pyarrow as pa
 
 from spinepipe.jobs.digest import code_digest, value_digest
 from spinepipe.marks import KEY
-from spinepipe.tables import TABLES, join, metadata_of, read
+from spinepipe.studies.registry import kind_of
+from spinepipe.tables import Table, join, metadata_of, read
 
 NO_MARK = "none"
 
@@ -16,11 +17,12 @@ class StaleFile(ValueError):
     """A file to be joined that hangs on other settings, data or code than the table does."""
 
 
-def run(table: str, inputs: list[str], expected: list[str], output: str) -> None:
+def run(kind: str, table: str, inputs: list[str], expected: list[str], output: str) -> None:
     """Join files of a table; what their folders say of them becomes columns again.
 
     Parameters
     ----------
+    kind : of the study, which declares the table.
     expected : the mark that each of the inputs must have.
 
     Raises
@@ -32,14 +34,16 @@ def run(table: str, inputs: list[str], expected: list[str], output: str) -> None
     found = [metadata_of(part) for part in parts]
     for path, wanted, metadata in zip(inputs, expected, found, strict=True):
         _check(path, wanted, metadata.get(KEY, ""))
-    rows = [_with_folders(table, path, part) for path, part in zip(inputs, parts, strict=True)]
-    mark = joined_digest(inputs, expected)
-    join(TABLES[table], rows, output, {**_together(found), KEY: mark})
+    shape = kind_of(kind).table(table)
+    rows = [_with_folders(shape, path, part) for path, part in zip(inputs, parts, strict=True)]
+    mark = joined_digest(shape, inputs, expected)
+    join(shape, rows, output, {**_together(found), KEY: mark})
 
 
-def joined_digest(parts: Sequence[str], marks: Sequence[str]) -> str:
-    """The mark of a file joined from others of these names and marks."""
-    return value_digest(code_digest("spinepipe.jobs.collect"), list(parts), list(marks))
+def joined_digest(table: Table, parts: Sequence[str], marks: Sequence[str]) -> str:
+    """The mark of a file of a table joined from others of these names and marks."""
+    code = code_digest("spinepipe.jobs.collect")
+    return value_digest(code, str(table.schema), list(table.key), list(parts), list(marks))
 
 
 def _check(path: str, wanted: str, found: str) -> None:
@@ -61,9 +65,9 @@ def _together(found: Sequence[dict[str, str]]) -> dict[str, str]:
     return together
 
 
-def _with_folders(table: str, path: str, rows: pa.Table) -> pa.Table:
+def _with_folders(table: Table, path: str, rows: pa.Table) -> pa.Table:
     """Rows of one file with the ``name=value`` parts of its folders as columns."""
-    schema = TABLES[table].schema
+    schema = table.schema
     for part in Path(path).parts[:-1]:
         name, found, value = part.partition("=")
         if found and name in schema.names and name not in rows.column_names:

@@ -10,15 +10,15 @@ import ast
 import hashlib
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.settings import relevant_settings
 from spinepipe.marks import KEY
+from spinepipe.studies.registry import PACKAGE, kind_of, place_of
 from spinepipe.studies.study import Study
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -175,6 +175,11 @@ def versions() -> dict[str, str]:
     return {"version_python": platform.python_version(), **found}
 
 
+def settings_of(study: Study, ignored: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a study but for what is ignored of them, as plain values."""
+    return study.model_dump(mode="json", exclude=dict(ignored))
+
+
 def digest_of(
     job: str,
     study: Study,
@@ -182,7 +187,7 @@ def digest_of(
     specimens: Sequence[str] | None = None,
     others: Sequence[str] = (),
 ) -> str:
-    """The mark of a file written by ``spinepipe.jobs.<job>``: all that it hangs on.
+    """The mark of a file that a job of the study's kind writes: all that it hangs on.
 
     Parameters
     ----------
@@ -190,11 +195,28 @@ def digest_of(
     others : what else it reads that decides, such as the mark of another file.
     """
     return value_digest(
-        code_digest(f"spinepipe.jobs.{job}"),
-        relevant_settings(job, study),
+        _code(study, job),
+        settings_of(study, kind_of(study.kind).job(job).ignores),
         _cohort_digest(cohort, specimens),
         list(others),
     )
+
+
+def figure_digest(figure: str, study: Study, cohort: Cohort) -> str:
+    """The mark of a figure."""
+    kind = kind_of(study.kind)
+    module = f"{PACKAGE}.{study.kind}.{kind.figure(figure).at.partition(':')[0]}"
+    code = [code_digest("spinepipe.jobs.draw"), code_digest(module)]
+    ignored = dict.fromkeys(kind.ignored_by_figures, True)
+    return value_digest(code, settings_of(study, ignored), cohort.digest)
+
+
+def report_digest(study: Study, cohort: Cohort) -> str:
+    """The mark of a report, which prints all settings."""
+    module = f"{PACKAGE}.{study.kind}.page"
+    titles = [figure.title for figure in kind_of(study.kind).figures]
+    code = [code_digest("spinepipe.jobs.report"), code_digest(module), titles]
+    return value_digest(code, settings_of(study, {}), cohort.digest)
 
 
 def provenance(
@@ -204,21 +226,26 @@ def provenance(
     specimens: Sequence[str] | None = None,
     others: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study, its mark among it.
+    """Metadata of a file that a job of the study's kind writes, its mark among it.
 
     ``config_digest`` covers the settings that the job depends on, ``cohort_digest`` the specimens
     that it reads, no others. Parameters as in `digest_of`.
     """
+    settings = settings_of(study, kind_of(study.kind).job(job).ignores)
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
         "cohort_digest": _cohort_digest(cohort, specimens),
-        "config_digest": value_digest(relevant_settings(job, study)),
-        "code_digest": code_digest(f"spinepipe.jobs.{job}"),
+        "config_digest": value_digest(settings),
+        "code_digest": _code(study, job),
         KEY: digest_of(job, study, cohort, specimens, others),
         **versions(),
     }
+
+
+def _code(study: Study, job: str) -> str:
+    return code_digest(place_of(study.kind, job).partition(":")[0])
 
 
 def _cohort_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:

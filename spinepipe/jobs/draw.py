@@ -1,31 +1,22 @@
-"""What the report of a study of any kind is made of, from its files."""
+"""Job: one figure of a study of any kind, as SVG and as PNG."""
 
-from collections.abc import Collection
-from pathlib import Path
+from importlib import import_module
 
-import pyarrow.parquet as pq
-
-from spinepipe.report.page.document import Results
-from spinepipe.tables import read_frames
-
-
-def results_of(
-    read: Collection[str], tables: list[str], figures: list[str], captions: list[str]
-) -> Results:
-    """Rows of the tables named in `read`, where all tables come from, pictures and captions."""
-    return Results(
-        tables=read_frames([path for path in tables if Path(path).stem in read]),
-        metadata={Path(path).stem: _metadata(path) for path in tables},
-        pictures=_texts(figures),
-        captions=_texts(captions),
-    )
+from spinepipe.jobs.digest import figure_digest
+from spinepipe.jobs.inputs import study_of
+from spinepipe.report.style import save, style
+from spinepipe.studies.registry import PACKAGE, kind_of
+from spinepipe.tables import Tables
 
 
-def _metadata(path: str) -> dict[str, str]:
-    found = pq.read_schema(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in found.items()}
-
-
-def _texts(paths: list[str]) -> dict[str, str]:
-    """Texts of files by the name of the file, in the order given."""
-    return {Path(path).stem: Path(path).read_text(encoding="utf-8") for path in paths}
+def run(
+    root: str, study: str, figure: str, tables: list[str], svg: str, png: str, **others: str
+) -> None:
+    """Draw a figure that the kind declares, from the files of its tables and ``others``."""
+    settings, cohort = study_of(root, study)
+    module, _, function = kind_of(settings.kind).figure(figure).at.partition(":")
+    draw = getattr(import_module(f"{PACKAGE}.{settings.kind}.{module}"), function)
+    with style():
+        drawn = draw(settings, cohort, Tables.read(tables, others))
+        for path in (svg, png):
+            save(drawn, path, figure_digest(figure, settings, cohort))

@@ -11,32 +11,17 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.collect import joined_digest
-from spinepipe.jobs.digest import digest_of
-from spinepipe.jobs.inputs import ranked_set
-from spinepipe.jobs.layouts import files_of
+from spinepipe.jobs.digest import digest_of, figure_digest, report_digest
 from spinepipe.jobs.model_mark import base_marks
-from spinepipe.jobs.study_files import StudyFiles
 from spinepipe.studies.base_model import made_by
+from spinepipe.studies.kind import Job
 from spinepipe.studies.read import check
+from spinepipe.studies.registry import kind_of
 from spinepipe.studies.study import Study
+from spinepipe.studies.study_files import StudyFiles
 
 Place = Mapping[str, str]
 """Wildcards of a job: specimen, pose and what else its files' names say."""
-
-HEADER_ALONE = {"start_model", "range_of_motion.draw_stiffness", "global_sensitivity.design"}
-"""Jobs that read no specimen."""
-
-ALL_SPECIMENS = {"cohort_stiffness.pool"}
-"""Jobs that read all although their files are of one."""
-
-MAKES_MODEL = {"joint_pose_sensitivity": "start_model", "discrepancy": "discrepancy.search"}
-"""Job that writes the model files of a kind of study."""
-
-WITH_BASE = {
-    "discrepancy.search",
-    *(f"cohort_stiffness.{job}" for job in ("fit", "literature", "left_out", "pool")),
-}
-"""Jobs that read the model file that a study builds on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +35,7 @@ class Expected:
     @cached_property
     def files(self) -> StudyFiles:
         """Names of the files."""
-        return files_of(self.study, self.cohort)
+        return kind_of(self.study.kind).files.of(self.study, self.cohort)
 
     @cached_property
     def _known(self) -> dict[Any, str]:
@@ -58,8 +43,9 @@ class Expected:
 
     def of_job(self, job: str, place: Place) -> str:
         """The mark of the files of a job."""
-        others = self._others(job, place)
-        specimens = self._specimens(job, place)
+        declared = kind_of(self.study.kind).job(job)
+        others = self._others(declared, place)
+        specimens = self._specimens(declared, place)
         key = job, specimens, tuple(others)
         if key not in self._known:
             self._known[key] = digest_of(job, self.study, self.cohort, specimens, others)
@@ -81,32 +67,28 @@ class Expected:
         return self._joined(table, self.files.block_files(table))
 
     def _joined(self, table: str, parts: Sequence[str]) -> str:
-        return joined_digest(parts, [self.of_part(table, part) for part in parts])
+        shape = kind_of(self.study.kind).table(table)
+        return joined_digest(shape, parts, [self.of_part(table, part) for part in parts])
 
-    def _specimens(self, job: str, place: Place) -> tuple[str, ...] | None:
-        if job in HEADER_ALONE:
+    def of_figure(self, figure: str) -> str:
+        """The mark of a figure."""
+        return figure_digest(figure, self.study, self.cohort)
+
+    def of_report(self) -> str:
+        """The mark of the report."""
+        return report_digest(self.study, self.cohort)
+
+    def _specimens(self, job: Job, place: Place) -> tuple[str, ...] | None:
+        if job.specimens == "none":
             return ()
-        if "specimen" not in place or job in ALL_SPECIMENS:
+        if "specimen" not in place or job.specimens == "all":
             return None
         return (place["specimen"],)
 
-    def _others(self, job: str, place: Place) -> list[str]:
+    def _others(self, job: Job, place: Place) -> list[str]:
         """What else a job reads that decides, as the job itself names it."""
-        study: Any = self.study
-        base = self._base() if job in WITH_BASE else []
-        if job == "cohort_stiffness.left_out":
-            where = (place[name] for name in ("specimen", "representation", "fitted_to"))
-            fits = self.files.fits_of_others(*where)  # type: ignore[attr-defined]
-            return [*base, *(self.of_part("stiffness", fit) for fit in fits)]
-        if job in ("global_sensitivity.respond", "global_sensitivity.calibrate"):
-            return [str(study.batch_size(len(self.files.specimens)))]
-        if job == "simulate" and place["stiffness"] != "calibrated":
-            return [self._ranked(place["specimen"], place["stiffness"])]
-        return base
-
-    def _ranked(self, specimen: str, stiffness: str) -> str:
-        best = Path(self.root, self.files.folder, "best.json")
-        return ranked_set(str(best), specimen, stiffness) if best.is_file() else ""
+        base = self._base() if job.reads_base else []
+        return [*base, *(job.also(self, place) if job.also else [])]
 
     def _base(self) -> list[str]:
         """The mark of the model file that the study builds on, also if it is yet to be made."""
@@ -121,7 +103,8 @@ class Expected:
 
     def of_models(self) -> str:
         """The mark of the model files of the study."""
-        return self.of_job(MAKES_MODEL[self.study.kind], {})
+        maker = kind_of(self.study.kind).makes_models
+        return self.of_job(maker, {}) if maker else ""
 
 
 def place_of(path: str) -> dict[str, str]:

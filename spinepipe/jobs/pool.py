@@ -23,7 +23,7 @@ import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
@@ -32,12 +32,6 @@ from types import ModuleType
 from typing import Any, TextIO
 
 _JOBS = Path(__file__).resolve().parent
-_PRELOADED = (
-    *("calibrate", "simulate", "bootstrap", "collect", "cohort_stiffness.fit"),
-    *("range_of_motion.simulate", "global_sensitivity.respond"),
-)
-"""Jobs that come by the hundreds: imported once in the server, others when first asked for."""
-
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
 _REMEDIES = {
@@ -121,10 +115,16 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
         _fail(job, log, _explain(failure, folder), failure.trace)
 
 
-def warm_up() -> None:
-    """Start the server that workers are forked from: its imports run while the caller plans."""
+def warm_up(modules: Sequence[str] = ()) -> None:
+    """Start the server that workers are forked from: its imports run while the caller plans.
+
+    Parameters
+    ----------
+    modules : of jobs that come by the hundreds; others are imported when first asked for.
+    """
     with _starting, _environment():
-        _CONTEXT.set_forkserver_preload([f"spinepipe.jobs.{name}" for name in _PRELOADED])
+        if modules:
+            _CONTEXT.set_forkserver_preload(["spinepipe.jobs.collect", *modules])
         forkserver.ensure_running()
 
 

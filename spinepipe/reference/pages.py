@@ -1,22 +1,14 @@
-"""The generated list of effects: an overview, and each as it declares itself.
-
-Markdown tables.
-
-Tables of configuration keys, from the pydantic models that check them.
-
-The generated parts of the documentation, each between two markers in a page.
+"""The generated parts of the documentation, each between two markers in a page.
 
 A page says where a part goes:
 
     <!-- generated: table poses -->
     <!-- end of generated -->
 
-What stands between the markers is written by `spinepipe docs` and compared in the tests.
-
-`spinepipe docs`: the parts of the documentation that come from the code.
+What stands between the markers is written by `spinepipe docs` and compared in the tests: the list
+of effects, tables of configuration keys from the pydantic models, tables of columns.
 """
 
-import argparse
 import inspect
 import re
 import sys
@@ -34,8 +26,8 @@ from spinepipe.cohort.cohort import CohortHeader
 from spinepipe.effects import Effect, Parameter, Trial, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
-from spinepipe.studies.read import KINDS, Selection
-from spinepipe.tables import TABLES
+from spinepipe.studies.read import Selection
+from spinepipe.studies.registry import every_kind
 from spinepipe.tables.schema import Column, Table
 
 
@@ -311,7 +303,12 @@ _PART = re.compile(rf"<!-- generated: (.+?) -->\n.*?{re.escape(END)}", re.DOTALL
 def generators() -> dict[str, Callable[[], str]]:
     """Every part that can be generated, by the name that pages use."""
     parts: dict[str, Callable[[], str]] = {"effects": effects}
-    parts |= {f"table {name}": partial(result_table, shape) for name, shape in TABLES.items()}
+    kinds = every_kind()
+    parts |= {
+        f"table {shape.name}": partial(result_table, shape)
+        for kind in kinds.values()
+        for shape in kind.tables
+    }
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
         for name, form in cohort_columns.TABLES.items()
@@ -319,7 +316,7 @@ def generators() -> dict[str, Callable[[], str]]:
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
     parts["keys model"] = partial(key_table, ModelFile)
-    parts |= {f"keys {kind}": partial(key_table, model) for kind, model in KINDS.items()}
+    parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts
 
 
@@ -399,25 +396,3 @@ def outdated(root: Path) -> list[Path]:
 def names_in(text: str) -> list[str]:
     """Names of the generated parts of a page."""
     return [found[1] for found in _PART.finditer(text)]
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Write, or only compare."""
-    parser.add_argument(
-        "--check", action="store_true", help="write nothing; fail where a page is out of date"
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Write the pages that are out of date, or name them."""
-    pages = outdated(options.root)
-    for path in pages:
-        name = path.relative_to(options.root)
-        if options.check:
-            print(f"FAIL  {name}: out of date; run `spinepipe docs`")
-        else:
-            path.write_text(refreshed(path.read_text(encoding="utf-8"), str(name)), "utf-8")
-            print(f"wrote {name}")
-    if not pages:
-        print("ok    every generated part of docs/ is up to date")
-    return 1 if pages and options.check else 0

@@ -1,8 +1,6 @@
-"""Figure: one specimen from its right side and from behind, with frames, landmarks and loads.
+"""One specimen: its frames, points, bodies, loads and motion, drawn from the right and behind."""
 
-What is shown of one specimen: its frames, points, bodies, loads and measured motion.
-"""
-
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +23,6 @@ from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, blank
 from spinepipe.report.words import count
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M
 
 
@@ -47,13 +44,23 @@ class SpecimenView:
     motions: tuple[MeasuredMotion, ...]
 
 
-def view_of(cohort: Cohort, specimen: str, study: JointPoseSensitivity | None) -> SpecimenView:
-    """A specimen of a cohort, with the tests and the load shift of a study where there is one."""
-    tests = cohort.tests if study is None else study.tests or cohort.tests
-    shift = np.zeros(3)
-    if study is not None:
-        shift = np.array(study.load_point_shift_mm.in_order()) / MM_PER_M
-    cases = () if cohort.loads is None else load_cases(cohort, specimen, tests, shift)
+def view_of(
+    cohort: Cohort,
+    specimen: str,
+    tests: Sequence[str] | None = None,
+    load_shift_mm: Sequence[float] = (0.0, 0.0, 0.0),
+) -> SpecimenView:
+    """A specimen of a cohort with its tests, by default all of them.
+
+    Parameters
+    ----------
+    load_shift_mm : (3,) by which a study moves the point where loads act: x anterior, y superior,
+        z right.
+    """
+    shift = np.array(load_shift_mm) / MM_PER_M
+    cases = (
+        () if cohort.loads is None else load_cases(cohort, specimen, tests or cohort.tests, shift)
+    )
     return SpecimenView(
         specimen=specimen,
         frames=joint_frames(cohort, specimen),

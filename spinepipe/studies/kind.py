@@ -1,20 +1,20 @@
 """What a kind of study is: settings, checks, tables, jobs and figures in one declaration.
 
-The declaration of a kind is `KIND` in ``spinepipe/studies/<kind>/kind.py``. Functions are named, not
-imported, so that reading the declaration loads no mechanics and no drawing, and so that the
+The declaration of a kind is `KIND` in ``spinepipe/studies/<kind>/kind.py``. Functions are named,
+not imported, so that reading the declaration loads no mechanics and no drawing, and so that the
 digest of a job follows its own file alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.study import Study
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.study_files import Figure, StudyFiles
 from spinepipe.tables.schema import Table
 
 Check = Callable[[Document, Any, Cohort], Iterator[Problem]]
@@ -31,14 +31,20 @@ class Job:
     Attributes
     ----------
     name : what rules, logs and digests call it.
-    at : ``file:function`` in the folder of the kind; without a function, `run`. By default the
-        file of the job's own name.
+    at : ``file:function`` in the folder of the kind, by default the file of the job's own name and
+        `run`.
     reads : for a job that makes tables of tables, the tables it is computed from, of those that
         the study has; a name with a dot is another result file, handed over as an argument of its
         own.
     writes : the tables it makes of them.
     ignores : settings that it does not look at: their names, with what of each is ignored. All
         others count, so that one added later is not overlooked.
+    specimens : whose data it reads: ``own``, of the specimen that its files are of, or of all where
+        they are of none; ``all``; or ``none``, the header of the cohort alone.
+    reads_base : whether it reads the model file that the study builds on.
+    many : whether it comes by the hundreds, so that workers import it beforehand.
+    also : what else it reads that decides, such as marks of other files; asked with what is
+        expected of the study (`spinepipe.jobs.expected`) and the job's wildcards.
     """
 
     name: str
@@ -46,6 +52,10 @@ class Job:
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
     ignores: Mapping[str, Any] = field(default_factory=dict)
+    specimens: Literal["own", "all", "none"] = "own"
+    reads_base: bool = False
+    many: bool = False
+    also: Callable[[Any, Mapping[str, str]], list[str]] | None = None
 
     @property
     def module(self) -> str:
@@ -59,49 +69,33 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A figure of a study.
-
-    Attributes
-    ----------
-    name : of its files.
-    title : above it on the report's page.
-    at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
-    reads : what it is drawn from, as of a `Job`.
-    """
-
-    name: str
-    title: str
-    at: str
-    reads: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Kind:
     """All that the core asks a kind of study.
 
     Attributes
     ----------
     settings : what its study files hold.
-    files : the result files of a study of a cohort.
+    files : the result files of a study of a cohort; they name its figures.
     checks : what it demands of its cohort; each asked whatever the others find.
     checks_of_files : what it demands of further files.
     checks_at_start : what it needs of the machine; asked before it starts, when all else is sound.
     tables : the tables it can make.
     jobs : what computes them.
-    figures : in the order of the report.
     ignored_by_figures : settings that no figure looks at.
+    makes_models : the job that writes model files on which other studies may build.
+    exports : ``file:function`` of what makes a model of a specimen for other programs.
     """
 
     settings: type[Study]
-    files: Callable[[Any, Cohort], StudyFiles]
+    files: type[StudyFiles]
     checks: tuple[Check, ...]
     tables: tuple[Table, ...]
     jobs: tuple[Job, ...]
-    figures: tuple[Figure, ...]
     checks_of_files: tuple[CheckOfFiles, ...] = ()
     checks_at_start: tuple[CheckOfFiles, ...] = ()
     ignored_by_figures: tuple[str, ...] = ()
+    makes_models: str | None = None
+    exports: str | None = None
 
     def job(self, name: str) -> Job:
         """The job of that name."""
@@ -114,6 +108,11 @@ class Kind:
     def figure(self, name: str) -> Figure:
         """The figure of that name."""
         return next(figure for figure in self.figures if figure.name == name)
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """Its figures, in the order of the report."""
+        return self.files.drawings
 
     @property
     def analyses(self) -> tuple[Job, ...]:

@@ -5,8 +5,10 @@ Lists in study files: something in them, and nothing twice.
 Published stiffness that studies start from where a study file names none.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -17,6 +19,9 @@ from pydantic import (
 )
 
 from spinepipe.anatomy import published
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.units import TRANSLATIONS
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 """Unknown keys, `yes` for a number and NaN are errors."""
@@ -175,3 +180,13 @@ class LevelStiffness(BaseModel):
     def in_order(self) -> tuple[float, ...]:
         """(3,) N m/rad in the order of the rotations."""
         return tuple(dict(self).values())
+
+
+def stiffness_of_joints(
+    cohort: Cohort, every: Stiffness, levels: Mapping[str, LevelStiffness]
+) -> Array:
+    """(J, 6) SI: one stiffness of all joints, with the rotations of levels that have their own."""
+    values = np.tile(np.array(every.in_order(), dtype=float), (len(cohort.joint_names), 1))
+    for joint, level in levels.items():
+        values[cohort.joint_names.index(joint), len(TRANSLATIONS) :] = level.in_order()
+    return values

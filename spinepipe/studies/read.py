@@ -177,14 +177,15 @@ def read_selection(root: Path) -> Selection:
     return selection
 
 
-def names_of_kind(root: Path, kind: str) -> tuple[str, ...]:
-    """Names of the study files of a kind, sound or not; those that cannot be read have none."""
-    found = []
+def names_by_kind(root: Path) -> dict[str, list[str]]:
+    """Names of the study files of each kind, sound or not; those that cannot be read have none."""
+    found: dict[str, list[str]] = {}
     for path in sorted((root / STUDIES).glob("*.yaml")):
         document, _ = read_yaml(path, displayed(path, root))
-        if document is not None and document.data.get("kind") == kind:
-            found.append(path.stem)
-    return tuple(found)
+        kind = None if document is None else document.data.get("kind")
+        if isinstance(kind, str):
+            found.setdefault(kind, []).append(path.stem)
+    return found
 
 
 def _unknown_names(selection: Selection, document: Document, root: Path) -> list[Problem]:

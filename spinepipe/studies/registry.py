@@ -4,6 +4,7 @@ Nothing is imported here by a written name, so that the digest of a job that ask
 does not follow all kinds.
 """
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -36,3 +37,15 @@ def place_of(kind: str, job: str) -> str:
     """``module:function`` of a job of a kind."""
     found = kind_of(kind).job(job)
     return f"{PACKAGE}.{kind}.{found.module}:{found.function}"
+
+
+def modules_of_many(kinds: Iterable[str]) -> list[str]:
+    """Modules of the jobs of these kinds that come by the hundreds."""
+    return sorted(
+        {
+            place_of(name, job.name).partition(":")[0]
+            for name in kinds
+            for job in kind_of(name).jobs
+            if job.many
+        }
+    )

@@ -6,10 +6,34 @@ files costs Snakemake quadratic time.
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
+from spinepipe.cohort import Cohort
 from spinepipe.studies.study import Study
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a study.
+
+    Attributes
+    ----------
+    name : of its files; its caption is ``figures/<name>.rst`` in the folder of the kind.
+    title : above it on the report's page.
+    at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
+    reads : the tables it is drawn from; a name with a dot is another result file.
+    """
+
+    name: str
+    title: str
+    at: str
+    reads: tuple[str, ...]
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Those of ``reads`` that are tables."""
+        return tuple(name for name in self.reads if "." not in name)
 
 
 @dataclass(frozen=True)
@@ -24,13 +48,30 @@ class StudyFiles(ABC):
         Names of the specimens of its cohort.
     """
 
+    drawings: ClassVar[tuple[Figure, ...]] = ()
+    """Figures of this kind of study, in the order of the report."""
+
+    joined: ClassVar[tuple[str, ...]] = ()
+    """Tables that studies of this kind join from job files."""
+
+    told_in_report: ClassVar[tuple[str, ...]] = ()
+    """Files other than tables and figures that the report reads."""
+
+    subfolder: ClassVar[str] = ""
+    """Where results are, below the folder of the study; ends with a slash."""
+
     study: Study
     specimens: tuple[str, ...]
+
+    @classmethod
+    @abstractmethod
+    def of(cls, study: Any, cohort: Cohort) -> Self:
+        """The files of a study of a cohort."""
 
     @property
     def folder(self) -> str:
         """Where all results of the study are."""
-        return f"results/{self.study.study}"
+        return f"results/{self.study.study}/{self.subfolder}".rstrip("/")
 
     @property
     @abstractmethod
@@ -38,26 +79,21 @@ class StudyFiles(ABC):
         """The tables that this study has."""
 
     @property
-    @abstractmethod
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures of this kind of study and the tables each is drawn from."""
-
-    @property
-    @abstractmethod
     def made_of_jobs(self) -> tuple[str, ...]:
-        """The tables of this study that are made of job files."""
+        """The tables of this study that are made of job files, block by block."""
+        return ()
 
-    @abstractmethod
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""
+        raise ValueError(f"{table} is not made of job files")
 
-    @abstractmethod
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
+        raise ValueError(f"{table} is not made of job files")
 
-    @abstractmethod
     def job_of(self, table: str, path: str) -> str:
-        """The job, below `spinepipe.jobs`, that writes a file of which a table is made."""
+        """The job that writes a file of which a table is made."""
+        raise ValueError(f"{table} is not made of job files")
 
     @property
     def by_specimen(self) -> tuple[str, ...]:
@@ -73,12 +109,16 @@ class StudyFiles(ABC):
     def figures(self) -> tuple[str, ...]:
         """The figures that this study has."""
         return tuple(
-            name for name, tables in self.drawn_from.items() if set(tables) <= set(self.tables)
+            drawing.name for drawing in self.drawings if set(drawing.tables) <= set(self.tables)
         )
 
     def table_files(self, names: tuple[str, ...]) -> list[str]:
         """Files of tables, of those that the study has."""
         return [f"{self.folder}/{name}.parquet" for name in names if name in self.tables]
+
+    def other_files(self, names: tuple[str, ...]) -> dict[str, str]:
+        """Files that are no tables (a name with a dot), by their names without the ending."""
+        return {name.partition(".")[0]: f"{self.folder}/{name}" for name in names if "." in name}
 
     def report_tables(self) -> list[str]:
         """The tables that the report shows or speaks of."""
@@ -90,7 +130,15 @@ class StudyFiles(ABC):
 
     def captions(self) -> list[str]:
         """What is said below each figure."""
-        return [f"workflow/report/{figure}.rst" for figure in self.figures]
+        return [self.caption(figure) for figure in self.figures]
+
+    def caption(self, figure: str) -> str:
+        """The file of what is said below a figure."""
+        return f"spinepipe/studies/{self.study.kind}/figures/{figure}.rst"
+
+    def figure(self, name: str) -> Figure:
+        """The figure of that name."""
+        return next(drawing for drawing in self.drawings if drawing.name == name)
 
     def block_files(self, table: str) -> list[str]:
         """The files of which a table is made."""

@@ -2,6 +2,7 @@
 
 from spinepipe.tables.parquet import (
     BadTable,
+    Tables,
     from_rows,
     join,
     metadata_of,
@@ -17,6 +18,7 @@ __all__ = [
     "BadTable",
     "Column",
     "Table",
+    "Tables",
     "from_rows",
     "join",
     "metadata_of",

@@ -1,10 +1,21 @@
 # Study kind cohort_stiffness: how stiffness differs between specimens, levels and load cases.
-# Each job is a function `run` of spinepipe.jobs.cohort_stiffness.
-from spinepipe.jobs.cohort_stiffness.layout import COHORT_ANALYSES, COHORT_FIGURES
+# The jobs stand in spinepipe/studies/cohort_stiffness.
 
 COHORTS = results_of("cohort_stiffness")
 OWN = "specimen={specimen}/representation={representation}/fitted_to={fitted_to}"
 POOL = "fitted_to={fitted_to}/without={without}"
+
+
+wildcard_constraints:
+    representation="[a-z_]+",
+    fitted_to="[^/=]+",
+    without="[^/=]+",
+
+
+def fits_of_others(wildcards):
+    """Fits of the other specimens, of which the left-out one takes the median."""
+    place = wildcards.specimen, wildcards.representation, wildcards.fitted_to
+    return layout(wildcards.study).fits_of_others(*place)
 
 
 rule literature:
@@ -17,9 +28,9 @@ rule literature:
     log:
         f"{LOGS}/literature/specimen={{specimen}}.log",
     params:
-        digest=digest("cohort_stiffness.literature"),
+        digest=digest("literature"),
     run:
-        run_job(rule, "cohort_stiffness.literature", wildcards, input, output, log)
+        run_job(rule, "literature", wildcards, input, output, log)
 
 
 rule fit:
@@ -32,9 +43,9 @@ rule fit:
     log:
         f"{LOGS}/fits/{OWN}.log",
     params:
-        digest=digest("cohort_stiffness.fit"),
+        digest=digest("fit"),
     run:
-        run_job(rule, "cohort_stiffness.fit", wildcards, input, output, log)
+        run_job(rule, "fit", wildcards, input, output, log)
 
 
 rule left_out:
@@ -47,9 +58,9 @@ rule left_out:
     log:
         f"{LOGS}/left_out/{OWN}.log",
     params:
-        digest=digest("cohort_stiffness.left_out"),
+        digest=digest("left_out"),
     run:
-        run_job(rule, "cohort_stiffness.left_out", wildcards, input, output, log)
+        run_job(rule, "left_out", wildcards, input, output, log)
 
 
 rule pool:
@@ -63,67 +74,6 @@ rule pool:
     log:
         f"{LOGS}/pooled/{POOL}.log",
     params:
-        digest=digest("cohort_stiffness.pool"),
+        digest=digest("pool"),
     run:
-        run_job(rule, "cohort_stiffness.pool", wildcards, input, output, log)
-
-
-# Jobs that make one table of tables: what each reads.
-for job, read in COHORT_ANALYSES.items():
-
-    rule:
-        name:
-            f"cohort_{job}"
-        input:
-            tables=tables(*read),
-        output:
-            output=f"{COHORTS}/{job}.parquet",
-        log:
-            f"{LOGS}/{job}.log",
-        params:
-            digest=digest(f"cohort_stiffness.{job}"),
-            job=f"cohort_stiffness.{job}",
-        run:
-            run_job(rule, params.job, wildcards, input, output, log)
-
-
-for figure, drawn_from in COHORT_FIGURES.items():
-
-    rule:
-        name:
-            f"figure_{figure}"
-        input:
-            tables=tables(*drawn_from),
-        output:
-            svg=shown(COHORTS, figure),
-            png=f"{COHORTS}/figures/{figure}.png",
-        log:
-            f"{LOGS}/figure_{figure}.log",
-        params:
-            digest=digest("cohort_stiffness.figures"),
-            figure=figure,
-        run:
-            run_job(
-                rule,
-                "cohort_stiffness.figures",
-                wildcards,
-                input,
-                output,
-                log,
-                figure=params.figure,
-            )
-
-
-rule cohort_report:
-    input:
-        tables=lambda wildcards: layout(wildcards.study).report_tables(),
-        figures=lambda wildcards: layout(wildcards.study).figure_files(),
-        captions=lambda wildcards: layout(wildcards.study).captions(),
-    output:
-        output=f"{COHORTS}/report.html",
-    log:
-        f"{LOGS}/report.log",
-    params:
-        digest=digest("cohort_stiffness.report"),
-    run:
-        run_job(rule, "cohort_stiffness.report", wildcards, input, output, log)
+        run_job(rule, "pool", wildcards, input, output, log)

@@ -8,6 +8,7 @@ from pathlib import Path
 from spinepipe.jobs.expected import Expected
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
+from spinepipe.studies.registry import kind_names, kind_of, modules_of_many
 
 ROOT = os.getcwd()
 RESULTS = "results/{study}"
@@ -16,13 +17,18 @@ LOGS = "results/{study}/logs"
 TMPDIR = tempfile.gettempdir()
 
 
-def results_of(kind):
-    """Where results of studies of a kind go.
+STUDIES = studies.names_by_kind(Path(ROOT))
+KINDS_IN_USE = [name for name in kind_names() if name in STUDIES]
 
-    The pattern names the studies, so that rules of other kinds may write files of the same name.
-    """
-    names = [re.escape(name) for name in studies.names_of_kind(Path(ROOT), kind)]
-    return f"results/{{study,{'|'.join(names) or 'none of this kind'}}}"
+
+def one_of(names):
+    """A pattern that matches these names alone."""
+    return "|".join(map(re.escape, names))
+
+
+def results_of(kind):
+    """Where results of studies of a kind go: the pattern names the studies."""
+    return f"results/{{study,{one_of(STUDIES.get(kind, ['none of this kind']))}}}"
 
 
 def selection():
@@ -86,6 +92,43 @@ def tables(*names):
     return lambda wildcards: layout(wildcards.study).table_files(names)
 
 
+def inputs_of(place, kind, names):
+    """Input of a job that reads tables; a name with a dot is a file with a name of its own."""
+    folder = f"{RESULTS}/{kind.files.subfolder}"
+    return {
+        "tables": tables(*(name for name in names if "." not in name)),
+        **{name.split(".")[0]: f"{folder}{name}" for name in names if "." in name},
+    }
+
+
+def outputs_of(place, kind, job):
+    """Output of a job that makes tables: one is called `output`, several by their names."""
+    files = {
+        name: f"{place}/{kind.files.subfolder}{name}.parquet" for name in job.writes
+    }
+    return files if len(files) > 1 else {"output": files[job.writes[0]]}
+
+
+def inputs_of_figure(wildcards):
+    files = layout(wildcards.study)
+    names = files.figure(wildcards.figure).reads
+    return {"tables": files.table_files(names), **files.other_files(names)}
+
+
+def inputs_of_report(wildcards):
+    files = layout(wildcards.study)
+    return {
+        "tables": files.report_tables(),
+        "figures": files.figure_files(),
+        "captions": files.captions(),
+        **files.other_files(files.told_in_report),
+    }
+
+
+def caption_of_figure(wildcards):
+    return Path(layout(wildcards.study).caption(wildcards.figure)).read_text("utf-8")
+
+
 def digest(job):
     """Params function: the mark that the files of a job for the study at hand must have."""
     return lambda wildcards: expected(wildcards.study).of_job(
@@ -104,55 +147,34 @@ def table_digest(wildcards):
     return expected(wildcards.study).of_table(wildcards.table)
 
 
+def figure_digest(wildcards):
+    """Params function: the mark of a figure."""
+    return expected(wildcards.study).of_figure(wildcards.figure)
+
+
+def report_digest(wildcards):
+    """Params function: the mark of a report."""
+    return expected(wildcards.study).of_report()
+
+
 def blocks_of_table(wildcards):
     return layout(wildcards.study).block_files(wildcards.table)
-
-
-def jobs_of_block(wildcards):
-    """The job files of one block of a table.
-
-    Simulations are known only once the models are ranked: a new ranking with the same content
-    then leaves them as they are.
-    """
-    if wildcards.table == "simulations":
-        checkpoints.rank_models.get(study=wildcards.study)
-    place = wildcards.table, wildcards.specimen, wildcards.block
-    return layout(wildcards.study).job_files(*place)
-
-
-def blocks_of_specimen(table):
-    """Input function: the blocks of a table that hold the specimen at hand."""
-    return lambda wildcards: layout(wildcards.study).blocks_of(
-        table, wildcards.specimen
-    )
-
-
-def stiffness_source(wildcards):
-    """Where a simulation takes its stiffness from: its own calibration or the ranking.
-
-    Of the ranking its own set alone counts, which is part of its mark.
-    """
-    folder = f"results/{wildcards.study}"
-    if wildcards.stiffness != "calibrated":
-        ranked = checkpoints.rank_models.get(study=wildcards.study)
-        return {"best": ancient(ranked.output[0])}
-    file = f"specimen={wildcards.specimen}/pose={wildcards.pose}.parquet"
-    return {"calibration": f"{folder}/calibrations/{file}"}
-
-
-def fits_of_others(wildcards):
-    """Fits of the other specimens, of which the left-out one takes the median."""
-    place = wildcards.specimen, wildcards.representation, wildcards.fitted_to
-    return layout(wildcards.study).fits_of_others(*place)
 
 
 def base_model(wildcards):
     """The model file that a study builds on, or nothing; another study may make it."""
     base = load(wildcards.study)[0].base
-    return [os.path.relpath(base.path(Path(ROOT)), ROOT)] if base else []
+    model = base and base.model
+    return [os.path.relpath(Path(ROOT) / model, ROOT)] if model else []
 
 
-def shown(results, name):
-    """The file of a figure, shown with its caption by `snakemake --report`."""
-    path = f"{results}/figures/{name}.svg"
-    return report(path, caption=f"../report/{name}.rst", category="{study}")
+def jobs_of_block(wildcards):
+    """The job files of one block of a table."""
+    for wait in WAITING.get(wildcards.table, ()):
+        wait(wildcards)
+    place = wildcards.table, wildcards.specimen, wildcards.block
+    return layout(wildcards.study).job_files(*place)
+
+
+# What must be done before the job files of a table are known, by table: functions of wildcards.
+WAITING = {}

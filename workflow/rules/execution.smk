@@ -8,8 +8,8 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
-from spinepipe.jobs.pool import submit_and_wait, warm_up
-from spinepipe.jobs.progress import Progress
+from spinepipe.jobs.pool import Progress, submit_and_wait, warm_up
+from spinepipe.studies.registry import place_of
 
 
 def check_engine():
@@ -95,34 +95,41 @@ def sweep_logs():
                 os.rmdir(folder)
 
 
-@cache
-def simulations_to_do(name):
-    """Simulations of a study that had no file when first asked: none is made before the ranking."""
-    return layout(name).simulations_to_do()
-
-
 def totals():
-    """Jobs per rule in this run. Until models are ranked, Snakemake does not know simulations."""
+    """Jobs per rule in this run, also of rules whose jobs Snakemake does not know yet."""
     jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
     counts = Counter(job.rule.name for job in jobs)
-    if not counts["simulate"]:
-        names = {job.wildcards.study for job in jobs if job.rule.name == "rank_models"}
-        counts["simulate"] = sum(simulations_to_do(name) for name in names)
+    for rule, foreseen in FORESEEN.items():
+        if not counts[rule]:
+            counts[rule] = foreseen(jobs)
     return counts
 
 
+# How many jobs of a rule are to come that Snakemake does not know yet, by rule: functions of jobs.
+FORESEEN = {}
 progress = Progress(totals)
 
 
 def run_job(rule, job, wildcards, input, output, log, **others):
-    """Run `spinepipe.jobs.<job>` in the warm pool on the files and wildcards of a rule.
+    """Run a job of the study's kind in the warm pool on the files and wildcards of a rule.
 
     Named input and output files and the wildcards become arguments of the same name; `others`
     are further arguments, and defaults for input that only some jobs of the rule have.
     """
+    kind = load(wildcards.study)[0].kind
+    arguments = {**others, **arguments_of(wildcards, input, output)}
+    execute(rule, place_of(kind, job), wildcards, log, arguments)
+
+
+def run_core(rule, job, wildcards, input, output, log):
+    """Run `spinepipe.jobs.<job>`, which serves every kind of study."""
+    arguments = arguments_of(wildcards, input, output)
+    execute(rule, f"spinepipe.jobs.{job}:run", wildcards, log, arguments)
+
+
+def arguments_of(wildcards, input, output):
     files = {name: plain(value) for name, value in [*input.items(), *output.items()]}
-    arguments = {"root": ROOT, **others, **wildcards, **files}
-    execute(rule, job, wildcards, log, arguments)
+    return {"root": ROOT, **wildcards, **files}
 
 
 def collect(rule, wildcards, input, output, log):
@@ -130,12 +137,13 @@ def collect(rule, wildcards, input, output, log):
     table = wildcards.table
     marks = [expected(wildcards.study).of_part(table, path) for path in plain(input)]
     arguments = {
+        "kind": load(wildcards.study)[0].kind,
         "table": table,
         "inputs": plain(input),
         "expected": marks,
         "output": plain(output[0]),
     }
-    execute(rule, "collect", wildcards, log, arguments)
+    execute(rule, "spinepipe.jobs.collect:run", wildcards, log, arguments)
 
 
 def plain(value):
@@ -143,7 +151,7 @@ def plain(value):
     return str(value) if isinstance(value, str) else [str(path) for path in value]
 
 
-def execute(rule, job, wildcards, log, arguments):
+def execute(rule, function, wildcards, log, arguments):
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
-    submit_and_wait(name, f"spinepipe.jobs.{job}:run", str(log), **arguments)
+    submit_and_wait(name, function, str(log), **arguments)
     progress.finish(rule)

@@ -1,8 +1,18 @@
 # Study kind global_sensitivity: which uncertain inputs drive motion, joint loads and stiffness.
-# Each job is a function `run` of spinepipe.jobs.global_sensitivity.
-from spinepipe.jobs.global_sensitivity.layout import SENSITIVITY_FIGURES
+# The jobs stand in spinepipe/studies/global_sensitivity.
 
 SENSITIVITIES = results_of("global_sensitivity")
+
+
+wildcard_constraints:
+    batch="[0-9]{5,7}",
+
+
+def blocks_of_specimen(table):
+    """Input function: the blocks of a table that hold the specimen at hand."""
+    return lambda wildcards: layout(wildcards.study).blocks_of(
+        table, wildcards.specimen
+    )
 
 
 rule draw_design:
@@ -11,9 +21,9 @@ rule draw_design:
     log:
         f"{LOGS}/draw_design.log",
     params:
-        digest=digest("global_sensitivity.design"),
+        digest=digest("design"),
     run:
-        run_job(rule, "global_sensitivity.design", wildcards, input, output, log)
+        run_job(rule, "design", wildcards, input, output, log)
 
 
 # One batch of samples; how many are in one is the study's samples_per_target.
@@ -27,9 +37,9 @@ rule respond:
     resources:
         tmpdir=TMPDIR,
     params:
-        digest=digest("global_sensitivity.respond"),
+        digest=digest("respond"),
     run:
-        run_job(rule, "global_sensitivity.respond", wildcards, input, output, log)
+        run_job(rule, "respond", wildcards, input, output, log)
 
 
 rule calibrate_samples:
@@ -42,9 +52,9 @@ rule calibrate_samples:
     resources:
         tmpdir=TMPDIR,
     params:
-        digest=digest("global_sensitivity.calibrate"),
+        digest=digest("calibrate"),
     run:
-        run_job(rule, "global_sensitivity.calibrate", wildcards, input, output, log)
+        run_job(rule, "calibrate", wildcards, input, output, log)
 
 
 rule index_factors:
@@ -58,11 +68,11 @@ rule index_factors:
     log:
         f"{LOGS}/index_factors/specimen={{specimen}}.log",
     params:
-        digest=digest("global_sensitivity.analyse"),
+        digest=digest("analyse"),
     run:
         run_job(
             rule,
-            "global_sensitivity.analyse",
+            "analyse",
             wildcards,
             input,
             output,
@@ -70,45 +80,3 @@ rule index_factors:
             responses=[],
             calibrated=[],
         )
-
-
-for figure, drawn_from in SENSITIVITY_FIGURES.items():
-
-    rule:
-        name:
-            f"figure_{figure}"
-        input:
-            tables=tables(*drawn_from),
-        output:
-            svg=shown(SENSITIVITIES, figure),
-            png=f"{SENSITIVITIES}/figures/{figure}.png",
-        log:
-            f"{LOGS}/figure_{figure}.log",
-        params:
-            digest=digest("global_sensitivity.figures"),
-            figure=figure,
-        run:
-            run_job(
-                rule,
-                "global_sensitivity.figures",
-                wildcards,
-                input,
-                output,
-                log,
-                figure=params.figure,
-            )
-
-
-rule global_sensitivity_report:
-    input:
-        tables=lambda wildcards: layout(wildcards.study).report_tables(),
-        figures=lambda wildcards: layout(wildcards.study).figure_files(),
-        captions=lambda wildcards: layout(wildcards.study).captions(),
-    output:
-        output=f"{SENSITIVITIES}/report.html",
-    log:
-        f"{LOGS}/report.log",
-    params:
-        digest=digest("global_sensitivity.report"),
-    run:
-        run_job(rule, "global_sensitivity.report", wildcards, input, output, log)

@@ -1,6 +1,54 @@
 # Study kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed.
-# Each job is a function `run` of spinepipe.jobs; see `run_job` for how its arguments are named.
+# The jobs stand in spinepipe/studies/joint_pose_sensitivity; see `run_job` for their arguments.
+from spinepipe.studies.joint_pose_sensitivity.kind import METHODS
+
 POSES = results_of("joint_pose_sensitivity")
+
+
+wildcard_constraints:
+    pose="[0-9]{4,5}",
+    bootstrap="start|damping",
+    loading="equilibrium|quasi_static|dynamic",
+    set="[0-9]{3,4}",
+    method=one_of(METHODS),
+    sd_mm="[0-9.e+-]+",
+
+
+def stiffness_source(wildcards):
+    """Where a simulation takes its stiffness from: its own calibration or the ranking.
+
+    Of the ranking its own set alone counts, which is part of its mark.
+    """
+    folder = f"results/{wildcards.study}"
+    if wildcards.stiffness != "calibrated":
+        ranked = checkpoints.rank_models.get(study=wildcards.study)
+        return {"best": ancient(ranked.output[0])}
+    file = f"specimen={wildcards.specimen}/pose={wildcards.pose}.parquet"
+    return {"calibration": f"{folder}/calibrations/{file}"}
+
+
+def when_ranked(wildcards):
+    """Simulations are known only once the models are ranked.
+
+    A new ranking with the same content then leaves them as they are.
+    """
+    if load(wildcards.study)[0].kind == "joint_pose_sensitivity":
+        checkpoints.rank_models.get(study=wildcards.study)
+
+
+@cache
+def simulations_to_do(name):
+    """Simulations of a study that had no file when first asked for: none is made before the ranking."""
+    return layout(name).simulations_to_do()
+
+
+def simulations_foreseen(jobs):
+    names = {job.wildcards.study for job in jobs if job.rule.name == "rank_models"}
+    return sum(simulations_to_do(name) for name in names)
+
+
+WAITING["simulations"] = [when_ranked]
+FORESEEN["simulate"] = simulations_foreseen
 
 
 rule start_model:
@@ -73,7 +121,7 @@ rule simulate:
         unpack(stiffness_source),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
-        output=f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness}}.parquet",
+        output=f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet",
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
     resources:
@@ -84,3 +132,38 @@ rule simulate:
         run_job(
             rule, "simulate", wildcards, input, output, log, calibration="", best=""
         )
+
+
+rule bootstrap:
+    output:
+        output=f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/set={{set}}.parquet",
+    log:
+        f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{set}}.log",
+    params:
+        digest=digest("bootstrap"),
+    run:
+        run_job(rule, "bootstrap", wildcards, input, output, log)
+
+
+rule fit_by_method:
+    input:
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+    output:
+        output=f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet",
+    log:
+        f"{LOGS}/methods/specimen={{specimen}}/pose={{pose}}-{{method}}.log",
+    params:
+        digest=digest("fit_by_method"),
+    run:
+        run_job(rule, "fit_by_method", wildcards, input, output, log)
+
+
+rule landmark_errors:
+    output:
+        output=f"{POSES}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet",
+    log:
+        f"{LOGS}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.log",
+    params:
+        digest=digest("landmark_errors"),
+    run:
+        run_job(rule, "landmark_errors", wildcards, input, output, log)

@@ -1,17 +1,8 @@
-"""One HTML document, whatever the kind of study: what goes into the template.
-
-What was run: settings, seed, versions and digests, from the files of the tables.
-
-What a report is made of.
-
-Finding about the paper: how many of its numbers ours are inside the range of.
-
-Tables as the page shows them: columns with unit and meaning, cells with a value to sort by.
-"""
+"""One HTML document, whatever the kind of study: what it is made of, and its template."""
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
 
@@ -26,8 +17,8 @@ from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
 from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
 from spinepipe.report.style import picture, style
 from spinepipe.report.words import count, number
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.study import Study
+from spinepipe.tables import Tables
 from spinepipe.tables.schema import Column
 
 _VERSION = "version_"
@@ -59,17 +50,6 @@ def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
     return Origin(tuple(_facts(metadata)), digests, settings)
 
 
-def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
-    """Optional parts that the settings leave out, each with the setting that does."""
-    parts = (
-        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
-        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
-        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
-        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
-    )
-    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
-
-
 def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
     names = sorted({name for found in metadata.values() for name in found})
     plain = [name for name in names if not name.startswith(_VERSION)]
@@ -84,31 +64,39 @@ def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
     return facts
 
 
+@dataclass(frozen=True)
+class Picture:
+    """One figure: its name, title, address as data, and caption."""
+
+    name: str
+    title: str
+    address: str
+    caption: str
+
+    @classmethod
+    def of(cls, name: str, title: str, svg: str, caption: str) -> "Picture":
+        """A figure inside the page: as an image of its own it shares no ids with the others."""
+        return cls(name, title, _address(svg.encode()), caption)
+
+
 @dataclass(frozen=True, eq=False)
 class Results:
     """Results of one study, each by its name.
 
     Attributes
     ----------
-    tables : rows of each table that the study has.
+    tables : rows of each table that the page reads, and other result files.
     metadata : what each table's file says of where it comes from.
-    pictures : each figure as SVG text, in the order of the report.
-    captions : the words below each figure.
+    pictures : each figure with its title and caption, in the order of the report.
     """
 
-    tables: Mapping[str, pd.DataFrame]
+    tables: Tables
     metadata: Mapping[str, Mapping[str, str]]
-    pictures: Mapping[str, str]
-    captions: Mapping[str, str]
+    pictures: Mapping[str, Picture]
 
     def table(self, name: str) -> pd.DataFrame:
         """Rows of a table, none where the study does not have it."""
         return self.tables.get(name, pd.DataFrame())
-
-
-def paper(study: JointPoseSensitivity, results: Results) -> str:
-    """How the published quantities were judged."""
-    return judged(results.table("against_gould_2024a"))
 
 
 def judged(rows: pd.DataFrame) -> str:
@@ -238,21 +226,6 @@ _MOST_NAMES, _MOST_SHOWN = 12, 6
 
 
 @dataclass(frozen=True)
-class Picture:
-    """One figure: its name, title, address as data, and caption."""
-
-    name: str
-    title: str
-    address: str
-    caption: str
-
-    @classmethod
-    def of(cls, name: str, title: str, svg: str, caption: str) -> "Picture":
-        """A figure inside the page: as an image of its own it shares no ids with the others."""
-        return cls(name, title, _address(svg.encode()), caption)
-
-
-@dataclass(frozen=True)
 class Headline:
     """The answer in one sentence, how sure it is, and what casts doubt on it."""
 
@@ -271,6 +244,7 @@ class Document:
     poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled.
     metadata : what each table's file says of where it comes from.
     with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
+    tests, load_shift_mm : what the view shows of a study that chooses tests or moves their loads.
     headline : the answer, where the study asks for one; figures then come before the 3-D view.
     """
 
@@ -280,8 +254,10 @@ class Document:
     tables: Sequence[Sortable]
     metadata: Mapping[str, Mapping[str, str]]
     left_out: Sequence[str]
-    poses: pd.DataFrame
+    poses: pd.DataFrame = field(default_factory=pd.DataFrame)
     with_loads: bool = True
+    tests: Sequence[str] | None = None
+    load_shift_mm: Sequence[float] = (0.0, 0.0, 0.0)
     headline: Headline | None = None
 
     def html(self, study: Study, cohort: Cohort) -> str:
@@ -290,7 +266,7 @@ class Document:
             autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
         template = environment.from_string(_part("page.html"))
-        views = self._views(study, cohort)
+        views = self._views(cohort)
         drawn = scenes(views, cohort, self.poses)
         return template.render(
             study=study,
@@ -313,10 +289,10 @@ class Document:
             plotly=Markup(get_plotlyjs()),
         )
 
-    def _views(self, study: Study, cohort: Cohort) -> list[SpecimenView]:
+    def _views(self, cohort: Cohort) -> list[SpecimenView]:
         """What is shown of each of the first specimens."""
-        shifted = study if isinstance(study, JointPoseSensitivity) else None
-        views = [view_of(cohort, name, shifted) for name in cohort.specimen_names[:_MOST_SHOWN]]
+        shown = cohort.specimen_names[:_MOST_SHOWN]
+        views = [view_of(cohort, name, self.tests, self.load_shift_mm) for name in shown]
         return views if self.with_loads else [replace(v, cases=(), motions=()) for v in views]
 
 

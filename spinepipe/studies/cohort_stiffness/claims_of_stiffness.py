@@ -306,7 +306,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``findings.parquet``."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     rows = list(finding_rows(read_frames(tables), settings.significance))
-    origin = provenance("cohort_stiffness.findings", settings, cohort)
+    origin = provenance("findings", settings, cohort)
     write(from_rows(FINDINGS, rows), output, origin)
 
 

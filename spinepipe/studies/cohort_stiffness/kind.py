@@ -1,11 +1,13 @@
-"""Which files the results of a cohort study consist of, and which of them make up a table."""
+"""The kind cohort_stiffness: how stiffness differs between specimens, levels and load cases."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.published import OF_COHORTS, stands_for
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
@@ -14,27 +16,31 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_sets,
     tests_of,
 )
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.cohort_stiffness.tables import TABLES
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study_files import Figure, StudyFiles
 
 OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""
 
-COHORT_ANALYSES: dict[str, tuple[str, ...]] = {
-    "mae": ("errors",),
-    "ranking": ("errors", "fits", "pooling"),
-    "statistics": ("errors", "fits"),
-    "findings": ("stiffness", "errors", "statistics", "pooling"),
-    "against_gould_2024b": ("stiffness", "fits", "errors", "mae", "statistics"),
-}
-"""Tables computed from others, and which."""
-
-COHORT_FIGURES: dict[str, tuple[str, ...]] = {
-    "stiffness_by_level": ("stiffness",),
-    "error_map": ("errors", "sign_checks"),
-    "held_out_error": ("errors",),
-    "load_case_stiffness": ("stiffness", "errors", "statistics"),
-}
-"""Figures and the tables each is drawn from."""
+_ANALYSES = (
+    Job("mae", "ranking:mae", ("errors",), ("mae",)),
+    Job("ranking", "ranking:ranking", ("errors", "fits", "pooling"), ("ranking",)),
+    Job("statistics", "significance", ("errors", "fits"), ("statistics",)),
+    Job(
+        "findings",
+        "claims_of_stiffness",
+        ("stiffness", "errors", "statistics", "pooling"),
+        ("findings",),
+    ),
+    Job(
+        "against_gould_2024b",
+        "gould_2024b.against",
+        ("stiffness", "fits", "errors", "mae", "statistics"),
+        ("against_gould_2024b",),
+    ),
+)
+"""What is computed from tables."""
 
 EVERYONE, POOLED_BLOCK = "everyone", "pooled"
 """Place of the block of the pooled fits, which are of no single specimen."""
@@ -54,6 +60,34 @@ class CohortLayout(StudyFiles):
     tests : load cases of the study. rebuilt : whether the cohort stands for that of a paper.
     """
 
+    joined = OF_JOBS
+    drawings = (
+        Figure(
+            "stiffness_by_level",
+            "Fitted stiffness of every specimen, level by level",
+            "figures.stiffness_by_level:stiffness_by_level_figure",
+            ("stiffness",),
+        ),
+        Figure(
+            "error_map",
+            "Errors by specimen and level",
+            "figures.error_map:error_map_figure",
+            ("errors", "sign_checks"),
+        ),
+        Figure(
+            "held_out_error",
+            "Errors of fitted and of held-out motion",
+            "figures.held_out_error:held_out_error_figure",
+            ("errors",),
+        ),
+        Figure(
+            "load_case_stiffness",
+            "Stiffness fitted to one load case",
+            "figures.load_case_stiffness:load_case_stiffness_figure",
+            ("stiffness", "errors", "statistics"),
+        ),
+    )
+
     study: CohortStiffness
     tests: tuple[str, ...]
     rebuilt: bool
@@ -69,14 +103,9 @@ class CohortLayout(StudyFiles):
         """The tables that this study has."""
         pooled = ("pooling",) if POOLED in self.study.representations else ()
         analysed = (
-            name for name in COHORT_ANALYSES if self.rebuilt or not name.startswith("against")
+            job.name for job in _ANALYSES if self.rebuilt or not job.name.startswith("against")
         )
         return ("stiffness", "fits", "errors", "sign_checks", *pooled, *analysed)
-
-    @property
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures and the tables each is drawn from."""
-        return COHORT_FIGURES
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -91,7 +120,7 @@ class CohortLayout(StudyFiles):
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
         folder = path.removeprefix(f"{self.folder}/").split("/")[0]
-        return f"cohort_stiffness.{_MADE_BY[folder]}"
+        return _MADE_BY[folder]
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per specimen, and one of the pooled fits."""
@@ -159,3 +188,34 @@ class CohortLayout(StudyFiles):
                 for name in self.specimens
             ]
         return places
+
+
+def _fits_of_others(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Marks of the fits of which the left-out specimen takes the median."""
+    where = (place[name] for name in ("specimen", "representation", "fitted_to"))
+    return [expected.of_part("stiffness", fit) for fit in expected.files.fits_of_others(*where)]
+
+
+_HELD_OUT = ("representations", "cross_validation", "significance")
+_FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
+"""Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
+
+KIND = Kind(
+    settings=CohortStiffness,
+    files=CohortLayout,
+    checks=(check_cohort_stiffness,),
+    checks_of_files=(check_cohort_base,),
+    tables=TABLES,
+    jobs=(
+        Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
+        Job("literature", ignores=ignoring(*_HELD_OUT, *_FITTING), reads_base=True),
+        Job("left_out", ignores=ignoring(*_HELD_OUT), reads_base=True, also=_fits_of_others),
+        Job(
+            "pool",
+            ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
+            specimens="all",
+            reads_base=True,
+        ),
+        *_ANALYSES,
+    ),
+)

@@ -3,6 +3,8 @@
 Which tables the page of a cohort study shows, and which of their rows.
 """
 
+from dataclasses import replace
+
 import pandas as pd
 
 from spinepipe.cohort import Cohort
@@ -10,7 +12,7 @@ from spinepipe.report.page.document import Document, Picture, Results, Sortable,
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS
+from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 from spinepipe.tables.shared import against_as_shown
 
 SHOWN = {
@@ -34,6 +36,9 @@ _COLUMNS = {
 """What a reader compares stands first; short names are left to the files."""
 
 
+_SHAPES = {table.name: table for table in TABLES}
+
+
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has, as the page shows them; those without rows are left out."""
     found = []
@@ -42,7 +47,7 @@ def shown_tables(results: Results) -> list[Sortable]:
         if not len(frame):
             continue
         rows, told = _rows(name, frame)
-        shape = TABLES[name]
+        shape = _SHAPES[name]
         columns = _COLUMNS.get(shape.name, shape.columns)
         found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
     return [table for table in found if table.rows]
@@ -64,40 +69,42 @@ def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     return chosen, f"Here: {told}; the others are in {name}.parquet."
 
 
+HELD_OUT_ERROR = "held_out_error"
+"""The figure of errors of held-out motion."""
+
+NOT_HELD_OUT = (
+    "Besides the bushings, effects of the model file {file} act in all models. Their values are "
+    "the file's in every bar: those for all specimens where it has such, else those for the "
+    "specimen itself. Readings that they were found on count as held out here for stiffness only."
+)
+
 QUESTION = (
     "Does stiffness differ between specimens, levels and load cases, how should it be described, "
     "and does it carry over to what it was not fitted to?"
 )
-TITLES = {
-    "stiffness_by_level": "Fitted stiffness of every specimen, level by level",
-    "error_map": "Errors by specimen and level",
-    "held_out_error": "Errors of fitted and of held-out motion",
-    "load_case_stiffness": "Stiffness fitted to one load case",
-}
 READ = SHOWN
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def cohort_page(study: CohortStiffness, cohort: Cohort, results: Results) -> str:
-    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
-    whole = Document(
+def document(study: CohortStiffness, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    return Document(
         question=QUESTION,
         findings=findings(study, results),
-        pictures=[
-            Picture.of(
-                name,
-                TITLES.get(name, name.replace("_", " ")),
-                svg,
-                " ".join(results.captions[name].split()),
-            )
-            for name, svg in results.pictures.items()
-        ],
+        pictures=[_with_base(study, picture) for picture in results.pictures.values()],
         tables=shown_tables(results),
         metadata=results.metadata,
         left_out=left_out(study, len(cohort.specimen_names)),
         poses=results.table("poses"),
     )
-    return whole.html(study, cohort)
+
+
+def _with_base(study: CohortStiffness, picture: Picture) -> Picture:
+    """Beneath held-out errors, what of a base model was not held out."""
+    if study.base is None or picture.name != HELD_OUT_ERROR:
+        return picture
+    told = f"{picture.caption} {NOT_HELD_OUT.format(file=study.base.model)}"
+    return replace(picture, caption=told)
 
 
 def left_out(study: CohortStiffness, specimens: int) -> tuple[str, ...]:

@@ -17,26 +17,21 @@ import numpy as np
 from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import coupled_range, loaded_coordinate, peak_step
-from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion
+from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion, on_bushings
 from spinepipe.effects.contract import Array
+from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import Stamp, on_bushings, stamp, stiffness_of_joints
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
-from spinepipe.studies.parts import Damping
+from spinepipe.studies.parts import Damping, stiffness_of_joints
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
 
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
-NOT_HELD_OUT = (
-    "Besides the bushings, effects of the model file {file} act in all models. Their values are "
-    "the file's in every bar: those for all specimens where it has such, else those for the "
-    "specimen itself. Readings that they were found on count as held out here for stiffness only."
-)
 
 
 @lru_cache(maxsize=8)
@@ -72,7 +67,6 @@ def origin(
 ) -> dict[str, str]:
     """Metadata of a file, see `provenance`, with the digest of the model file."""
     base = base_marks(root, study.base and study.base.model)
-    job = f"cohort_stiffness.{job}"
     whole = provenance(job, study, cohort, specimens, [*base, *others])
     return {**whole, "base_model_digest": _digest(root, study)} if base else whole
 

@@ -45,7 +45,7 @@ def ranking(root: str, study: str, tables: list[str], output: str) -> None:
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     frames = read_frames(tables)
     rows = ranking_rows(frames["errors"], frames["fits"], frames.get("pooling"))
-    origin = provenance("cohort_stiffness.ranking", settings, cohort)
+    origin = provenance("ranking", settings, cohort)
     write(from_rows(RANKING, rows), output, origin)
 
 
@@ -207,7 +207,7 @@ def mae(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``mae.parquet``."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     rows = mae_rows(read_frames(tables)["errors"])
-    write(from_rows(MAE, rows), output, provenance("cohort_stiffness.mae", settings, cohort))
+    write(from_rows(MAE, rows), output, provenance("mae", settings, cohort))
 
 
 def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:

@@ -228,7 +228,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     frames = read_frames(tables)
     rows = list(corrected_rows(all_tests(frames["errors"], frames["fits"])))
-    origin = provenance("cohort_stiffness.statistics", settings, cohort)
+    origin = provenance("statistics", settings, cohort)
     write(from_rows(STATISTICS, rows), output, origin)
 
 

@@ -6,7 +6,7 @@ Tables of studies of kind cohort_stiffness that are computed from its fits and t
 """
 
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
-from spinepipe.tables.shared import against_paper
+from spinepipe.tables.shared import STATISTICS, against_paper
 from spinepipe.units import COORDINATES
 
 REPRESENTATIONS = (
@@ -413,3 +413,9 @@ FINDINGS = Table(
 )
 
 AGAINST_GOULD_2024B = against_paper("against_gould_2024b")
+
+TABLES = (
+    *(STIFFNESS, FITS, ERRORS, POOLING, SIGN_CHECKS),
+    *(MAE, RANKING, STATISTICS, FINDINGS, AGAINST_GOULD_2024B),
+)
+"""All tables of the kind."""

@@ -191,7 +191,7 @@ def _model(
     return model_file(fit, f"{study.study}_{of}", cohort.name, base)
 
 
-JOB = "discrepancy.search"
+JOB = "search"
 STORE = "store"
 
 
@@ -212,7 +212,7 @@ def run(
     A base that cannot be fitted is a verdict too: UNKNOWN, and why.
     """
     settings, cohort = study_of_kind(Discrepancy, root, study)
-    store = Store(Path(verdict).parent / STORE, f"spinepipe.jobs.{JOB}")
+    store = Store(Path(verdict).parent / STORE, __name__)
     results = searched(settings, cohort, root, store)
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
     files = {

@@ -1,33 +1,58 @@
-"""Which files the results of a search for missing effects consist of."""
+"""The kind discrepancy: which effect a model lacks, where, and how sure that is."""
 
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
+from spinepipe.studies.discrepancy.checks import check_base_model, check_discrepancy
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.kind import Job, Kind
+from spinepipe.studies.study_files import Figure, StudyFiles
 
-FOLDER = "discrepancy"
-"""Folder of all results inside that of the study."""
+VERDICT = "verdict.json"
+"""The answer; each figure may draw from it."""
 
-TABLES = ("gap", "candidates", "where", "confusions", "held_out")
-
-OTHERS = ("verdict.json", "model_base.yaml", "model_with_effects.yaml")
-
-DISCREPANCY_FIGURES: dict[str, tuple[str, ...]] = {
-    "gap_map": ("where",),
-    "gap_by_step": ("gap",),
-    "effect_evidence": ("candidates",),
-    "gap_held_out": ("held_out",),
-    "effect_confusions": ("confusions", "candidates"),
-}
-"""Figures and the tables each is drawn from, besides the verdict."""
+OTHERS = (VERDICT, "model_base.yaml", "model_with_effects.yaml")
 
 
 @dataclass(frozen=True)
 class DiscrepancyFiles(StudyFiles):
     """The result files of one search for missing effects."""
+
+    subfolder = "discrepancy/"
+    told_in_report = (VERDICT,)
+    drawings = (
+        Figure(
+            "gap_map",
+            "Where the model is off, before and after",
+            "figures.gap_map:gap_map_figure",
+            ("where",),
+        ),
+        Figure(
+            "gap_by_step",
+            "The gap along the load",
+            "figures.gap_map:gap_by_step_figure",
+            ("gap",),
+        ),
+        Figure(
+            "effect_evidence",
+            "Evidence for each effect",
+            "figures.effects:effect_evidence_figure",
+            ("candidates", VERDICT),
+        ),
+        Figure(
+            "gap_held_out",
+            "Proof on motion held out",
+            "figures.gap_held_out:gap_held_out_figure",
+            ("held_out",),
+        ),
+        Figure(
+            "effect_confusions",
+            "What these tests could tell apart, and see",
+            "figures.effects:effect_confusions_figure",
+            ("confusions", "candidates", VERDICT),
+        ),
+    )
 
     study: Discrepancy
 
@@ -37,43 +62,25 @@ class DiscrepancyFiles(StudyFiles):
         return cls(study, cohort.specimen_names)
 
     @property
-    def folder(self) -> str:
-        """Where all results of the study are."""
-        return f"results/{self.study.study}/{FOLDER}"
-
-    @property
     def tables(self) -> tuple[str, ...]:
         """The tables that every study has."""
-        return TABLES
+        return tuple(table.name for table in TABLES)
 
     @property
     def others(self) -> tuple[str, ...]:
         """The verdict and the two model files."""
         return OTHERS
 
-    @property
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures and the tables each is drawn from."""
-        return DISCREPANCY_FIGURES
 
-    @property
-    def made_of_jobs(self) -> tuple[str, ...]:
-        """No table is made of job files."""
-        return ()
+TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)
 
-    def job_of(self, table: str, path: str) -> str:
-        """None: no table is made of job files."""
-        raise ValueError(f"{table} is not made of job files")
-
-    def blocks(self, table: str) -> list[tuple[str, str]]:
-        """None: no table is made of job files."""
-        return []
-
-    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
-        """None: no table is made of job files."""
-        return []
-
-    def base_model(self) -> list[str]:
-        """The model file that the study starts from; none where its base is stiffness alone."""
-        model = self.study.base.model
-        return [os.path.relpath(model)] if model else []
+KIND = Kind(
+    settings=Discrepancy,
+    files=DiscrepancyFiles,
+    checks=(check_discrepancy,),
+    checks_of_files=(check_base_model,),
+    tables=TABLES,
+    # every setting says something about the search
+    jobs=(Job("search", at="job", reads_base=True),),
+    makes_models="search",
+)

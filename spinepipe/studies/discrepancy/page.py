@@ -17,7 +17,7 @@ from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, WHERE
-from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import (
     axis,
     called,
@@ -228,39 +228,28 @@ QUESTION = (
     "Where do model and measurement disagree, which effect does the model lack, what happens when "
     "it is added, and how sure is that?"
 )
-TITLES = {
-    "gap_map": "Where the model is off, before and after",
-    "gap_by_step": "The gap along the load",
-    "effect_evidence": "Evidence for each effect",
-    "gap_held_out": "Proof on motion held out",
-    "effect_confusions": "What these tests could tell apart, and see",
-}
 READ = ("where", "candidates", "held_out", "confusions")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def discrepancy_page(study: Discrepancy, cohort: Cohort, results: Results, verdict: Verdict) -> str:
-    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
-    whole = Document(
+def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    verdict = read_verdict(results.tables.files["verdict"])
+    return Document(
         question=QUESTION,
         findings=findings(verdict, results),
-        pictures=[
-            Picture.of(name, TITLES[name], svg, " ".join(results.captions[name].split()))
-            for name, svg in _ordered(results.pictures, verdict)
-        ],
+        pictures=_ordered(results.pictures, verdict),
         tables=shown_tables(verdict, results),
         metadata=results.metadata,
         left_out=tuple(left_out(study)),
-        poses=pd.DataFrame(),
         headline=Headline(headline(verdict), _joined(how_sure(verdict)), warnings(verdict)),
     )
-    return whole.html(study, cohort)
 
 
-def _ordered(pictures: Mapping[str, str], verdict: Verdict) -> list[tuple[str, str]]:
+def _ordered(pictures: Mapping[str, Picture], verdict: Verdict) -> list[Picture]:
     """Where nothing is missing, what could have been seen comes first."""
     first = "effect_confusions" if verdict.answer is Answer.NULL else ""
-    return sorted(pictures.items(), key=lambda pair: pair[0] != first)
+    return sorted(pictures.values(), key=lambda picture: picture.name != first)
 
 
 def left_out(study: Discrepancy) -> Iterator[str]:

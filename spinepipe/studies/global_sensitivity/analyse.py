@@ -133,7 +133,7 @@ def run(
         *response_outputs(responses, settings),
         *calibrated_outputs(calibrated, settings),
     ]
-    made_by = provenance("global_sensitivity.analyse", settings, cohort, [specimen])
+    made_by = provenance("analyse", settings, cohort, [specimen])
     for table, rows, path in (
         (INDICES, _index_rows, indices),
         (CONVERGENCE, _convergence_rows, convergence),

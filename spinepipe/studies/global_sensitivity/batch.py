@@ -11,11 +11,13 @@ import pyarrow.parquet as pq
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.inputs import Stamp, stamp, stiffness_of_joints, study_of_kind
+from spinepipe.files import Stamp, stamp
+from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices import Design, draw
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import Start, start_of
 from spinepipe.studies.global_sensitivity.vary import Varied, vary
+from spinepipe.studies.parts import stiffness_of_joints
 
 
 def design_of(study: GlobalSensitivity) -> Design:

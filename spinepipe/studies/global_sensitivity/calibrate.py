@@ -35,7 +35,7 @@ def run(root: str, study: str, design: str, specimen: str, batch: str, output: s
     rows.sort(key=lambda row: int(row["sample"]))
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("global_sensitivity.calibrate", settings, cohort, [specimen], size)
+    made_by = provenance("calibrate", settings, cohort, [specimen], size)
     write(to_arrow(TABLE, columns), output, made_by)
 
 

@@ -25,7 +25,7 @@ def run(root: str, study: str, output: str) -> None:
         "group": _repeated(settings.groups, samples),
         "unit": _repeated(settings.units, samples),
     }
-    made_by = provenance("global_sensitivity.design", settings, cohort, ())
+    made_by = provenance("design", settings, cohort, ())
     write(to_arrow(DESIGN, columns), output, made_by)
 
 

@@ -1,11 +1,22 @@
-"""Which files the results of a global sensitivity study consist of."""
+"""The kind global_sensitivity: which uncertain inputs drive motion, joint loads and stiffness."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
+from spinepipe.studies.global_sensitivity.tables import (
+    CALIBRATED,
+    CONVERGENCE,
+    DESIGN,
+    INDICES,
+    RESPONSES,
+)
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study_files import Figure, StudyFiles
 
 OF_JOBS = ("responses", "calibrated", "indices", "convergence")
 """Tables joined from job files: of batches of samples, the last two of whole specimens."""
@@ -19,13 +30,6 @@ _MADE_BY = {
 }
 """The job that writes the files of each of them."""
 
-SENSITIVITY_FIGURES: dict[str, tuple[str, ...]] = {
-    "factor_indices": ("indices",),
-    "index_convergence": ("convergence", "indices"),
-    "top_factors": ("responses", "design", "indices"),
-}
-"""Figures and the tables each is drawn from."""
-
 _MOST_FILES_PER_BLOCK = 300
 
 
@@ -36,6 +40,28 @@ class SensitivityFiles(StudyFiles):
     Samples are computed in batches of `GlobalSensitivity.batch_size`; one file holds one batch of
     one specimen. A batch of one is a target of its own for each sample.
     """
+
+    joined = OF_JOBS
+    drawings = (
+        Figure(
+            "factor_indices",
+            "What each output hangs on",
+            "figures.indices:indices_figure",
+            ("indices",),
+        ),
+        Figure(
+            "index_convergence",
+            "Indices against the number of runs",
+            "figures.convergence:convergence_figure",
+            ("convergence", "indices"),
+        ),
+        Figure(
+            "top_factors",
+            "Outputs over the leading factors",
+            "figures.scatter:scatter_figure",
+            ("responses", "design", "indices"),
+        ),
+    )
 
     study: GlobalSensitivity
 
@@ -51,18 +77,13 @@ class SensitivityFiles(StudyFiles):
         return ("design", "responses", *calibrated, "indices", "convergence")
 
     @property
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures and the tables each is drawn from."""
-        return SENSITIVITY_FIGURES
-
-    @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The tables that are made of job files."""
         return tuple(name for name in OF_JOBS if name in self.tables)
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        return f"global_sensitivity.{_MADE_BY[table]}"
+        return _MADE_BY[table]
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""
@@ -90,3 +111,34 @@ class SensitivityFiles(StudyFiles):
 
     def _batch_file(self, table: str, specimen: str, number: int) -> str:
         return f"{self.folder}/jobs/{table}/specimen={specimen}/batch={number:05d}.parquet"
+
+
+def _size_of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """How many samples one file holds hangs on the number of specimens."""
+    return [str(expected.study.batch_size(len(expected.files.specimens)))]
+
+
+_RESPONDING = (
+    *("specimens", "tests", "steps", "stiffness", "level_stiffness", "damping", "loading"),
+)
+_ANALYSING = ("bootstraps", "confidence", "indices", "most_failed", "outputs")
+"""Settings by what they decide: what the samples are done with, what is made of them."""
+
+KIND = Kind(
+    settings=GlobalSensitivity,
+    files=SensitivityFiles,
+    checks=(check_global_sensitivity,),
+    checks_at_start=(check_size_of_design,),
+    tables=(DESIGN, RESPONSES, CALIBRATED, INDICES, CONVERGENCE),
+    jobs=(
+        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), specimens="none"),
+        Job(
+            "respond",
+            many=True,
+            ignores=ignoring(*_ANALYSING, "calibration", "seed"),
+            also=_size_of_batch,
+        ),
+        Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_size_of_batch),
+        Job("analyse"),
+    ),
+)

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.report.page.document import Document, Results, Sortable, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
@@ -22,7 +22,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
 )
 from spinepipe.studies.global_sensitivity.findings import findings, opening
 from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
-from spinepipe.tables import TABLES
+from spinepipe.studies.global_sensitivity.tables import INDICES
 from spinepipe.tables.schema import Column
 
 _PLACE = ("specimen", "output", "test", "step", "joint", "coordinate")
@@ -47,7 +47,7 @@ def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
         for place, part in rows.groupby(list(_PLACE), sort=False, dropna=False)
     ]
     columns = [
-        *(column for column in TABLES["indices"].columns if column.name in _PLACE),
+        *(column for column in INDICES.columns if column.name in _PLACE),
         *(
             Column(name, "text", f"{name} factor, {NAME[measures.main]} [interval]")
             for name in _RANKS
@@ -84,7 +84,7 @@ def _pairs(indices: pd.DataFrame) -> Iterator[Sortable]:
         clear = rows[rows["ci_low"] > 0.0].sort_values("estimate", ascending=False, kind="stable")
         about = "S2 whose intervals lie above 0, the largest first; of many pairs chance alone "
         about += "lifts 1 in 40."
-        columns = TABLES["indices"].columns
+        columns = INDICES.columns
         yield sortable("indices", "Interactions of two factors", about, clear, columns)
 
 
@@ -95,38 +95,28 @@ def _drawn(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> Sortabl
     order = {name: place for place, name in enumerate(leading(found, measures))}
     ranked = rows.assign(rank=rows["factor"].map(order)).sort_values("rank", kind="stable")
     title = "Indices of the outputs in the figures"
-    return sortable("indices", title, TABLES["indices"].about, ranked, TABLES["indices"].columns)
+    return sortable("indices", title, INDICES.about, ranked, INDICES.columns)
 
 
 QUESTION = (
     "Which uncertain inputs drive the results of this spine's simulations, how sure is that, and "
     "which inputs need not be known better?"
 )
-TITLES = {
-    "factor_indices": "What each output hangs on",
-    "index_convergence": "Indices against the number of runs",
-    "top_factors": "Outputs over the leading factors",
-}
 READ = ("indices", "convergence")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def sensitivity_page(study: GlobalSensitivity, cohort: Cohort, results: Results) -> str:
-    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
-    whole = Document(
+def document(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    return Document(
         question=QUESTION,
         findings=findings(study, cohort, results),
-        pictures=[
-            Picture.of(name, TITLES[name], svg, " ".join(results.captions[name].split()))
-            for name, svg in results.pictures.items()
-        ],
+        pictures=list(results.pictures.values()),
         tables=shown_tables(cohort, results),
         metadata=results.metadata,
         left_out=left_out(study),
-        poses=pd.DataFrame(),
         headline=opening(study, cohort, results),
     )
-    return whole.html(study, cohort)
 
 
 def left_out(study: GlobalSensitivity) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ def run(root: str, study: str, design: str, specimen: str, batch: str, output: s
     ]
     columns = _columns(one, cohort.joint_names, solved)
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("global_sensitivity.respond", settings, cohort, [specimen], size)
+    made_by = provenance("respond", settings, cohort, [specimen], size)
     write(to_arrow(TABLE, columns), output, made_by)
 
 

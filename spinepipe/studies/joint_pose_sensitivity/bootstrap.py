@@ -11,10 +11,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import specimen_inputs, start_stiffness, study_and_cohort
 from spinepipe.model import RefusedModel
 from spinepipe.statics import Course, moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
+    specimen_inputs,
+    start_stiffness,
+    study_and_cohort,
+)
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP

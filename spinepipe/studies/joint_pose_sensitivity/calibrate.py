@@ -7,10 +7,10 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import sampled_poses, study_and_cohort
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.statistics import Agreement, bland_altman
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from spinepipe.report.page.document import Results, paper
+from spinepipe.report.page.document import Results, judged
 from spinepipe.report.panels import EVERY_JOINT
 from spinepipe.report.words import AXIS, count, fixed, number, percent, tick
 from spinepipe.status import Status
@@ -351,3 +351,8 @@ def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
     )
     told = [make(study, results) for make in makers]
     return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]
+
+
+def paper(study: JointPoseSensitivity, results: Results) -> str:
+    """How the published quantities were judged."""
+    return judged(results.table("against_gould_2024a"))

@@ -14,10 +14,14 @@ from spinepipe.calibrate.forward_runs import (
 )
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import sampled_poses, start_stiffness, study_and_cohort
 from spinepipe.model import RefusedModel
 from spinepipe.statics import Course, moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
+    sampled_poses,
+    start_stiffness,
+    study_and_cohort,
+)
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.success import near_start

@@ -1,13 +1,20 @@
-"""Which files the results of a joint-pose study consist of, and which of them make up a table."""
+"""The kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.published import OF_JOINT_POSE, stands_for
+from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study_files import Figure, StudyFiles
 
 ALWAYS = (
     *("landmarks", "poses", "calibrations", "simulations", "success", "counts", "summary"),
@@ -29,18 +36,6 @@ METHODS = (
     "forward_run_raw_units",
 )
 """Ways of fitting that are compared."""
-
-FIGURES: dict[str, tuple[str, ...]] = {
-    "stiffness": ("calibrations",),
-    "errors": ("simulations",),
-    "agreement": ("agreement", "simulations", "success"),
-    "joint_pose": ("poses",),
-    "pose_against_stiffness": ("variance_shares", "importance"),
-    "landmark_precision": ("landmark_precision", "required_precision"),
-    "bootstrap": ("bootstrap",),
-    "success_by_method": ("success_by_method", "method_fits"),
-}
-"""Figures and the tables each is drawn from."""
 
 _JOBS = {
     "calibrations": "calibrations",
@@ -82,6 +77,58 @@ class Layout(StudyFiles):
         Whether its cohort was rebuilt from the paper that results are compared with.
     """
 
+    joined = OF_JOBS
+    drawings = (
+        Figure(
+            "stiffness",
+            "Calibrated stiffness",
+            "figures.stiffness:stiffness_figure",
+            ("calibrations",),
+        ),
+        Figure(
+            "errors",
+            "Errors of predicted motion",
+            "figures.errors:errors_figure",
+            ("simulations",),
+        ),
+        Figure(
+            "agreement",
+            "Agreement with measured motion",
+            "figures.agreement:agreement_figure",
+            ("agreement", "simulations", "success"),
+        ),
+        Figure(
+            "joint_pose",
+            "Joint frames from uncertain landmarks",
+            "figures.joint_pose:joint_pose_figure",
+            ("poses",),
+        ),
+        Figure(
+            "pose_against_stiffness",
+            "Joint pose against stiffness",
+            "figures.pose_against_stiffness:pose_against_stiffness_figure",
+            ("variance_shares", "importance"),
+        ),
+        Figure(
+            "landmark_precision",
+            "Landmark precision needed",
+            "figures.landmark_precision:landmark_precision_figure",
+            ("landmark_precision", "required_precision"),
+        ),
+        Figure(
+            "bootstrap",
+            "Start values, damping and loading",
+            "figures.bootstrap:bootstrap_figure",
+            ("bootstrap",),
+        ),
+        Figure(
+            "success_by_method",
+            "Success by method",
+            "figures.success:success_figure",
+            ("success_by_method", "method_fits"),
+        ),
+    )
+
     study: JointPoseSensitivity
     rebuilt: bool
 
@@ -119,11 +166,6 @@ class Layout(StudyFiles):
             ("against_gould_2024a",): int(self.rebuilt),
         }
         return (*ALWAYS, *(name for names, count in parts.items() if count for name in names))
-
-    @property
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures and the tables each is drawn from."""
-        return FIGURES
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -200,3 +242,127 @@ class Layout(StudyFiles):
             case "precision_errors":
                 return f"sd_mm={self.study.landmark_precision.sd_mm[number]:.15g}"
         raise ValueError(f"{table} is not made of job files")
+
+
+def _set_simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """A set of the ranking, where a pose is simulated with one."""
+    if place["stiffness"] == "calibrated":
+        return []
+    best = Path(expected.root, expected.files.folder, "best.json")
+    chosen = place["specimen"], place["stiffness"]
+    return [ranked_set(str(best), *chosen) if best.is_file() else ""]
+
+
+_SOLVING = ("loading", "settle_time_s")
+_GROUPING = ("best_models", "block")
+_MODEL = ("tests", "load_point_shift_mm", "stiffness", "damping", "calibration")
+_BOOTSTRAPS = ("start_bootstrap", "damping_bootstrap", "dynamic")
+_JUDGING = ("success", "significance")
+_PARTS = ("methods", "landmark_precision", *_BOOTSTRAPS, *_JUDGING)
+"""Settings by what they decide; the last were added to the sampled poses, whose fits and
+simulations do not hang on them."""
+
+_NOT_JUDGED = tuple(name for name in _PARTS if name != "success")
+_NOT_PRECISE = tuple(name for name in _PARTS if name != "landmark_precision")
+
+_SAMPLED = (
+    Job(
+        "start_model",
+        ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
+        specimens="none",
+    ),
+    Job(
+        "sample_landmarks",
+        "poses:sample",
+        ignores=ignoring(*_MODEL, *_SOLVING, *_GROUPING, *_PARTS),
+    ),
+    Job(
+        "build_models",
+        "poses:build",
+        ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
+    ),
+    Job("calibrate", many=True, ignores=ignoring("poses", *_SOLVING, *_GROUPING, *_PARTS)),
+    Job("rank", ignores=ignoring("block", *_NOT_JUDGED)),
+    Job(
+        "simulate",
+        many=True,
+        ignores=ignoring("poses", "calibration", "stiffness", *_GROUPING, *_PARTS),
+        also=_set_simulated,
+    ),
+)
+_ADDED = (
+    Job(
+        "bootstrap",
+        many=True,
+        ignores=ignoring(
+            *("poses", "landmark_sd_mm", "loading", "methods", "landmark_precision"),
+            *(*_GROUPING, *_JUDGING),
+            start_bootstrap={"loadings"},
+            damping_bootstrap={"loadings"},
+        ),
+    ),
+    Job(
+        "landmark_errors",
+        ignores=ignoring(
+            *("poses", "landmark_sd_mm", "damping", "methods", *_SOLVING, *_GROUPING),
+            *(*_BOOTSTRAPS, *_JUDGING),
+            landmark_precision={"sd_mm", "translation_limit_mm", "rotation_limit_deg", "share"},
+        ),
+    ),
+    Job(
+        "fit_by_method",
+        ignores=ignoring(
+            *("poses", "loading", "landmark_precision", "significance"),
+            *(*_GROUPING, *_BOOTSTRAPS),
+            methods={"poses"},
+            success={"failed_when", "outlier_times_start"},
+        ),
+    ),
+)
+
+
+def _analysis(name: str, at: str, reads: tuple[str, ...], writes: tuple[str, ...] = ()) -> Job:
+    """A job that makes tables of tables; by default the one of its own name."""
+    return Job(name, at, reads, writes or (name,), ignoring("block", *_NOT_JUDGED))
+
+
+_FITTED = ("calibrations", "simulations", "poses", "success")
+_ANALYSES = (
+    _analysis("success", "success:success", ("calibrations",)),
+    _analysis("counts", "success:counts", ("success", "bootstrap")),
+    _analysis("summary", "summary", (*_FITTED, "bootstrap", "best.json")),
+    _analysis("statistics", "significance", (*_FITTED, "best.json")),
+    _analysis("agreement", "errors", ("simulations", "success")),
+    _analysis(
+        "two_factor",
+        "two_factor",
+        ("simulations", "poses", "success", "best.json"),
+        ("variance_shares", "importance"),
+    ),
+    _analysis("success_by_method", "success:success_by_method", ("method_fits",)),
+    Job(
+        "landmark_precision",
+        "landmark_precision",
+        ("precision_errors",),
+        ("landmark_precision", "required_precision"),
+        ignoring("block", *_NOT_PRECISE),
+    ),
+    Job(
+        "against_gould_2024a",
+        "gould_2024a.against",
+        COMPARED,
+        ("against_gould_2024a",),
+        ignoring("block"),
+    ),
+)
+
+KIND = Kind(
+    settings=JointPoseSensitivity,
+    files=Layout,
+    checks=(check_joint_pose_sensitivity,),
+    tables=(*TABLES, *TABLES_OF_FITS),
+    jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
+    ignored_by_figures=("block",),
+    makes_models="start_model",
+    exports="export:model_of",
+)

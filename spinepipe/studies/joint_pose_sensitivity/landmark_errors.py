@@ -12,10 +12,10 @@ from spinepipe.designs import sample_landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import specimen_inputs, study_and_cohort
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import PRECISION_ERRORS

@@ -14,13 +14,13 @@ from statsmodels.stats.proportion import proportion_confint
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import LandmarkPrecision
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
     LANDMARK_PRECISION,
     REQUIRED_PRECISION,
 )
-from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.tables import from_rows, read_frames, write
 
 CONFIDENCE = (2.5, 97.5)
 
@@ -98,13 +98,15 @@ BOOTSTRAPS = 1000
 COLUMNS = {"translation": "translation_error_mm", "rotation": "rotation_error_deg"}
 
 
-def run(root: str, study: str, errors: str, precision: str, required: str) -> None:
-    """Write ``landmark_precision.parquet`` and ``required_precision.parquet``."""
+def run(
+    root: str, study: str, tables: list[str], landmark_precision: str, required_precision: str
+) -> None:
+    """Write both tables from ``precision_errors``."""
     settings, cohort = study_and_cohort(root, study)
     asked = settings.landmark_precision
     spread: list[dict[str, Any]] = []
     needed: list[dict[str, Any]] = []
-    for (specimen, stiffness), rows in read_frame(errors).groupby(
+    for (specimen, stiffness), rows in read_frames(tables)["precision_errors"].groupby(
         ["specimen", "stiffness"], sort=False
     ):
         key = {"specimen": specimen, "stiffness": stiffness}
@@ -113,8 +115,8 @@ def run(root: str, study: str, errors: str, precision: str, required: str) -> No
         seed = specimen_seed(settings.seed, f"required/{specimen}/{stiffness}")
         needed += [{**key, **row} for row in _required(asked, found, seed)]
     origin = provenance("landmark_precision", settings, cohort)
-    write(from_rows(LANDMARK_PRECISION, spread), precision, origin)
-    write(from_rows(REQUIRED_PRECISION, needed), required, origin)
+    write(from_rows(LANDMARK_PRECISION, spread), landmark_precision, origin)
+    write(from_rows(REQUIRED_PRECISION, needed), required_precision, origin)
 
 
 def measured_errors(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -9,11 +9,12 @@ Which tables the page shows, and in what order.
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Picture, Results, Sortable, left_out, sortable
+from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
 from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
@@ -22,8 +23,9 @@ from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness imp
 )
 from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE
+from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
 from spinepipe.tables.schema import Column
 from spinepipe.tables.shared import STATISTICS, against_as_shown
 
@@ -32,14 +34,12 @@ SIMULATED = ("errors", "agreement")
 """Figures of simulated motion."""
 
 
-def caption(
-    name: str, text: str, study: JointPoseSensitivity, cohort: Cohort, results: Results
-) -> str:
+def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
     """A figure's caption for this study and cohort."""
     false = tuple(_false(cohort, results))
-    sentences = _SENTENCE_END.split(" ".join(text.split()))
+    sentences = _SENTENCE_END.split(picture.caption)
     kept = [sentence for sentence in sentences if not sentence.startswith(false)]
-    if name in SIMULATED and settling(study):
+    if picture.name in SIMULATED and settling(study):
         kept.append(settling(study))
     return " ".join(kept)
 
@@ -148,6 +148,9 @@ _IMPORTANCE = (
 AGAINST_COLUMNS = against_as_shown(AGAINST_GOULD_2024A)
 
 
+_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS)}
+
+
 def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
     """Tables that the study has, as the page shows them; those without rows are left out."""
     found = [
@@ -162,7 +165,7 @@ def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable
 def _of(
     name: str, title: str, frame: pd.DataFrame, study: JointPoseSensitivity
 ) -> Iterator[Sortable]:
-    about = TABLES[name].about
+    about = _SHAPES[name].about
     if name == "statistics":
         yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
         yield _folded(frame, study.significance)
@@ -171,7 +174,7 @@ def _of(
     elif name == AGAINST_GOULD_2024A.name:
         yield sortable(name, title, about, frame, AGAINST_COLUMNS)
     else:
-        yield sortable(name, title, about, frame, TABLES[name].columns)
+        yield sortable(name, title, about, frame, _SHAPES[name].columns)
 
 
 def _trees(importance: pd.DataFrame) -> pd.DataFrame:
@@ -195,35 +198,34 @@ QUESTION = (
     "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
     "where its landmarks were palpated?"
 )
-TITLES = {
-    "stiffness": "Calibrated stiffness",
-    "errors": "Errors of predicted motion",
-    "joint_pose": "Joint frames from uncertain landmarks",
-    "bootstrap": "Start values, damping and loading",
-    "success_by_method": "Success by method",
-    "agreement": "Agreement with measured motion",
-    "pose_against_stiffness": "Joint pose against stiffness",
-    "landmark_precision": "Landmark precision needed",
-}
 READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def study_page(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
-    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
-    whole = Document(
+def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    return Document(
         question=QUESTION,
         findings=findings(study, results),
-        pictures=[_picture(name, study, cohort, results) for name in results.pictures],
+        pictures=[
+            replace(picture, caption=caption(picture, study, cohort, results))
+            for picture in results.pictures.values()
+        ],
         tables=shown_tables(study, results),
         metadata=results.metadata,
         left_out=left_out(study),
         poses=results.table("poses"),
+        tests=study.tests,
+        load_shift_mm=study.load_point_shift_mm.in_order(),
     )
-    return whole.html(study, cohort)
 
 
-def _picture(name: str, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Picture:
-    """A figure with its caption as it holds for this study."""
-    words = caption(name, results.captions[name], study, cohort, results)
-    return Picture.of(name, TITLES.get(name, name.replace("_", " ")), results.pictures[name], words)
+def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
+    """Optional parts that the settings leave out, each with the setting that does."""
+    parts = (
+        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
+        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
+        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
+        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+    )
+    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)

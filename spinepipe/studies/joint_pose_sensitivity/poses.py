@@ -16,8 +16,8 @@ from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.designs import sample_landmarks
 from spinepipe.frames import zxy_angles
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import LANDMARKS, POSES
 from spinepipe.tables import read_frame, to_arrow, write

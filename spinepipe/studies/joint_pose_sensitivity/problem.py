@@ -8,13 +8,13 @@ from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort.specimen import in_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.jobs.inputs import (
+from spinepipe.statics import free_parameters
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     specimen_inputs,
     start_stiffness,
     study_and_cohort,
 )
-from spinepipe.statics import free_parameters
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import BORDER_PER_SI, COORDINATES, STIFFNESS_COLUMNS
 

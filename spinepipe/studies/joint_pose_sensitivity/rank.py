@@ -7,8 +7,8 @@ import pandas as pd
 
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import digest_of
-from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.marks import with_mark
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS

@@ -9,7 +9,6 @@ import pandas as pd
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import (
     chi_squared_normality,
@@ -25,7 +24,9 @@ from spinepipe.studies.joint_pose_sensitivity.errors import (
     measured_coordinates,
     readings,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.tables.shared import STATISTICS

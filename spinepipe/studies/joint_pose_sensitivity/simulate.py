@@ -10,17 +10,17 @@ import numpy as np
 from spinepipe.cohort.specimen import MeasuredMotion, in_frames
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import (
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.statics import Program, System, follow, settle
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
     SpecimenInputs,
     bushing_model,
-    ranked_set,
     sampled_poses,
     specimen_inputs,
     study_and_cohort,
 )
-from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.statics import Program, System, follow, settle
-from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
 from spinepipe.tables import read_frame, to_arrow, write

@@ -1,8 +1,8 @@
 """Job: the model file that every calibration of a study starts from."""
 
 from spinepipe.jobs.digest import digest_of
-from spinepipe.jobs.inputs import start_stiffness, study_and_cohort
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
+from spinepipe.studies.joint_pose_sensitivity.inputs import start_stiffness, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import STIFFNESS_COLUMNS
 

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import start_stiffness, study_and_cohort
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import start_stiffness, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
     COUNTS,
     SUCCESS,
     SUCCESS_BY_METHOD,
 )
-from spinepipe.tables import from_rows, read_frame, read_frames, write
+from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 Array = NDArray[np.float64]
@@ -50,10 +50,10 @@ def above_start(values: Array, start: Array, times: float) -> Flags:
     return values >= times * start
 
 
-def success(root: str, study: str, calibrations: str, output: str) -> None:
-    """Write ``success.parquet``."""
+def success(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``success.parquet`` from ``calibrations``."""
     settings, cohort = study_and_cohort(root, study)
-    judged = judge_poses(settings, read_frame(calibrations))
+    judged = judge_poses(settings, read_frames(tables)["calibrations"])
     table = from_rows(SUCCESS, judged.to_dict("records"))
     write(table, output, provenance("success", settings, cohort))
 
@@ -125,10 +125,10 @@ NOTHING = 1e-6
 """Cost (mm2, deg2) below which all fits are exact, and count as equal."""
 
 
-def success_by_method(root: str, study: str, fits: str, output: str) -> None:
-    """Write ``success_by_method.parquet``."""
+def success_by_method(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``success_by_method.parquet`` from ``method_fits``."""
     settings, cohort = study_and_cohort(root, study)
-    rows = count_by_method(read_frame(fits), settings.success.failed_when)
+    rows = count_by_method(read_frames(tables)["method_fits"], settings.success.failed_when)
     table = from_rows(SUCCESS_BY_METHOD, rows)
     write(table, output, provenance("success_by_method", settings, cohort))
 

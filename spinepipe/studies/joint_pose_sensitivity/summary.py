@@ -9,13 +9,14 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.errors import (
     UNITS,
     absolute_error,
     measured_size,
     readings,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.success import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import SUMMARY

@@ -11,7 +11,7 @@ from spinepipe.tables.schema import (
     status,
     stiffness_unit,
 )
-from spinepipe.tables.shared import against_paper
+from spinepipe.tables.shared import STATISTICS, against_paper
 from spinepipe.units import COORDINATES
 
 NO_FIT = "no stiffness was found"
@@ -373,3 +373,9 @@ REQUIRED_PRECISION = Table(
 )
 
 AGAINST_GOULD_2024A = against_paper("against_gould_2024a")
+
+TABLES = (
+    *(BOOTSTRAP, SUCCESS, COUNTS, SUMMARY, METHOD_FITS, SUCCESS_BY_METHOD, PRECISION_ERRORS),
+    *(LANDMARK_PRECISION, REQUIRED_PRECISION, STATISTICS, AGAINST_GOULD_2024A),
+)
+"""Of fits, and what is made of them."""

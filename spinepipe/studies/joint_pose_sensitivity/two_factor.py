@@ -10,7 +10,6 @@ import pandas as pd
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import ranking, study_and_cohort
 from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
 from spinepipe.studies.joint_pose_sensitivity.errors import (
     absolute_error,
@@ -18,14 +17,18 @@ from spinepipe.studies.joint_pose_sensitivity.errors import (
     measured_coordinates,
     readings,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.poses import pose_parameters
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, VARIANCE_SHARES
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES
 
 
-def run(root: str, study: str, tables: list[str], best: str, shares: str, importance: str) -> None:
+def run(
+    root: str, study: str, tables: list[str], best: str, variance_shares: str, importance: str
+) -> None:
     """Write ``variance_shares.parquet`` and ``importance.parquet``."""
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
@@ -48,7 +51,7 @@ def run(root: str, study: str, tables: list[str], best: str, shares: str, import
             tree = Grown(settings, cohort.joint_names, parameters, sets, seed)
             grown += [{**key, **row} for row in tree.rows(grid)]
     origin = provenance("two_factor", settings, cohort)
-    write(from_rows(VARIANCE_SHARES, divided), shares, origin)
+    write(from_rows(VARIANCE_SHARES, divided), variance_shares, origin)
     write(from_rows(IMPORTANCE, grown), importance, origin)
 
 

@@ -129,11 +129,11 @@ _QUANTILES = {
 }
 
 
-def summary(root: str, study: str, range_of_motion: str, output: str) -> None:
+def summary(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``rom_summary.parquet``."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
-    grid = read_grid(range_of_motion, settings, cohort)
-    made_by = provenance("range_of_motion.summary", settings, cohort)
+    grid = read_grid(tables[0], settings, cohort)
+    made_by = provenance("rom_summary", settings, cohort)
     write(from_rows(ROM_SUMMARY, list(summary_rows(grid))), output, made_by)
 
 
@@ -188,11 +188,11 @@ _OURS = {"row": "pose", "column": "stiffness", "draw": "pose", "treatment": "sti
 _GENERAL = re.compile(rf"\b({'|'.join(_OURS)})\b")
 
 
-def variance(root: str, study: str, range_of_motion: str, output: str) -> None:
+def variance(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``rom_variance.parquet``."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
-    grid = read_grid(range_of_motion, settings, cohort)
-    made_by = provenance("range_of_motion.variance", settings, cohort)
+    grid = read_grid(tables[0], settings, cohort)
+    made_by = provenance("rom_variance", settings, cohort)
     write(from_rows(ROM_VARIANCE, list(variance_rows(grid))), output, made_by)
 
 

@@ -13,8 +13,9 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, zxy_angles
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import stiffness_of_joints, study_of_kind
+from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
+from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import FRAMES, STIFFNESS_SETS
 from spinepipe.tables import to_arrow, write
@@ -33,7 +34,7 @@ def draw_stiffness(root: str, study: str, output: str) -> None:
         "joint": list(joints) * len(factors),
         **dict(zip(STIFFNESS_COLUMNS, values.T.tolist(), strict=True)),
     }
-    made_by = provenance("range_of_motion.draw_stiffness", settings, cohort, ())
+    made_by = provenance("draw_stiffness", settings, cohort, ())
     write(to_arrow(STIFFNESS_SETS, columns), output, made_by)
 
 
@@ -42,7 +43,7 @@ def sample_frames(root: str, study: str, specimen: str, output: str) -> None:
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     frame = _sampled(settings, cohort, specimen)
     columns = {column.name: frame[column.name].to_list() for column in FRAMES.columns}
-    made_by = provenance("range_of_motion.sample_frames", settings, cohort, [specimen])
+    made_by = provenance("sample_frames", settings, cohort, [specimen])
     write(to_arrow(FRAMES, columns), output, made_by)
 
 

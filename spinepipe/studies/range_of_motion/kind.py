@@ -1,11 +1,18 @@
-"""Which files the results of a range-of-motion study consist of."""
+"""The kind range_of_motion: how far spines of known geometry move in tests that nobody did."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
-from spinepipe.studies.range_of_motion.settings import RangeOfMotion
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion, check_range_of_motion
+from spinepipe.studies.range_of_motion.tables import (
+    FRAMES,
+    RANGE_OF_MOTION,
+    ROM_SUMMARY,
+    ROM_VARIANCE,
+    STIFFNESS_SETS,
+)
+from spinepipe.studies.study_files import Figure, StudyFiles
 
 _JOBS = ("range_of_motion",)
 """Tables joined from job files, one for each specimen, pose and stiffness set."""
@@ -18,18 +25,25 @@ OF_JOBS = (*_JOBS, *BY_SPECIMEN)
 
 TABLES = ("frames", "stiffness_sets", *_JOBS, "rom_summary", "rom_variance")
 
-ROM_FIGURES: dict[str, tuple[str, ...]] = {
-    "range_of_motion": ("rom_summary",),
-    "rom_variance": ("rom_variance",),
-}
-"""Figures and the tables each is drawn from."""
-
 _MOST_FILES_PER_BLOCK = 300
 
 
 @dataclass(frozen=True)
 class RangeOfMotionFiles(StudyFiles):
     """The result files of one range-of-motion study."""
+
+    joined = OF_JOBS
+    drawings = (
+        Figure(
+            "range_of_motion", "Range of motion", "figures.motion:levels_figure", ("rom_summary",)
+        ),
+        Figure(
+            "rom_variance",
+            "What motion hangs on",
+            "figures.motion:variance_figure",
+            ("rom_variance",),
+        ),
+    )
 
     study: RangeOfMotion
 
@@ -44,11 +58,6 @@ class RangeOfMotionFiles(StudyFiles):
         return TABLES
 
     @property
-    def drawn_from(self) -> Mapping[str, tuple[str, ...]]:
-        """Figures and the tables each is drawn from."""
-        return ROM_FIGURES
-
-    @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The table that is made of job files."""
         return _JOBS
@@ -60,7 +69,7 @@ class RangeOfMotionFiles(StudyFiles):
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        return "range_of_motion." + ("sample_frames" if table in BY_SPECIMEN else "simulate")
+        return "sample_frames" if table in BY_SPECIMEN else "simulate"
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""
@@ -82,3 +91,28 @@ class RangeOfMotionFiles(StudyFiles):
         pose, stiffness = divmod(number, self.study.stiffness_sets)
         place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
         return f"{self.folder}/jobs/{place}.parquet"
+
+
+_MOVING = ("virtual_tests", "tests", "rows", "damping")
+_SETS = ("stiffness", "level_stiffness", "stiffness_sets", "stiffness_spread")
+_FRAMES = ("poses", "pose_sd")
+"""Settings by what they decide: the tests, the stiffness sets, the joint frames."""
+
+KIND = Kind(
+    settings=RangeOfMotion,
+    files=RangeOfMotionFiles,
+    checks=(check_range_of_motion,),
+    tables=(FRAMES, STIFFNESS_SETS, RANGE_OF_MOTION, ROM_SUMMARY, ROM_VARIANCE),
+    jobs=(
+        Job("sample_frames", at="draw:sample_frames", ignores=ignoring(*_MOVING, *_SETS)),
+        Job(
+            "draw_stiffness",
+            at="draw:draw_stiffness",
+            ignores=ignoring(*_MOVING, *_FRAMES),
+            specimens="none",
+        ),
+        Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES)),
+        Job("rom_summary", "analyse:summary", ("range_of_motion",), ("rom_summary",)),
+        Job("rom_variance", "analyse:variance", ("range_of_motion",), ("rom_variance",)),
+    ),
+)

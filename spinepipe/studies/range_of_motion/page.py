@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.report.page.document import Document, Results, Sortable, sortable
 from spinepipe.report.words import count, fixed, percent
-from spinepipe.studies.range_of_motion.figures import EVERY
+from spinepipe.studies.range_of_motion.figures.motion import EVERY
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import ROM_SUMMARY, ROM_VARIANCE, STIFFNESS_SETS
 from spinepipe.tables import Table
@@ -103,7 +103,6 @@ QUESTION = (
     "How far do the joints of these spines move in tests, and does that hang on the spine, on "
     "where its joint frames are, or on the stiffness?"
 )
-TITLES = {"range_of_motion": "Range of motion", "rom_variance": "What motion hangs on"}
 READ = ("rom_summary", "rom_variance", "stiffness_sets", "frames")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
@@ -111,23 +110,19 @@ OWN_POSE = 0
 """The pose with the cohort's own joint frames."""
 
 
-def range_of_motion_page(study: RangeOfMotion, cohort: Cohort, results: Results) -> str:
-    """The report as one HTML document that fetches nothing; the same results, the same bytes."""
+def document(study: RangeOfMotion, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
     frames = results.table("frames")
-    whole = Document(
+    return Document(
         question=QUESTION,
         findings=findings(study, cohort, results),
-        pictures=[
-            Picture.of(name, TITLES[name], svg, " ".join(results.captions[name].split()))
-            for name, svg in results.pictures.items()
-        ],
+        pictures=list(results.pictures.values()),
         tables=[table for table in _tables(cohort, results) if table.rows],
         metadata=results.metadata,
         left_out=left_out(study),
         poses=frames[frames["pose"] > OWN_POSE] if len(frames) else frames,
         with_loads=study.virtual_tests is None,
     )
-    return whole.html(study, cohort)
 
 
 def left_out(study: RangeOfMotion) -> tuple[str, ...]:

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
+from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import Stamp, on_bushings, stamp, study_of_kind
+from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
 from spinepipe.statics import System, follow
 from spinepipe.status import Status
@@ -117,7 +119,7 @@ def run(
         ]
     columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
     columns["stiffness"] = [int(stiffness)] * len(columns["test"])
-    made_by = provenance("range_of_motion.simulate", settings, cohort, [specimen])
+    made_by = provenance("simulate", settings, cohort, [specimen])
     write(to_arrow(TABLE, columns), output, made_by)
 
 

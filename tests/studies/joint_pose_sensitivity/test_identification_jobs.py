@@ -12,7 +12,7 @@ from scipy import stats
 from study_cases import START, STUDY, Size, project, results
 
 from spinepipe.designs import sample_log_uniform
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity import (
     bootstrap,
     landmark_errors,

@@ -16,7 +16,7 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.report.page.document import Results, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of

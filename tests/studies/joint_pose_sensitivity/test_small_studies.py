@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.report.page.document import Results
 from spinepipe.report.page.scene import scenes
 from spinepipe.report.panels import across_of, log_ticks

@@ -17,7 +17,7 @@ from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.range_of_motion import draw as sample_frames
 from spinepipe.studies.range_of_motion.analyse import read_grid, summary_rows, variance_rows
-from spinepipe.studies.range_of_motion.figures import levels_figure, variance_figure
+from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
 from spinepipe.studies.range_of_motion.page import findings, range_of_motion_page
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.read import check

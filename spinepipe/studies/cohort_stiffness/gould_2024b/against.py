@@ -50,5 +50,5 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_gould_2024b.parquet``; what needs an absent table is told as not computed."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     rows = judged(CLAIMS, Run(read_frames(tables)))
-    origin = provenance("cohort_stiffness.against_gould_2024b", settings, cohort)
+    origin = provenance("against_gould_2024b", settings, cohort)
     write(from_rows(AGAINST_GOULD_2024B, rows), output, origin)

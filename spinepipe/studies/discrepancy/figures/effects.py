@@ -20,8 +20,10 @@ from spinepipe.report.panels import explain_marks, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, blank, note, saying
 from spinepipe.report.words import fixed, number, plain, short, tick
 from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell, name_cells
+from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
-from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
+from spinepipe.tables import Tables
 
 _SQUARE_MM, _BESIDE_MM, _SCALE_MM = 5.4, 34.0, 24.0
 _MOST_WITH_NUMBERS = 22
@@ -35,10 +37,9 @@ WORDS = (
 HEADINGS = ("Share of one effect's gap that another explains", "Smallest gap named")
 
 
-def effect_confusions_figure(
-    cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
+def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
     """Effects against effects, and beside them the smallest gap at which each is seen."""
+    verdict = read_verdict(tables.files["verdict"])
     confusions, candidates = tables["confusions"], tables["candidates"]
     hidden = _hidden(candidates, verdict)
     names = list(dict.fromkeys([*confusions["effect"], *confusions["other"]]))
@@ -121,10 +122,9 @@ _LINEAR_TO = 10.0
 """Log evidence up to which the axis is linear, beyond it is logarithmic."""
 
 
-def effect_evidence_figure(
-    cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
+def effect_evidence_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
     """A panel for each round: the best form of each effect, screened and refitted."""
+    verdict = read_verdict(tables.files["verdict"])
     rounds = looks(tables["candidates"])[:MOST_ROUNDS]
     if not rounds:
         return saying("No evidence can be shown: no effect was tried.")

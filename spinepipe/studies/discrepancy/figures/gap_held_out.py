@@ -1,7 +1,5 @@
 """Figure: residuals of motion that no fit has seen, fold by fold."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -14,7 +12,8 @@ from spinepipe.report.marks import finite
 from spinepipe.report.panels import explain_marks, head, log_ticks
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import plain, short
-from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.tables import Tables
 
 KINDS = {"specimen": "One specimen left out", "test": "One test left out"}
 MODELS = {
@@ -29,9 +28,7 @@ _WIDE = 8.0
 """Residuals that differ by more than this factor are drawn on a logarithmic axis."""
 
 
-def gap_held_out_figure(
-    cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
+def gap_held_out_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
     """A panel for left-out specimens and one for left-out tests; a row for each fold."""
     rows = tables["held_out"]
     kinds = [kind for kind in KINDS if (rows["kind"] == kind).any()]

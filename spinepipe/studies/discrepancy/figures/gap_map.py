@@ -5,7 +5,7 @@ Figure: measured less modelled motion along the load steps, where they disagree 
 Grids of numbers as colours, with the number in each cell where there is room.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,8 @@ from spinepipe.report.style import (
     saying,
 )
 from spinepipe.report.words import AXIS, capital, count, fixed, number, plain, short, unit
-from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.tables import Tables
 from spinepipe.units import COORDINATES
 
 MOST_PLACES, FEWEST_PLACES = 6, 3
@@ -55,9 +56,7 @@ _PANEL_MM, _STEPS_KEY_MM = 50.0, 17.0
 _BAND_SD = 1.96
 
 
-def gap_by_step_figure(
-    cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
+def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
     """A panel for each of the places where the base model is farthest off."""
     gap = tables["gap"]
     places = worst_places(gap)
@@ -242,7 +241,7 @@ _LEAST_SCALE = 2.0
 """The scale reaches at least so many noise SD: noise must not look like physics."""
 
 
-def gap_map_figure(cohort: Cohort, verdict: Verdict, tables: Mapping[str, pd.DataFrame]) -> Figure:
+def gap_map_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
     """For each test the base model on the left, the model with the named effects on the right."""
     where = tables["where"]
     rows = where[where["by"] == "joint x coordinate x test"]

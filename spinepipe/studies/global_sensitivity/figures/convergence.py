@@ -28,7 +28,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     unit_of,
     with_results,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
 
 MOST_PANELS = 9
 _LOOKS = (
@@ -46,8 +46,11 @@ _ROOM_FOR_KEY = 0.55
 Looks = Mapping[str, Mapping[str, Any]]
 
 
-def convergence_figure(cohort: Cohort, convergence: pd.DataFrame, indices: pd.DataFrame) -> Figure:
+def convergence_figure(
+    study: GlobalSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
     """The main index of each panel's leading factors against the runs, from ``convergence``."""
+    convergence, indices = tables["convergence"], tables["indices"]
     measures = measures_of(indices)
     found = outputs(cohort, indices, measures) if measures else []
     if not found or measures is None:

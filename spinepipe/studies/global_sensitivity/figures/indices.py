@@ -35,7 +35,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     told,
     unit_of,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
 
 MOST, FEWEST = 24, 6
 SMALL = 0.01
@@ -91,8 +91,11 @@ _DOT_FROM = 0.005
 """Part of the largest index below which a dot would only blur the line at 0."""
 
 
-def indices_figure(cohort: Cohort, indices: pd.DataFrame) -> Figure:
+def indices_figure(
+    study: GlobalSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
     """A panel for each output, a row for each factor, a bar for each index, from ``indices``."""
+    indices = tables["indices"]
     measures = measures_of(indices)
     found = outputs(cohort, indices, measures) if measures else []
     if not found or measures is None:

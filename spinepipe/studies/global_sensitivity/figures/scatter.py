@@ -32,7 +32,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     what,
     where,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 TOP = 3
@@ -139,9 +139,10 @@ _UNITS = {"deg": "°", "1": "times"}
 
 
 def scatter_figure(
-    cohort: Cohort, responses: pd.DataFrame, design: pd.DataFrame, indices: pd.DataFrame
+    study: GlobalSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """A line of panels for each output: all runs over the values of its three leading factors."""
+    responses, design, indices = tables["responses"], tables["design"], tables["indices"]
     measures = measures_of(indices)
     found = outputs(cohort, indices, measures) if measures else []
     if not found or measures is None:

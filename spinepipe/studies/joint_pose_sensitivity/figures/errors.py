@@ -1,6 +1,6 @@
 """Figure: predicted less measured motion, with each pose's own stiffness and with the best sets."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,13 +34,14 @@ class _Set:
 
 
 def errors_figure(
-    cohort: Cohort, simulations: pd.DataFrame, study: JointPoseSensitivity | None = None
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """Errors per measured coordinate and joint, and the share of runs without equilibrium.
 
     Where motion is zeroed at step 0, the zeros of that step are no readings. The study tells
     whether motion was simulated at rest.
     """
+    simulations = tables["simulations"]
     measured = [
         name
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
@@ -137,12 +138,12 @@ def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> dict[str, str
     }
 
 
-def _words(runs: pd.DataFrame, rows: Rows, study: JointPoseSensitivity | None) -> str:
+def _words(runs: pd.DataFrame, rows: Rows, study: JointPoseSensitivity) -> str:
     own = runs["stiffness"] == OWN
     total = f"{count(int(own.sum()), 'run')} with the own calibration, {int((~own).sum())} with"
     meaning = "Error: predicted less measured, all measured load steps together, median (IQR)"
     parts = (meaning, KEY, rows.note, f"{total} best sets")
-    settled = "" if study is None else settling(study)
+    settled = settling(study)
     return " ".join(["; ".join(part for part in parts if part) + ".", settled]).strip()
 
 

@@ -17,6 +17,7 @@ from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent, unit
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
 _ORIGIN = dict(zip(("x_mm", "y_mm", "z_mm"), TRANSLATIONS, strict=True))
@@ -25,8 +26,11 @@ _NAMES = {**_ORIGIN, **_ANGLES}
 COLUMNS = tuple(_NAMES)
 
 
-def joint_pose_figure(cohort: Cohort, poses: pd.DataFrame) -> Figure:
+def joint_pose_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
     """Origin (three panels) and orientation (three) of every joint, less the nominal ones."""
+    poses = tables["poses"]
     sampled = poses[poses["status"] == Status.CONVERGED.value]
     total = len(poses[["specimen", "pose"]].drop_duplicates())
     if sampled.empty:

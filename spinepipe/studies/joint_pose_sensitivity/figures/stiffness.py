@@ -1,5 +1,6 @@
 """Figure: calibrated stiffness over all sampled joint poses, one panel per free coordinate."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log10
 from typing import Any
@@ -64,9 +65,10 @@ class _Panel:
 
 
 def stiffness_figure(
-    study: JointPoseSensitivity, cohort: Cohort, calibrations: pd.DataFrame
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """Distribution of every fitted stiffness, with start, bounds and the paper's values."""
+    calibrations = tables["calibrations"]
     usable = [status.value for status in Status if status.usable]
     solved = calibrations[calibrations["status"].isin(usable)]
     poses = len(calibrations[["specimen", "pose"]].drop_duplicates())

@@ -7,7 +7,6 @@ import pandas as pd
 
 from spinepipe.comparison.claim import Run, judged
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.best_models import (
     claims_of_best_model,
     claims_of_ten_best,
@@ -36,6 +35,7 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.precision import (
     claims_of_closed_forms,
     claims_of_precision,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
 from spinepipe.tables import from_rows, read_frames, write
 

@@ -6,7 +6,7 @@ Figure: what the motion of every joint hangs on.
 """
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import BAR_PT, KEY, THIN_BAR_PT, draw_bar
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, count
+from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.units import COORDINATES
 
 EVERY = "*"
@@ -63,8 +64,11 @@ _LEVEL_MM, _ROW_MM_OF_MANY = 7.0, 4.6
 _FEW_ROWS = 8
 
 
-def levels_figure(cohort: Cohort, summary: pd.DataFrame) -> Figure:
+def levels_figure(
+    study: RangeOfMotion, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
     """Motion in the loaded coordinate per joint and test, from ``rom_summary``."""
+    summary = tables["rom_summary"]
     loaded = summary[(summary["role"] == "loaded") & (summary["n"] > 0)]
     if loaded.empty:
         return saying("No motion can be shown: no run has an equilibrium.")
@@ -131,11 +135,14 @@ _MARKS: dict[str, tuple[str, str, str]] = {
 """Colour, shape and name of each factor: shapes tell them apart without colours."""
 
 
-def variance_figure(cohort: Cohort, variance: pd.DataFrame) -> Figure:
+def variance_figure(
+    study: RangeOfMotion, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
     """Shares with intervals per joint and test, from ``rom_variance``.
 
     Of several specimens those of the cohort, or of the first where the cohort has none.
     """
+    variance = tables["rom_variance"]
     done = variance[variance["status"] == "done"]
     whole = done[done["specimen"] == EVERY]
     shown = whole if len(whole) else done[done["specimen"] == done["specimen"].min()]

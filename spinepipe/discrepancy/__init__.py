@@ -1,1 +1,0 @@
-"""Discrepancy: where simulation and measurement disagree, and which effect the model lacks."""

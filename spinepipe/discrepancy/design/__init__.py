@@ -1,1 +1,0 @@
-"""What a cohort's tests could tell of each effect, before residuals are looked at."""

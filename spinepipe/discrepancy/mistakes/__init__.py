@@ -1,1 +1,0 @@
-"""Mistakes in the files that no effect should explain."""

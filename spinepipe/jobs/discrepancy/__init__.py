@@ -1,1 +1,0 @@
-"""Jobs of studies of kind discrepancy."""

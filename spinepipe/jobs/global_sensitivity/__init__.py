@@ -1,1 +1,0 @@
-"""Jobs of studies of kind global_sensitivity: the design, responses by the batch, indices."""

@@ -1,1 +1,0 @@
-"""Jobs of studies of kind range_of_motion: frames, stiffness sets, motion and its summaries."""

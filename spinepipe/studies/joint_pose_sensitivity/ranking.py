@@ -1,0 +1,27 @@
+"""The ranking of stiffness sets that `rank` wrote, as other jobs read it."""
+
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from spinepipe.files import Stamp, stamp
+from spinepipe.marks import without_mark
+
+
+@lru_cache(maxsize=4)
+def _ranking(where: Stamp) -> dict[str, list[dict[str, Any]]]:
+    return without_mark(json.loads(Path(where[0]).read_text("utf-8")))
+
+
+def ranking(path: str) -> dict[str, list[dict[str, Any]]]:
+    """Specimen to its best stiffness sets, from ``best.json``."""
+    return _ranking(stamp(path))
+
+
+def ranked_set(path: str, specimen: str, name: str) -> str:
+    """Stiffness (J or 1, 6) of a ranked set as JSON; empty where the specimen has none so named."""
+    for ranked in ranking(path).get(specimen, []):
+        if ranked["name"] == name:
+            return json.dumps(ranked["stiffness"])
+    return ""
