@@ -36,7 +36,7 @@ KRYLOV = {"atol": 1e-15, "btol": 1e-15, "conlim": 0.0}
 """Where `lsmr` stops: where rounding ends its progress."""
 
 KRYLOV_STEPS = 10
-"""Steps of `lsmr` per unknown at most: twice the unknowns do for those of a fit."""
+"""Steps of `lsmr` per unknown at most; without rounding one would do."""
 
 
 class NotFiniteError(ValueError):
@@ -58,7 +58,7 @@ def svd(matrix: ArrayLike) -> tuple[Array, Array, Array]:
     given = _finite(matrix)
     if given.ndim == 2:
         return _svd(given)
-    if given.any(axis=-2).all():
+    if _not_zero(given).all():
         try:
             return _gesdd(given)
         except LinAlgError:  # one matrix stops all of them
@@ -90,17 +90,17 @@ def lstsq(matrix: ArrayLike, targets: ArrayLike) -> tuple[Array, int]:
     """
     given, wanted = _finite(matrix), _finite(targets)
     rcond = max(given.shape) * np.finfo(float).eps
-    there = given.any(axis=0)
+    there = _not_zero(given)
     solution = np.zeros((given.shape[1], *wanted.shape[1:]))
     some = _only(given, there)
     try:
         solution[there], _, rank, _ = np.linalg.lstsq(some, wanted, rcond=rcond)
+        return solution, int(rank)
     except LinAlgError:
         left, sizes, right = _gesvd(some)
         seen = sizes > rcond * sizes.max(initial=0.0)
-        rank = np.count_nonzero(seen)
         solution[there] = (right[seen].T / sizes[seen]) @ (left[:, seen].T @ wanted)
-    return solution, int(rank)
+        return solution, int(np.count_nonzero(seen))
 
 
 def orth(matrix: ArrayLike, rcond: float) -> Array:
@@ -113,7 +113,7 @@ def orth(matrix: ArrayLike, rcond: float) -> Array:
     NotFiniteError : where an entry is not finite.
     """
     given = _finite(matrix)
-    some = _only(given, given.any(axis=0))
+    some = _only(given, _not_zero(given))
     if not some.size:
         return np.zeros((len(given), 0))
     try:
@@ -148,7 +148,7 @@ def pinvh(matrix: ArrayLike, rcond: float) -> Array:
     NotFiniteError : where an entry is not finite.
     """
     given = _finite(matrix)
-    there = given.any(axis=0)
+    there = _not_zero(given)
     some = given if there.all() else given[np.ix_(there, there)]
     try:
         inverse = np.linalg.pinv(some, rcond=rcond, hermitian=True)
@@ -190,7 +190,7 @@ def bounded_least_squares(
 def bounded_lstsq(matrix: ArrayLike, targets: ArrayLike, bounds: tuple[Array, Array]) -> Array:
     """(N,) least squares of a matrix (M, N) of full rank inside bounds (N,), exact on bounds.
 
-    Where `gelsd` gives up, bounds are reached to 1e-9 or so instead.
+    Where `gelsd` gives up, `lsmr` and an interior method do it: near bounds, not on them.
 
     Raises
     ------
@@ -226,6 +226,11 @@ def _finite(matrix: ArrayLike) -> Array:
     return given
 
 
+def _not_zero(matrix: Array) -> NDArray[np.bool_]:
+    """(..., N) whether a column of (..., M, N) holds anything but zeros."""
+    return np.asarray(matrix.any(axis=-2))
+
+
 def _only(matrix: Array, there: NDArray[np.bool_]) -> Array:
     """Columns that are there; the matrix itself where all are."""
     return matrix if there.all() else matrix[:, there]
@@ -243,7 +248,7 @@ def _gesvd(matrix: Array) -> tuple[Array, Array, Array]:
 
 
 def _svd(matrix: Array) -> tuple[Array, Array, Array]:
-    there = matrix.any(axis=0)
+    there = _not_zero(matrix)
     some = _only(matrix, there)
     try:
         found = _gesdd(some)

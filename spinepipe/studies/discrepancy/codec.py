@@ -13,7 +13,7 @@ from enum import Enum
 from functools import cache
 from importlib import import_module
 from io import BytesIO
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -41,8 +41,9 @@ def encoded(value: Any) -> bytes:
     writer = _Writer()
     structure = json.dumps(writer.of(value), ensure_ascii=False, allow_nan=False)
     flat = {name: np.concatenate(parts, dtype=name) for name, parts in writer.parts.items()}
+    flat[STRUCTURE] = np.frombuffer(structure.encode(), dtype=np.uint8)
     buffer = BytesIO()
-    np.savez(buffer, **{STRUCTURE: np.frombuffer(structure.encode(), dtype=np.uint8)}, **flat)
+    np.savez(buffer, allow_pickle=False, **flat)
     return buffer.getvalue()
 
 
@@ -69,7 +70,7 @@ class _Writer:
 
     def of(self, value: Any) -> Any:
         """JSON of the value; of an object seen before, its number."""
-        kind = type(value)
+        kind: Any = type(value)
         if value is None or kind in (bool, int, str):
             return value
         if kind is float:
@@ -84,7 +85,7 @@ class _Writer:
         self._known[id(value)] = len(self._known)
         return written
 
-    def _compound(self, value: Any, kind: type) -> list[Any]:
+    def _compound(self, value: Any, kind: Any) -> list[Any]:
         if kind is np.ndarray:
             return ["array", *self._array(value)]
         if kind in (tuple, list):
@@ -94,15 +95,19 @@ class _Writer:
         if kind is dict:
             return ["dict", *([self.of(key), self.of(one)] for key, one in value.items())]
         if is_dataclass(kind):
-            return ["data", _name(kind), *(self.of(getattr(value, n)) for n in _fields(kind))]
+            return self._data(value, type(value))
         raise TypeError(f"a {kind.__module__}.{kind.__qualname__} cannot be kept as data")
+
+    def _data(self, value: Any, kind: Any) -> list[Any]:
+        name, names = _name(kind), _fields(kind)
+        return ["data", name, *(self.of(getattr(value, one)) for one in names)]
 
     def _array(self, array: np.ndarray) -> tuple[str, list[int], str, int]:
         """Its dtype, shape and order, and where it begins among those of its dtype."""
         if array.dtype.kind not in NUMBERS:
             raise TypeError(f"an array of dtype {array.dtype} cannot be kept as data")
         name = array.dtype.str
-        order = "F" if array.flags.fnc else "C"
+        order: Literal["F", "C"] = "F" if array.flags.fnc else "C"
         start = self._sizes.get(name, 0)
         self._sizes[name] = start + array.size
         self.parts.setdefault(name, []).append(array.ravel(order=order))

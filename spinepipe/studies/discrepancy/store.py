@@ -96,7 +96,8 @@ class _Digests:
         raise TypeError(f"what a {type(value).__qualname__} holds cannot be told")
 
     def _dataclass(self, value: Any) -> bytes:
-        name, names = _declared(type(value))
+        kind: Any = type(value)
+        name, names = _declared(kind)
         return _joined("dataclass", name, *(self.of(getattr(value, one)) for one in names))
 
 
@@ -127,18 +128,19 @@ def _array(array: np.ndarray) -> bytes:
 os.environ.setdefault("NO_ET", "1")  # pydra reports its use over the network unless told not to
 
 
-_WAITING: dict[str, Callable[[], bytes]] = {}
+_WAITING: dict[str, Callable[[], None]] = {}
 
 
-@python.define(outputs=["result"])  # type: ignore[untyped-decorator]
-def Piece(token: str) -> bytes:
-    """The piece of that digest, as it is kept."""
+@python.define(outputs=["done"])  # type: ignore[untyped-decorator]
+def Piece(token: str) -> str:
+    """Runs the piece of that digest; pydra learns, and pickles, nothing but the digest."""
     from spinepipe.studies.discrepancy.store import waiting
 
-    return waiting(token)()
+    waiting(token)()
+    return token
 
 
-def waiting(token: str) -> Callable[[], bytes]:
+def waiting(token: str) -> Callable[[], None]:
     """What a digest stands for, in the process that is about to run it."""
     return _WAITING[token]
 
@@ -185,13 +187,14 @@ class Store:
 
 
 def _computed(token: str, piece: Callable[[], bytes]) -> bytes:
-    """The piece, run by pydra; what pydra writes for it is gone afterwards."""
-    _WAITING[token] = piece
+    """The piece, run by pydra; what pydra writes about it is gone afterwards."""
+    made: list[bytes] = []
+    _WAITING[token] = lambda: made.append(piece())
     try:
         with TemporaryDirectory(prefix="spinepipe-", ignore_cleanup_errors=True) as scratch:
             os.environ["PYDRA_HASH_CACHE"] = str(Path(scratch, "hashes"))  # else in the home
             with Submitter(cache_root=scratch, worker="debug") as submitter:
-                result: bytes = submitter(Piece(token=token)).outputs.result
+                submitter(Piece(token=token))
     finally:
         del _WAITING[token]
-    return result
+    return made[0]
