@@ -192,7 +192,7 @@ def digest_of(
     return value_digest(
         code_digest(f"spinepipe.jobs.{job}"),
         relevant_settings(job, study),
-        _cohort_digest(cohort, specimens),
+        _data_digest(cohort, specimens),
         list(others),
     )
 
@@ -206,14 +206,16 @@ def provenance(
 ) -> dict[str, str]:
     """Metadata of a file written by ``spinepipe.jobs.<job>`` for a study, its mark among it.
 
-    ``config_digest`` covers the settings that the job depends on, ``cohort_digest`` the specimens
-    that it reads, no others. Parameters as in `digest_of`.
+    ``config_digest`` covers the settings that the job depends on, no others; ``specimens_digest``
+    stands for ``cohort_digest`` where not all of the cohort is read. Parameters as in `digest_of`.
     """
+    name = "cohort_digest" if specimens is None else "specimens_digest"
+    data = {name: _data_digest(cohort, specimens)}
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
-        "cohort_digest": _cohort_digest(cohort, specimens),
+        **data,
         "config_digest": value_digest(relevant_settings(job, study)),
         "code_digest": code_digest(f"spinepipe.jobs.{job}"),
         KEY: digest_of(job, study, cohort, specimens, others),
@@ -221,5 +223,5 @@ def provenance(
     }
 
 
-def _cohort_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
+def _data_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
     return cohort.digest if specimens is None else cohort.digest_of(specimens)
