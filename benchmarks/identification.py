@@ -117,9 +117,9 @@ def problems(numbers: Sequence[int] = SAMPLED) -> Iterator[tuple[str, Problem]]:
     """The study's problem in the cohort's own joint poses and in sampled ones."""
     settings, cohort = study_and_cohort(ROOT, STUDY)
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
-        landmarks, poses, model = (f"{folder}/{n}" for n in ("l.parquet", "p.parquet", "m.yaml"))
-        sample_landmarks.sample(ROOT, STUDY, landmarks)
-        build_models.build(ROOT, STUDY, landmarks, poses, model)
+        landmarks, poses = (f"{folder}/{name}.parquet" for name in ("landmarks", "poses"))
+        sample_landmarks.sample(ROOT, STUDY, SPECIMEN, landmarks)
+        build_models.build(ROOT, STUDY, landmarks, SPECIMEN, poses)
         sampled = sampled_poses(poses)
     own = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).nominal
     yield "the cohort's own", calibration_problem(ROOT, settings, SPECIMEN, own)

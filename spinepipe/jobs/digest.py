@@ -197,7 +197,7 @@ def digest_of(
     return value_digest(
         _code(study, job),
         settings_of(study, kind_of(study.kind).job(job).ignores),
-        _cohort_digest(cohort, specimens),
+        _data_digest(cohort, specimens),
         list(others),
     )
 
@@ -228,15 +228,16 @@ def provenance(
 ) -> dict[str, str]:
     """Metadata of a file that a job of the study's kind writes, its mark among it.
 
-    ``config_digest`` covers the settings that the job depends on, ``cohort_digest`` the specimens
-    that it reads, no others. Parameters as in `digest_of`.
+    ``config_digest`` covers the settings that the job depends on, no others; ``specimens_digest``
+    stands for ``cohort_digest`` where not all of the cohort is read. Parameters as in `digest_of`.
     """
     settings = settings_of(study, kind_of(study.kind).job(job).ignores)
+    name = "cohort_digest" if specimens is None else "specimens_digest"
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
-        "cohort_digest": _cohort_digest(cohort, specimens),
+        name: _data_digest(cohort, specimens),
         "config_digest": value_digest(settings),
         "code_digest": _code(study, job),
         KEY: digest_of(job, study, cohort, specimens, others),
@@ -248,5 +249,5 @@ def _code(study: Study, job: str) -> str:
     return code_digest(place_of(study.kind, job).partition(":")[0])
 
 
-def _cohort_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
+def _data_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
     return cohort.digest if specimens is None else cohort.digest_of(specimens)

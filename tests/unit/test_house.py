@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *("units", "problems", "decomposition", "files", "frames", "anatomy"),
+    *("units", "problems", "decomposition", "files", "marks", "frames", "anatomy"),
     *("effects", "model", "world", "statics"),
     *("calibrate", "designs", "statistics", "sensitivity"),
     *("tables", "comparison", "cohort", "studies", "discrepancy", "report", "jobs", "cli"),

@@ -148,9 +148,9 @@ def part(specimen: str, **metadata: str) -> pa.Table:
     return rows.replace_schema_metadata(metadata)
 
 
-def test_joined_tables_keep_order_and_common_metadata(tmp_path: Path) -> None:
-    parts = [part("b", seed="1", code="x", of="b"), part("a", seed="1", code="x", of="a")]
-    join(TABLE, parts, tmp_path / "all.parquet")
+def test_joined_tables_keep_order_and_have_metadata_of_their_own(tmp_path: Path) -> None:
+    parts = [part("b", of="b"), part("a", of="a")]
+    join(TABLE, parts, tmp_path / "all.parquet", {"seed": "1", "code": "x"})
     rows = read(tmp_path / "all.parquet")
     assert rows["specimen"].to_pylist() == ["b"] * 3 + ["a"] * 3
     assert rows.schema.metadata == {b"seed": b"1", b"code": b"x"}
@@ -158,7 +158,7 @@ def test_joined_tables_keep_order_and_common_metadata(tmp_path: Path) -> None:
 
 def test_joining_finds_rows_that_repeat_a_key(tmp_path: Path) -> None:
     with pytest.raises(BadTable, match="3 rows repeat the key"):
-        join(TABLE, [part("a"), part("b"), part("a")], tmp_path / "all.parquet")
+        join(TABLE, [part("a"), part("b"), part("a")], tmp_path / "all.parquet", {})
     assert not list(tmp_path.iterdir())
 
 

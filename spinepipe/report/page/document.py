@@ -13,6 +13,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from spinepipe.cohort import Cohort
+from spinepipe.marks import KEY
 from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
 from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
 from spinepipe.report.style import picture, style
@@ -50,13 +51,17 @@ def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
     return Origin(tuple(_facts(metadata)), digests, settings)
 
 
+_OF_A_TABLE = ("code_digest", "config_digest", "specimens_digest", KEY)
+"""What differs from table to table."""
+
+
 def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
     names = sorted({name for found in metadata.values() for name in found})
     plain = [name for name in names if not name.startswith(_VERSION)]
     versions = [name for name in names if name.startswith(_VERSION)]
     facts = []
     for name in [*plain, *versions]:
-        if name in ("code_digest", "config_digest", "pandas"):
+        if name in _OF_A_TABLE or name == "pandas":
             continue
         values = sorted({found[name] for found in metadata.values() if name in found})
         label = name.removeprefix(_VERSION) if name in versions else name.replace("_", " ")

@@ -17,6 +17,8 @@ from example_effects import CubicStiffening, MarkerError
 from scipy.optimize import brentq
 
 from spinepipe.effects import register, registry
+from spinepipe.jobs.model_mark import base_marks
+from spinepipe.marks import write_marked
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
 from spinepipe.studies import read as studies
@@ -176,21 +178,20 @@ def test_every_file_tells_which_model_it_was_made_with(tmp_path: Path) -> None:
     assert (by_joint(rows)["extension"] > 1.05 * A[:, 0]).all()
 
 
-def of_base(path: str) -> CohortStiffness:
-    return CohortStiffness(
-        study=STUDY, kind="cohort_stiffness", cohort="chains", base={"model": path}
-    )
-
-
-def test_a_given_file_counts_by_its_content_one_that_is_made_by_being_new(tmp_path: Path) -> None:
-    (tmp_path / "model.yaml").write_text(FOR_ALL)
-    before = given_digest(str(tmp_path), of_base("model.yaml"))
-    (tmp_path / "model.yaml").write_text(EACH)
-    assert before != given_digest(str(tmp_path), of_base("model.yaml"))
+def test_a_given_file_counts_by_its_content_one_that_is_made_by_its_mark(tmp_path: Path) -> None:
+    model, root = tmp_path / "model.yaml", str(tmp_path)
+    seen = []
+    for content in (FOR_ALL, EACH):
+        write_marked(content, model, "a" * 64)
+        seen += base_marks(root, "model.yaml")
+    assert len(set(seen)) == 2
+    assert base_marks(root, str(model)) == seen[1:]
     (tmp_path / "config/studies").mkdir(parents=True)
     (tmp_path / "config/studies/other.yaml").touch()
-    assert given_digest(str(tmp_path), of_base("results/other/discrepancy/m.yaml")) == ""
-    assert given_digest(str(tmp_path), of_base("./results/other/discrepancy/m.yaml")) == ""
+    write_marked(EACH, tmp_path / "results/other/discrepancy/m.yaml", "b" * 64)
+    for path in ("results/other/discrepancy/m.yaml", "./results/other/discrepancy/m.yaml"):
+        assert base_marks(root, path) == ["b" * 64]
+    assert base_marks(root, None) == []
 
 
 def complaints(root: Path, model: str, name: str = "model.yaml") -> list[str]:
@@ -273,7 +274,10 @@ def test_a_file_of_bushings_alone_changes_nothing(tmp_path: Path) -> None:
 
 def test_the_report_says_what_was_not_held_out() -> None:
     results = Results({}, {}, {}, {HELD_OUT: "Errors.", "error_map": "Map."})
-    told = _with_base(of_base("m.yaml"), results).captions
+    study = CohortStiffness(
+        study=STUDY, kind="cohort_stiffness", cohort="chains", base={"model": "m.yaml"}
+    )
+    told = _with_base(study, results).captions
     assert told == {HELD_OUT: f"Errors. {NOT_HELD_OUT.format(file='m.yaml')}", "error_map": "Map."}
     plain = CohortStiffness(study=STUDY, kind="cohort_stiffness", cohort="chains")
     assert _with_base(plain, results) is results

@@ -165,8 +165,13 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
     """Not with those of loads.csv, where the tests are virtual; no landmarks, so no vertebrae."""
     study, cohort, found = results(tmp_path, (2, 3, 4))
     (tmp_path / "config/cohorts/stack/loads.csv").write_text(LOADS)
-    sample_frames.sample_frames(str(tmp_path), STUDY, str(tmp_path / "frames.parquet"))
-    tables = {**found.tables, "frames": read_frame(tmp_path / "frames.parquet")}
+    parts = []
+    for specimen in cohort.specimen_names:
+        sample_frames.sample_frames(
+            str(tmp_path), STUDY, specimen, str(tmp_path / "frames.parquet")
+        )
+        parts.append(read_frame(tmp_path / "frames.parquet"))
+    tables = {**found.tables, "frames": pd.concat(parts, ignore_index=True)}
     study = study if virtual else study.model_copy(update={"virtual_tests": None})
     cohort = check(tmp_path, STUDY)[1]
     page = range_of_motion_page(study, cohort, replace(found, tables=tables))

@@ -1,0 +1,196 @@
+"""The mark told beforehand is the one a job writes, and hangs on no more than the job reads."""
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import grid_cases
+import pyarrow.parquet as pq
+import pytest
+
+from spinepipe.jobs import collect, inputs
+from spinepipe.jobs.collect import StaleFile
+from spinepipe.jobs.expected import Expected
+from spinepipe.marks import read_mark
+from spinepipe.studies.range_of_motion import draw as draw_stiffness
+from spinepipe.studies.range_of_motion import draw as sample_frames
+from spinepipe.studies.range_of_motion import simulate
+from spinepipe.studies.read import check
+from spinepipe.tables import metadata_of, read
+
+STUDY = grid_cases.STUDY
+SETTINGS = (
+    "poses: 2\nstiffness_sets: 2\n"
+    "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
+)
+BLOCK = f"results/{STUDY}/blocks/range_of_motion/specimen=a/block=000.parquet"
+
+
+@pytest.fixture
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project with a study of two specimens; paths of results are relative to it."""
+    monkeypatch.chdir(tmp_path)
+    return grid_cases.project(tmp_path, SETTINGS, specimens=("a", "b"))
+
+
+def expected(root: Path) -> Expected:
+    return Expected(str(root), *check(root, STUDY))
+
+
+def made(root: Path) -> Expected:
+    """Job files of specimen a, and what their marks must be."""
+    told = expected(root)
+    frames, sets = told.files.specimen_file("frames", "a"), "results/sets.parquet"
+    sample_frames.sample_frames(str(root), STUDY, "a", frames)
+    draw_stiffness.draw_stiffness(str(root), STUDY, sets)
+    for path in told.files.job_files("range_of_motion", "a", "000"):
+        pose, stiffness = (part.split("=")[1].split(".")[0] for part in path.split("/")[-2:])
+        simulate.run(str(root), STUDY, frames, sets, "a", pose, stiffness, path)
+    return told
+
+
+def join(told: Expected) -> None:
+    files = told.files.job_files("range_of_motion", "a", "000")
+    marks = [told.of_part("range_of_motion", path) for path in files]
+    collect.run("range_of_motion", files, marks, BLOCK)
+
+
+def test_jobs_write_the_marks_that_are_expected(root: Path) -> None:
+    told = made(root)
+    join(told)
+    for path in told.files.job_files("range_of_motion", "a", "000"):
+        assert read_mark(path) == told.of_part("range_of_motion", path)
+    frames = told.files.specimen_file("frames", "a")
+    assert read_mark(frames) == told.of_part("frames", frames)
+    assert read_mark("results/sets.parquet") == told.of_job("range_of_motion.draw_stiffness", {})
+    assert read_mark(BLOCK) == told.of_block("range_of_motion", "a", "000")
+
+
+def test_a_file_of_other_settings_is_not_joined(root: Path) -> None:
+    before = made(root)
+    study = root / f"config/studies/{STUDY}.yaml"
+    study.write_text(study.read_text().replace("7.5", "7.25"))
+    inputs._study.cache_clear()
+    told = expected(root)
+    (first, *_) = told.files.job_files("range_of_motion", "a", "000")
+    wanted, found = (one.of_part("range_of_motion", first) for one in (told, before))
+    with pytest.raises(StaleFile) as caught:
+        join(told)
+    for said in (first, f"found the mark {found}", f"expected {wanted}", "Run again"):
+        assert said in str(caught.value)
+    assert not Path(BLOCK).exists()
+
+
+def test_a_file_without_a_mark_is_not_joined(root: Path) -> None:
+    told = made(root)
+    (first, *_) = told.files.job_files("range_of_motion", "a", "000")
+    pq.write_table(read(first).replace_schema_metadata(None), first)
+    with pytest.raises(StaleFile, match=r"found the mark none, expected [0-9a-f]{64}"):
+        join(told)
+
+
+def test_digests_of_joined_files_are_kept_also_where_they_differ(root: Path) -> None:
+    told = made(root)
+    join(told)
+    one, other = ({"code_digest": code, "seed": "0", "version": code} for code in "xy")
+    together = collect._together([one, other])
+    assert together["seed"] == "0"
+    assert together["version"] == "x, y"
+    assert together["code_digest"] == collect._together([other, one])["code_digest"]
+    assert together["code_digest"] not in ("x", "y")
+    assert {"code_digest", "config_digest", "specimens_digest"} <= set(metadata_of(read(BLOCK)))
+
+
+def jobs(told: Expected) -> dict[str, str]:
+    """Marks of all files of all kinds of jobs of the study, and of what is joined from them."""
+    specimens = told.files.specimens
+    marks = {
+        f"{table} {s}": told.of_part(table, told.files.specimen_file(table, s))
+        for table in told.files.by_specimen
+        for s in specimens
+    }
+    for table in told.files.made_of_jobs:
+        for s, block in told.files.blocks(table):
+            files = told.files.job_files(table, s, block)
+            marks |= {path: told.of_part(table, path) for path in files}
+            marks[f"block {table} {s}"] = told.of_block(table, s, block)
+        marks[f"table {table}"] = told.of_table(table)
+    return marks
+
+
+def changed(told: Callable[[], Expected], change: Callable[[], object]) -> set[str]:
+    before = jobs(told())
+    change()
+    after = jobs(told())
+    assert before.keys() == after.keys()
+    return {name for name in before if before[name] != after[name]}
+
+
+def replace(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
+
+
+def test_a_changed_number_of_a_specimen_changes_what_it_makes_and_is_joined_to(root: Path) -> None:
+    joints = root / "config/cohorts/stack/joints.csv"
+    again = changed(lambda: expected(root), lambda: replace(joints, "b,L2L3,0,36,", "b,L2L3,0,37,"))
+    files = expected(root).files
+    own = set(files.job_files("range_of_motion", "b", "000"))
+    of_it = {"frames b", "block range_of_motion b", "table range_of_motion"}
+    assert again == own | of_it
+
+
+def test_the_title_of_the_cohort_changes_no_job_file(root: Path) -> None:
+    cohort = root / "config/cohorts/stack/cohort.yaml"
+    assert changed(lambda: expected(root), lambda: replace(cohort, "stacked", "piled")) == set()
+
+
+def test_what_all_specimens_share_changes_all(root: Path) -> None:
+    header = root / "config/cohorts/stack/cohort.yaml"
+    again = changed(
+        lambda: expected(root), lambda: replace(header, "rotation_deg: 3.0", "rotation_deg: 2.0")
+    )
+    assert again == set(jobs(expected(root)))
+
+
+ROOT = Path(__file__).resolve().parents[2]
+COHORT = "t12s1_phantom"
+JOINT_POSES = f"""\
+study: poses
+kind: joint_pose_sensitivity
+cohort: {COHORT}
+seed: 1
+poses: 2
+best_models: 1
+methods: {{poses: 1}}
+start_bootstrap: {{sets: 2}}
+"""
+
+
+def on_the_phantom(root: Path, name: str) -> Expected:
+    return Expected(str(root), *check(root, name))
+
+
+@pytest.mark.parametrize("study", ["poses", "t12s1_cohort_stiffness", "t12s1_range_of_motion"])
+def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, study: str) -> None:
+    """In studies of every kind with job files; only what predicts from all hangs on all."""
+    cohort, studies = Path("config/cohorts", COHORT), tmp_path / "config/studies"
+    shutil.copytree(ROOT / cohort, tmp_path / cohort)
+    studies.mkdir()
+    (studies / "poses.yaml").write_text(JOINT_POSES)
+    if study != "poses":
+        shutil.copy2(ROOT / "config/studies" / f"{study}.yaml", studies)
+    loads = tmp_path / cohort / "loads.csv"
+    rows = loads.read_text().splitlines(keepends=True)
+    at = next(place for place, row in enumerate(rows) if row.startswith("s03,flexion,2,9,"))
+    rows[at] = re.sub(r"(\d)(\n)$", lambda m: f"{(int(m[1]) + 1) % 10}{m[2]}", rows[at])
+    again = changed(
+        lambda: on_the_phantom(tmp_path, study), lambda: loads.write_text("".join(rows))
+    )
+    files = {name for name in jobs(on_the_phantom(tmp_path, study)) if name.endswith(".parquet")}
+    joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
+    own = {name for name in files if "specimen=s03/" in name}
+    assert own
+    assert again & files == own | joint
