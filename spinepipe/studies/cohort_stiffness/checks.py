@@ -19,7 +19,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     NOTHING,
     CohortStiffness,
 )
-from spinepipe.studies.places import at, unknown_tests
+from spinepipe.studies.places import at, unknown_levels, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 
@@ -100,11 +100,7 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
 def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
     """Ratios of levels need a value for each level, and a value needs its level."""
     given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
-    for joint in given:
-        if joint not in cohort.joint_names:
-            place = at(document, f"level_stiffness.{joint}")
-            remedy = did_you_mean(joint, cohort.joint_names, "delete it or correct its name")
-            yield Problem(*place, f"unknown joint '{joint}'", one_of(cohort.joint_names), remedy)
+    yield from unknown_levels(document, given, cohort.joint_names)
     chosen = [name for name in study.representations if named(name).by_level]
     if not chosen:
         return
