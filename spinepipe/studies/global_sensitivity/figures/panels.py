@@ -16,6 +16,7 @@ from spinepipe.report.panels import sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, count, plain, short, unit
 from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
 
 _DRIVEN = ("right_bending", "left_rotation", "extension")
@@ -139,8 +140,6 @@ def whole(n: int) -> str:
 
 
 PLACE = ["specimen", "joint"]
-EVERY = "*"
-"""All tests, or all joints: of stiffness."""
 
 
 @dataclass(frozen=True, eq=False)
