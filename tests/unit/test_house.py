@@ -1,4 +1,4 @@
-"""The house keeps its plan: who imports whom (docs/decisions/0015), and what no tracked file holds."""
+"""The house keeps its plan (docs/decisions/0015): who imports whom, what no tracked file holds."""
 
 import ast
 import re
