@@ -47,9 +47,9 @@ def code_digest(module: str) -> str:
     """
     if _source(module) is None:
         raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
-    closure = _closure(module)
-    lines = [f"{name} {_meaning(name)}" for name in sorted(closure)]
-    lines += [_bytes_digest(path) for path in _data_files(closure)]
+    found = closure(module)
+    lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
+    lines += [_bytes_digest(path) for path in _data_files(found)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -59,7 +59,8 @@ def value_digest(*values: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _closure(module: str) -> set[str]:
+@cache
+def closure(module: str) -> frozenset[str]:
     """The module, its packages and all spinepipe modules they import in turn."""
     found: set[str] = set()
     waiting = [module]
@@ -68,7 +69,7 @@ def _closure(module: str) -> set[str]:
         if name not in found:
             found.add(name)
             waiting.extend(_imports(name))
-    return found
+    return frozenset(found)
 
 
 @cache
@@ -149,7 +150,7 @@ def _is_cosmetic(node: ast.stmt) -> bool:
     )
 
 
-def _data_files(modules: set[str]) -> list[Path]:
+def _data_files(modules: frozenset[str]) -> list[Path]:
     """Data files beside the modules, in a fixed order."""
     folders = {path.parent for name in modules if (path := _source(name))}
     files = (file for folder in folders for file in folder.iterdir())

@@ -15,6 +15,7 @@ import pytest
 from chain_cases import JOINTS, MOMENT_OF, STUDY, Chains, Written, by_joint
 from example_effects import CubicStiffening, MarkerError
 from scipy.optimize import brentq
+from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
 
 from spinepipe.effects import register, registry
 from spinepipe.jobs.model_mark import base_marks
@@ -23,7 +24,6 @@ from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN
-from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])

@@ -11,10 +11,10 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
+from spinepipe.studies.cohort_stiffness.draw import DRAW
 
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.report.words import short
-from spinepipe.studies.cohort_stiffness.draw import DRAW
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
 from spinepipe.studies.cohort_stiffness.figures.held_out_error import rotation_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios

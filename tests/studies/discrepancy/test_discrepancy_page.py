@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 from discrepancy_cases import EFFECTS, HIDDEN, STUDY, VERDICTS, frames, project, results
 from matplotlib.figure import Figure
+from spinepipe.report.discrepancy import DRAW
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.discrepancy import DRAW
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
 from spinepipe.report.words import plain

@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from chain_cases import DEGREES, STUDY, Chains
-
-from spinepipe.effects import Spread, Trial, registry
 from spinepipe.jobs.layouts import files_of
 from spinepipe.jobs.settings import relevant_settings
+
+from spinepipe.effects import Spread, Trial, registry
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies

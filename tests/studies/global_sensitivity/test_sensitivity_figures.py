@@ -11,9 +11,9 @@ import pytest
 from chain_cases import JOINTS, Chains
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from spinepipe.report.global_sensitivity import DRAW
 
 from spinepipe.cohort import Cohort, read
-from spinepipe.report.global_sensitivity import DRAW
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.global_sensitivity.figures.panels import (

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 from identification_cases import identification
+from spinepipe.jobs.layouts import JOINED, files_of
 from study_cases import STUDY, Size, project, results
 
 from spinepipe import cohort as cohorts
-from spinepipe.jobs.layouts import JOINED, files_of
 from spinepipe.report import published
 from spinepipe.studies.joint_pose_sensitivity import draw as figures
 from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from study_cases import STUDY, Size, project
 
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.report.page.document import Results, left_out
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import shown_tables
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 

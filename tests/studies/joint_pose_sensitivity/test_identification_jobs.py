@@ -12,7 +12,6 @@ from scipy import stats
 from study_cases import START, STUDY, Size, project, results
 
 from spinepipe.designs import sample_log_uniform
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity import (
     bootstrap,
     landmark_errors,
@@ -32,6 +31,7 @@ from spinepipe.studies.joint_pose_sensitivity.errors import (
     measured_size,
     readings,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
 from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS

@@ -16,12 +16,12 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.report.page.document import Results, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of
 from spinepipe.studies.joint_pose_sensitivity import report
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import folded, in_full, study_page
 from spinepipe.tables import read_frame
 from spinepipe.tables.schema import Column

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.report.page.document import Results
 from spinepipe.report.page.scene import scenes
 from spinepipe.report.panels import across_of, log_ticks
@@ -29,6 +28,7 @@ from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness imp
     pose_against_stiffness_figure,
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import success_figure
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import caption
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
