@@ -89,15 +89,16 @@ class Project:
         assert old in text
         self.path(name).write_text(text.replace(old, new))
 
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end; `stdout` holds both streams.
+    def environment(self) -> dict[str, str]:
+        """Without the path of the original package: the copy must find itself."""
+        return {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
-        Without the path of the original package: the copy must find itself.
-        """
+    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake to its end; `stdout` holds both streams."""
         return subprocess.run(
             [sys.executable, "-m", "snakemake", *arguments],
             cwd=self.folder,
-            env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
+            env=self.environment(),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
