@@ -11,8 +11,9 @@ import pandas as pd
 import pyarrow as pa
 from chain_cases import JOINTS, ROTATIONS, STUDY, Chains
 
+from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
-from spinepipe.tables import Table, from_rows, write
+from spinepipe.tables import Table, Tables, from_rows, write
 
 Rows = list[dict[str, Any]]
 
@@ -183,6 +184,19 @@ def results(root: Path, answer: str) -> Path:
     for name, (table, rows) in _tables(answer).items():
         write(table_of(table, rows), folder / f"{name}.parquet", {"seed": "1"})
     return folder
+
+
+def files_of_a_search(folder: Path) -> dict[str, str]:
+    """Where its job writes what, by the names of the job's arguments."""
+    names = [*(f"{table.name}.parquet" for table in TABLES), *OTHERS]
+    return {name.partition(".")[0]: str(folder / name) for name in names}
+
+
+def tables(verdict: Mapping[str, Any], made: Mapping[str, pd.DataFrame], folder: Path) -> Tables:
+    """What a figure or page gets; the verdict is written to ``folder``."""
+    path = folder / "verdict.json"
+    path.write_text(json.dumps(verdict))
+    return Tables(made, {"verdict": str(path)})
 
 
 def table_of(table: Table, rows: Rows) -> pa.Table:
