@@ -86,16 +86,6 @@ def count(n: int, one: str, many: str | None = None) -> str:
     return f"{n:,} {one if n == 1 else many or one + 's'}".replace(",", _THIN_SPACE)
 
 
-NAME = {
-    "literature": "published, one value",
-    "literature_levels": "published, level by level",
-    "per_specimen": "one value per specimen",
-    "level_ratio": "published ratio of levels",
-    "per_joint": "each joint its own",
-    "partially_pooled": "partially pooled",
-}
-"""Representations of stiffness in words."""
-
 _LONGEST = 22
 
 

@@ -14,6 +14,7 @@ from spinepipe.effects import Kind, create
 from spinepipe.model.file import EffectEntry, ModelFile, effects_for, read_model
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.base_model import BUSHING, made_by
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     ALL_BUT,
@@ -189,13 +190,15 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
             place = at(document, f"level_stiffness.{joint}")
             remedy = did_you_mean(joint, cohort.joint_names, "delete it or correct its name")
             yield Problem(*place, f"unknown joint '{joint}'", one_of(cohort.joint_names), remedy)
-    if "level_ratio" not in study.representations:
+    chosen = [name for name in study.representations if named(name).by_level]
+    if not chosen:
         return
     missing = [joint for joint in cohort.joint_names if joint not in study.level_stiffness]
     if missing:
         found = f"no value for {', '.join(missing)}"
-        allowed = "a value for every joint of the cohort, as level_ratio is among representations"
-        remedy = "add them, or leave level_ratio out of representations"
+        names, verb = " and ".join(chosen), "is" if len(chosen) == 1 else "are"
+        allowed = f"a value for every joint of the cohort, as {names} {verb} among representations"
+        remedy = f"add them, or leave {names} out of representations"
         yield Problem(*at(document, "level_stiffness"), found, allowed, remedy)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.statistics import Mean, mean_of, wilcoxon_signed_rank
+from spinepipe.studies.cohort_stiffness.representations import EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
     LEFT_OUT_CASE,
@@ -208,28 +209,16 @@ PUBLISHED_FINDINGS = (
     ),
 )
 
-WORDS = {
-    "per_specimen": "one stiffness for all joints",
-    "level_ratio": "the published ratio of levels",
-    "per_joint": "a stiffness for each joint",
-    "partially_pooled": "partially pooled stiffness",
-}
 HELD_OUT = {
     LEFT_OUT_SPECIMEN: "a specimen from the others",
     LEFT_OUT_CASE: "a load case from the others",
 }
-CONTESTS = (
-    ("per_joint", "per_specimen"),
-    ("per_joint", "level_ratio"),
-    ("partially_pooled", "per_specimen"),
-    ("partially_pooled", "level_ratio"),
-    ("partially_pooled", "per_joint"),
-)
+CONTESTS = tuple((one.name, worse) for one in EVERY for worse in one.beats)
 """Pairs of representations of which the first is claimed to predict better what is held out."""
 
 
 def _contest(better: str, worse: str, stage: str) -> Comparison:
-    first, second = WORDS[better], WORDS[worse]
+    first, second = named(better).sentence, named(worse).sentence
     statement = f"{first[0].upper()}{first[1:]} predicts {HELD_OUT[stage]} better than {second}."
     return Comparison(
         f"{better}_beats_{worse}_{stage}",

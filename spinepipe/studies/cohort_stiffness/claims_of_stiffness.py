@@ -26,6 +26,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     told,
     words,
 )
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
@@ -178,10 +179,8 @@ LITTLE = 0.1
 FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
 """What differs, and what it is seen in again and again."""
 
-ERROR_CLAIMS = {
-    "per_specimen": ("", "one stiffness for all joints"),
-    "level_ratio": ("level_ratio_", "the published ratio of levels"),
-}
+ERROR_CLAIMS = {"per_specimen": "", "level_ratio": "level_ratio_"}
+"""Representations of the paper of which it is claimed, and how the names of the claims begin."""
 
 
 def stiffness_spreads(
@@ -276,7 +275,8 @@ def _share(f: float, times: int) -> float:
 
 def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row]:
     """Do errors in the loaded coordinate differ between specimens, and between levels?"""
-    for representation, (prefix, described) in ERROR_CLAIMS.items():
+    for representation, prefix in ERROR_CLAIMS.items():
+        described = named(representation).sentence
         for what in FACTORS:
             claim = Claim(
                 f"{prefix}errors_differ_between_{what}",

@@ -26,11 +26,11 @@ from spinepipe.studies.cohort_stiffness.problem import (
     calibration_problem,
     origin,
     specimen_tests,
-    start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
 IN_FOLDERS = ("specimen", "representation", "fitted_to")
@@ -140,9 +140,8 @@ def _record(problem: Problem, found: Fit) -> Row:
 
 
 def _no_stiffness(settings: CohortStiffness, cohort: Cohort, refusal: str) -> list[Row]:
-    k = start_stiffness(settings, cohort, "literature")
-    nothing = np.full(k.shape, np.nan)
-    none = np.zeros(k.shape, dtype=int)
+    nothing = np.full((len(cohort.joint_names), len(COORDINATES)), np.nan)
+    none = np.zeros(nothing.shape, dtype=int)
     rows = stiffness_rows(
         cohort.joint_names, settings.free, nothing, nothing, 0.0, none.astype(bool), none
     )

@@ -8,10 +8,10 @@ from typing import Any
 from spinepipe.cohort import Cohort
 from spinepipe.report.published import OF_COHORTS, stands_for
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
-    POOLED,
     CohortStiffness,
     load_sets,
     tests_of,

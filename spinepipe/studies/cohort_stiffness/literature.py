@@ -26,6 +26,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
     start_stiffness,
 )
+from spinepipe.studies.cohort_stiffness.representations import PUBLISHED, named
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, SIGN_CHECKS, STIFFNESS
 from spinepipe.tables import from_rows, write
@@ -160,9 +161,6 @@ def _sign(measured: Array, expected: Array) -> int:
     return int(np.sign(slope)) if abs(slope) > reach else 0
 
 
-LITERATURE = ("literature", "literature_levels")
-
-
 def run(
     root: str, study: str, specimen: str, stiffness: str, errors: str, sign_checks: str
 ) -> None:
@@ -183,7 +181,7 @@ def run(
         values += [{**row, **common, **ended} for row in rows]
         found = error_rows(cohort, specimen, tests, k, others)
         seen += [{**row, **common, "stage": "literature"} for row in found]
-    k = start_stiffness(settings, cohort, "literature")
+    k = start_stiffness(settings, cohort, PUBLISHED[0])
     signs = sign_rows(cohort, specimen, tests, k, others)
     made = origin("literature", root, settings, cohort, [specimen])
     write(from_rows(STIFFNESS.without("specimen"), values), stiffness, made)
@@ -194,4 +192,4 @@ def run(
 def published_sets(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
     """The published sets that this cohort has values for."""
     every_level = set(cohort.joint_names) <= set(study.level_stiffness)
-    return LITERATURE if every_level else LITERATURE[:1]
+    return tuple(name for name in PUBLISHED if every_level or not named(name).by_level)

@@ -16,8 +16,9 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.page.document import Results, judged
-from spinepipe.report.words import AXIS, NAME, case, count, number, percent
+from spinepipe.report.words import AXIS, case, count, number, percent
 from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, PUBLISHED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 
@@ -160,12 +161,12 @@ def _lost(name: str, part: pd.DataFrame) -> str:
     lost = int((~flags).sum())
     if not lost:
         return ""
-    return f"{NAME[name]} {lost} of {len(flags)} values ({percent(lost, len(flags))})"
+    return f"{IN_WORDS[name]} {lost} of {len(flags)} values ({percent(lost, len(flags))})"
 
 
 def _fit(row: dict[Any, Any]) -> str:
     fitted = str(row["fitted_to"]).replace("_", " ")
-    return f"{row['specimen']}, {NAME[row['representation']]}, fitted to {fitted}"
+    return f"{row['specimen']}, {IN_WORDS[row['representation']]}, fitted to {fitted}"
 
 
 def _some(places: list[str]) -> str:
@@ -187,7 +188,7 @@ def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
         return
     for criterion, words in _CRITERIA.items():
         ranked = rows[(rows["criterion"] == criterion) & rows["rank"].notna()].sort_values("rank")
-        if (~ranked["representation"].str.startswith("literature")).any():
+        if (~ranked["representation"].isin(PUBLISHED)).any():
             told = [_place(row, study.significance) for row in ranked.to_dict("records")]
             yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}."
     best = [
@@ -208,11 +209,11 @@ def _place(row: dict[Any, Any], significance: float) -> str:
         if pd.isna(row["p"]) or row["p"] < significance
         else (f" (not told apart from the first, p {number(row['p'], 2)})")
     )
-    return f"{NAME[row['representation']]} {number(row['value'])}{spread}°{same}"
+    return f"{IN_WORDS[row['representation']]} {number(row['value'])}{spread}°{same}"
 
 
 def _best(part: pd.DataFrame) -> str:
-    return " and ".join(NAME[name] for name in part["representation"])
+    return " and ".join(IN_WORDS[name] for name in part["representation"])
 
 
 def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
@@ -229,7 +230,7 @@ def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
     ]
     for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
         told = [
-            f"{NAME[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
+            f"{IN_WORDS[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
             for row in part.to_dict("records")
         ]
         yield (

@@ -32,7 +32,8 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
     start_stiffness,
 )
-from spinepipe.studies.cohort_stiffness.settings import NOBODY, POOLED, CohortStiffness
+from spinepipe.studies.cohort_stiffness.representations import POOLED
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS

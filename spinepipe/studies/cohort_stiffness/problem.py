@@ -27,6 +27,7 @@ from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.parts import Damping, stiffness_of_joints
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
@@ -177,22 +178,10 @@ def _chosen(cycles: str, found: Sequence[TestedCycle]) -> list[TestedCycle]:
     return chosen
 
 
-LEVEL_REPRESENTATIONS = ("level_ratio", "literature_levels")
-"""Representations that start from the published values of each level."""
-
-GROUPING = {
-    "per_specimen": "per_specimen",
-    "level_ratio": "per_specimen",
-    "per_joint": "per_joint",
-    "partially_pooled": "per_joint",
-}
-"""Which joints share an unknown: those that keep their ratios move together."""
-
-
 def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:
     """(J, 6) SI: the published stiffness a representation starts from."""
     levels = {}
-    if representation in LEVEL_REPRESENTATIONS:
+    if named(representation).by_level:
         levels = {joint: study.level_stiffness[joint] for joint in cohort.joint_names}
     return stiffness_of_joints(cohort, study.stiffness, levels)
 
@@ -231,7 +220,9 @@ def calibration_problem(
     start = start_stiffness(study, cohort, representation)
     model = stiff_model(cohort, specimen, frames, start, others)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
-    free = free_parameters(model, 0, names, GROUPING[representation])
+    grouping = named(representation).grouping
+    assert grouping is not None  # nothing of a published set is fitted
+    free = free_parameters(model, 0, names, grouping)
     reach = np.full(len(free), np.log(study.bound_factor))
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested

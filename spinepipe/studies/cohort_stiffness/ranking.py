@@ -15,7 +15,8 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import wilcoxon_signed_rank
 from spinepipe.studies.cohort_stiffness.claims import joined
-from spinepipe.studies.cohort_stiffness.settings import NOBODY, POOLED, CohortStiffness
+from spinepipe.studies.cohort_stiffness.representations import NAMES, POOLED, PUBLISHED
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_SPECIMEN,
     LITERATURE,
@@ -25,11 +26,10 @@ from spinepipe.studies.cohort_stiffness.stages import (
     specimen_rms,
     without_result,
 )
-from spinepipe.studies.cohort_stiffness.tables import CRITERIA, MAE, RANKING, REPRESENTATIONS
+from spinepipe.studies.cohort_stiffness.tables import CRITERIA, MAE, RANKING
 from spinepipe.tables import from_rows, read_frames, write
 
 INFORMATION = ("aicc", "bic")
-NOT_FITTED = ("literature", "literature_levels")
 SPREADS = ("between_levels", "between_specimens", "between_joints")
 NO_P = "no p for information criteria: pooled specimens are not independent"
 NO_RESULT = "no specimen has a result"
@@ -54,12 +54,12 @@ def ranking_rows(
 ) -> list[Row]:
     """Rows of the table ``ranking`` from those of ``errors``, ``fits`` and ``pooling``."""
     present = {*errors["representation"], *fits["representation"]}
-    names = [name for name in REPRESENTATIONS if name in present]
+    names = [name for name in NAMES if name in present]
     specimens = {*errors["specimen"], *fits["specimen"]}
     rows = []
     for criterion in CRITERIA:
         if criterion in INFORMATION:
-            found = _information(fits, criterion, [n for n in names if n not in NOT_FITTED])
+            found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
             count = estimated_spreads(fits, pooling)
             order = ranked(found, True, specimens, _penalty(fits, criterion, count))
             order = [_conditional(row, count) for row in order]
@@ -98,7 +98,7 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
     """Error by specimen of each representation; the literature's is the same everywhere."""
     found = {}
     for name in names:
-        stage = LITERATURE if name in NOT_FITTED else criterion
+        stage = LITERATURE if name in PUBLISHED else criterion
         chosen = of_joint_fits(errors, stage)
         chosen = chosen[chosen["representation"] == name]
         found[name, _source(name, criterion)] = specimen_rms(chosen, errors)
@@ -106,7 +106,7 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
 
 
 def _source(name: str, criterion: str) -> str:
-    if name in NOT_FITTED:
+    if name in PUBLISHED:
         return "literature"
     if criterion != LEFT_OUT_SPECIMEN:
         return "own"

@@ -26,9 +26,9 @@ from spinepipe.statistics import (
 )
 from spinepipe.statistics.normality import NESTED
 from spinepipe.studies.cohort_stiffness.fit_rows import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.representations import POOLED, start_of
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
-    POOLED,
     CohortStiffness,
     joint_label,
     load_cases,
@@ -143,9 +143,6 @@ def _without(message: str) -> Outcome:
     return NESTED.without(Ended.TOO_FEW, 0, message)
 
 
-PUBLISHED_OF = {"level_ratio": "literature_levels"}
-"""The published set a representation starts from, where it is not ``literature``."""
-
 FITS_AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
 
 
@@ -159,10 +156,9 @@ def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
         of_single_cases(errors, stage) for stage in (LITERATURE, FITTED, LEFT_OUT_SPECIMEN)
     )
     for representation in fitted["representation"].unique():
-        start = PUBLISHED_OF.get(representation, "literature")
         own = fitted[fitted["representation"] == representation]
         others = held_out[held_out["representation"] == representation]
-        before = published[published["representation"] == start]
+        before = published[published["representation"] == start_of(representation)]
         for comparison, first, second in (
             ("literature_against_fitted", before, own),
             ("fitted_against_left_out_specimen", own, others),

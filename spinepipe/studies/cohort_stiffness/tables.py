@@ -5,15 +5,10 @@ Columns that tables of studies of kind cohort_stiffness share.
 Tables of studies of kind cohort_stiffness that are computed from its fits and their errors.
 """
 
+from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.tables.shared import STATISTICS, against_paper
 from spinepipe.units import COORDINATES
-
-REPRESENTATIONS = (
-    *("literature", "literature_levels"),
-    *("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
-)
-"""How stiffness is described, from what is taken as published to what is free in each joint."""
 
 SOURCES = ("literature", "own", "others_median", "others_pooled")
 STAGES = ("literature", "fitted", "left_out_case", "left_out_specimen")
@@ -22,11 +17,8 @@ NO_POSE = "not measured, or no pose was found"
 REPRESENTATION = Column(
     "representation",
     "text",
-    "literature: one published value for all joints; literature_levels: published values level by "
-    "level; per_specimen: one stiffness for all joints of a specimen; level_ratio: published ratio "
-    "of levels times one factor; per_joint: each joint its own; partially_pooled: each joint its "
-    "own, drawn towards its specimen and its cohort as far as the data ask for it",
-    allowed=REPRESENTATIONS,
+    "; ".join(f"{one.name}: {one.about}" for one in EVERY),
+    allowed=NAMES,
 )
 FITTED_TO = Column(
     "fitted_to",
