@@ -7,11 +7,15 @@ import numpy as np
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.frames import FRAME_LANDMARKS
+from spinepipe.jobs import draw
+from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
 from spinepipe.tables import Table, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"
+TABLES = {table.name: table for table in KIND.tables}
+FIGURES = {figure.name: figure.reads for figure in KIND.figures}
 START = (24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0)
 _POINTS = {
     "superior_endplate_centre": (0.0, 26.0, 0.0),
@@ -98,6 +102,15 @@ def results(root: Path, size: Size) -> Path:
     _write(CALIBRATIONS, folder / "calibrations.parquet", _calibrations(size, rng))
     _write(SIMULATIONS, folder / "simulations.parquet", _simulations(size, rng))
     return folder
+
+
+def drawn(root: Path, name: str) -> Path:
+    """One figure of the results of the project, by the job; returns its SVG."""
+    folder = root / "results" / STUDY
+    svg, png = (folder / "figures" / f"{name}.{kind}" for kind in ("svg", "png"))
+    tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
+    draw.run(str(root), STUDY, name, tables, str(svg), str(png))
+    return svg
 
 
 def _write(table: Table, path: Path, rows: list[dict[str, object]]) -> None:

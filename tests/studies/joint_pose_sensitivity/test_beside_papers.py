@@ -4,14 +4,11 @@ from pathlib import Path
 
 import pytest
 from identification_cases import identification
-from spinepipe.jobs.layouts import JOINED, files_of
-from study_cases import STUDY, Size, project, results
+from study_cases import FIGURES, Size, drawn, project, results
 
 from spinepipe import cohort as cohorts
 from spinepipe.report import published
-from spinepipe.studies.joint_pose_sensitivity import draw as figures
-from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
-from spinepipe.studies.read import KINDS
+from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import Study
 
 COHORTS = Path(__file__).resolve().parents[3] / "config" / "cohorts"
@@ -28,7 +25,7 @@ def study_of(kind: str, cohort: str) -> Study:
             "outputs": {"stiffness": True},
         },
     }
-    return KINDS[kind](study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
+    return kind_of(kind).settings(study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +42,7 @@ def study_of(kind: str, cohort: str) -> Study:
 def test_results_are_held_against_the_paper_of_cohort_and_question(
     kind: str, cohort: str, against: list[str]
 ) -> None:
-    found = files_of(study_of(kind, cohort), cohorts.read(COHORTS / cohort))
+    found = kind_of(kind).files.of(study_of(kind, cohort), cohorts.read(COHORTS / cohort))
     assert [name for name in found.tables if name.startswith("against")] == against
 
 
@@ -65,18 +62,17 @@ def test_joint_pose_figures_of_a_cohort_of_the_other_paper(
     size = Size(("a",), 2, 12)
     folder = results(project(tmp_path, size), size)
     identification(folder, size)
-    tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
-    svg, png = (folder / f"{name}.{kind}" for kind in ("svg", "png"))
-    figures.run(str(tmp_path), STUDY, name, tables, str(svg), str(png))
-    alone = svg.read_bytes()
+    alone = drawn(tmp_path, name).read_bytes()
     monkeypatch.setitem(published.PAPER_OF_COHORT, "straight", "gould_2024b")
-    figures.run(str(tmp_path), STUDY, name, tables, str(svg), str(png))
-    assert svg.read_bytes() == alone
+    assert drawn(tmp_path, name).read_bytes() == alone
 
 
 def test_tables_of_job_files_of_every_kind_are_joined() -> None:
     phantom = cohorts.read(COHORTS / "t12s1_phantom")
-    layouts = [files_of(study_of(kind, "t12s1_phantom"), phantom) for kind in KINDS]
-    made = {table for layout in layouts for table in layout.made_of_jobs}
-    assert set(JOINED) == made | {"method_fits"}  # of joint-pose studies that ask for them
-    assert len(JOINED) == len(set(JOINED)), "one rule joins them all"
+    asked = {"joint_pose_sensitivity": {"method_fits"}}  # by studies that ask for them
+    for name in kind_names():
+        files = kind_of(name).files.of(study_of(name, "t12s1_phantom"), phantom)
+        made = {*files.made_of_jobs, *files.by_specimen} | asked.get(name, set())
+        joined = kind_of(name).files.joined
+        assert set(joined) == made, name
+        assert len(joined) == len(set(joined)), "one rule joins them all"
