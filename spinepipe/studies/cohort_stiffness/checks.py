@@ -21,8 +21,8 @@ from spinepipe.studies.cohort_stiffness.settings import (
     NOTHING,
     CohortStiffness,
 )
-from spinepipe.studies.places import at, unknown_tests
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
+from spinepipe.studies.places import at, readings, unknown_tests
+from spinepipe.units import ROTATIONS
 
 KEY = "base.model"
 LAWS = (Kind.JOINT_LAW, Kind.PATH)
@@ -158,15 +158,7 @@ def _specimens(cohort: Cohort) -> Iterator[Problem]:
 
 def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
     """Readings of a free coordinate in each test that is asked for, and of every specimen."""
-    assert cohort.motion is not None
-    columns = [
-        column
-        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
-        if name in study.free
-    ]
-    chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
-    zeros = cohort.zeroed_at_step_0 & (chosen["step"] == 0)  # made by zeroing, no readings
-    measured = chosen[chosen[columns].notna().any(axis=1) & ~zeros]
+    measured = readings(cohort, study.tests, study.free)
     for index, name in enumerate(study.tests or ()):
         if name in cohort.tests and name not in set(measured["test"]):
             found = f"test '{name}', which has no motion"
