@@ -31,7 +31,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
-from spinepipe.units import BORDER_PER_SI
+from spinepipe.units import BORDER_PER_SI, less_step_0, without_step_0
 from spinepipe.world import Chain
 
 
@@ -220,8 +220,8 @@ class Evaluator:
         """(N,) weighted residuals of the readings of one case that enter the cost."""
         measured = self.problem.cases[number]
         seen = np.stack([observe(system, q) for q in poses])
-        seen = seen - seen[0] if measured.zeroed else seen
-        return self._entering(number, (seen - measured.measured) * self._scale)
+        errors = less_step_0(seen, measured.zeroed) - measured.measured
+        return self._entering(number, errors * self._scale)
 
     def _jacobian(self, number: int, system: System, poses: Array, by_x: Array) -> Array:
         """(N, m) derivative of the residuals of one case by the unknowns."""
@@ -231,7 +231,7 @@ class Evaluator:
                 for q, dq in zip(poses, by_x, strict=True)
             ]
         )
-        seen = seen - seen[0] if self.problem.cases[number].zeroed else seen
+        seen = less_step_0(seen, self.problem.cases[number].zeroed)
         return self._entering(number, seen * self._scale[:, None])
 
     def _entering(self, number: int, errors: Array) -> Array:
@@ -267,7 +267,6 @@ def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
 
 def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:
     """(T, J, 6) which readings enter the cost; the zeros that zeroing makes of step 0 are none."""
-    used = np.isfinite(measured.measured) & (weights > 0.0)
-    if measured.zeroed:
-        used[0] = False
+    readings = without_step_0(measured.measured, measured.zeroed)
+    used: NDArray[np.bool_] = np.isfinite(readings) & (weights > 0.0)
     return used

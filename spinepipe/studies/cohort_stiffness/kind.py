@@ -7,7 +7,8 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.published import OF_COHORTS, stands_for
-from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
+from spinepipe.studies.base_checks import BaseCheck
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -204,7 +205,7 @@ KIND = Kind(
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
-    checks_of_files=(check_cohort_base,),
+    checks_of_files=(BaseCheck(own_bushings=True),),
     tables=TABLES,
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),

@@ -17,7 +17,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     driven,
     stiff_model,
 )
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, less_step_0
 from spinepipe.world import Chain
 
 Row = dict[str, Any]
@@ -52,7 +52,7 @@ def _motion(system: System, zeroed: bool) -> tuple[Array | None, Status, str]:
         if not step.usable:
             return None, step.equilibrium.status, step.equilibrium.message
     q = np.stack([observe(system, step.equilibrium.q) for step in steps])
-    return (q - q[0] if zeroed else q), Status.CONVERGED, ""
+    return less_step_0(q, zeroed), Status.CONVERGED, ""
 
 
 def error_rows(

@@ -30,7 +30,13 @@ from spinepipe.studies.base_model import beside_bushings, own_values
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.parts import Damping, stiffness_of_joints
-from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
+from spinepipe.units import (
+    COORDINATES,
+    ROTATIONS,
+    STIFFNESS_COLUMNS,
+    TRANSLATIONS,
+    without_step_0,
+)
 
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
 
@@ -150,18 +156,16 @@ def _specimen_tests(
     cases = load_cases(cohort, specimen, tests, np.zeros(3))
     motions = measured_motion(cohort, specimen, cases)
     found = [
-        TestedCycle(case, _readings(motion.q, cohort), peak_step(case), loaded_coordinate(case))
+        TestedCycle(
+            case,
+            without_step_0(motion.q, cohort.zeroed_at_step_0),
+            peak_step(case),
+            loaded_coordinate(case),
+        )
         for case, motion in zip(cases, motions, strict=True)
     ]
     read = [one for one in found if np.isfinite(one.measured).any()]
     return SpecimenTests(joint_frames(cohort, specimen), tuple(_chosen(cycles, read)))
-
-
-def _readings(q: Array, cohort: Cohort) -> Array:
-    readings = q.copy()
-    if cohort.zeroed_at_step_0:
-        readings[0] = np.nan
-    return readings
 
 
 def _chosen(cycles: str, found: Sequence[TestedCycle]) -> list[TestedCycle]:

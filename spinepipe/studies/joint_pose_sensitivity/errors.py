@@ -16,7 +16,7 @@ from spinepipe.statistics import Agreement, bland_altman
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 UNITS = {
     name: column.rsplit("_", 1)[1]
@@ -27,7 +27,7 @@ UNITS = {
 
 def readings(rows: pd.DataFrame, zeroed_at_step_0: bool) -> pd.DataFrame:
     """Rows that are readings: where motion is zeroed at step 0, that step's zeros are none."""
-    return rows[rows["step"] > 0] if zeroed_at_step_0 else rows
+    return rows[has_reading(rows["step"], zeroed_at_step_0)]
 
 
 def absolute_error(simulations: pd.DataFrame) -> pd.DataFrame:

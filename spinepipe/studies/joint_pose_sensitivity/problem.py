@@ -16,7 +16,13 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     study_and_cohort,
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import BORDER_PER_SI, COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import (
+    BORDER_PER_SI,
+    COORDINATES,
+    STIFFNESS_COLUMNS,
+    less_step_0,
+    without_step_0,
+)
 
 
 def calibration_problem(
@@ -73,13 +79,10 @@ def absolute_errors(cases: Sequence[MeasuredCase], poses: Sequence[Array]) -> Ar
 
 def _readings(measured: MeasuredCase) -> Array:
     """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
-    readings = measured.measured.copy()
-    if measured.zeroed:
-        readings[0] = np.nan
-    return readings
+    return without_step_0(measured.measured, measured.zeroed)
 
 
 def _predicted(measured: MeasuredCase, poses: Array) -> Array:
     """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
     q = poses.reshape(len(poses), -1, 6)
-    return q - q[0] if measured.zeroed else q
+    return less_step_0(q, measured.zeroed)

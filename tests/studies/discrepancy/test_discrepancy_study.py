@@ -201,22 +201,42 @@ def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("entry", "found"),
+    ("entry", "place", "found"),
     [
-        (EffectEntry(effect="linear_bushing", scope=Scope(joints=("L1L2",))), "'L1L2'"),
-        (EffectEntry(effect="linear_bushing", values=(Values(joint="L1L2"),)), "'L1L2'"),
-        (EffectEntry(effect="linear_bushing", scope=Scope(specimens=("z",))), "specimen 'z'"),
-        (EffectEntry(effect="linear_bushing", values=(Values(specimen="z"),)), "specimen 'z'"),
-        (EffectEntry(effect="linear_bushing", scope=Scope(tests=("twist",))), "test 'twist'"),
+        (
+            EffectEntry(effect="linear_bushing", scope=Scope(joints=("L1L2",))),
+            "scope.joints",
+            "L1L2",
+        ),
+        (
+            EffectEntry(effect="linear_bushing", values=(Values(joint="L1L2"),)),
+            "values.joint",
+            "L1L2",
+        ),
+        (
+            EffectEntry(effect="linear_bushing", scope=Scope(specimens=("z",))),
+            "scope.specimens",
+            "specimen 'z'",
+        ),
+        (
+            EffectEntry(effect="linear_bushing", values=(Values(specimen="z"),)),
+            "values.specimen",
+            "specimen 'z'",
+        ),
+        (
+            EffectEntry(effect="linear_bushing", scope=Scope(tests=("twist",))),
+            "scope.tests",
+            "test 'twist'",
+        ),
     ],
     ids=["joint", "value of a joint", "specimen", "value of a specimen", "test"],
 )
 def test_a_model_of_another_spine_is_refused(
-    entry: EffectEntry, found: str, tmp_path: Path
+    entry: EffectEntry, place: str, found: str, tmp_path: Path
 ) -> None:
     written(tmp_path, model(tmp_path, entry))
     (problem,) = complaints(tmp_path)
-    assert (problem.file, problem.row, problem.column) == (FILE, 4, "base.model")
+    assert (problem.file, problem.column) == ("model.yaml", f"effects.1.{place}")
     assert found in problem.found
 
 

@@ -18,6 +18,7 @@ from scipy.linalg import helmert
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.units import less_step_0
 
 FAR, FAR_CYCLE = 4.0, 5.0
 """Deviations from the median of the cycles beyond this many SDs are outliers.
@@ -66,7 +67,7 @@ class Noise:
         serial: Array = self.correlation**lag
         if not self.zeroed:
             return serial
-        left: Array = np.eye(steps) - np.eye(steps)[0]
+        left = less_step_0(np.eye(steps), self.zeroed)
         return left @ serial @ left.T
 
 

@@ -12,7 +12,7 @@ from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
-from spinepipe.units import COORDINATES
+from spinepipe.units import COORDINATES, without_step_0
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,7 @@ def specimen_readings(
 def _read(q: Array, coordinates: Sequence[str], zeroed: bool) -> Array:
     """(T, J, 6) what was read: no other coordinates, and no zeros that zeroing made."""
     chosen = np.array([name in coordinates for name in COORDINATES])
-    readings = np.where(chosen, q, np.nan)
-    if zeroed:
-        readings[0] = np.nan
-    return readings
+    return without_step_0(np.where(chosen, q, np.nan), zeroed)
 
 
 def _grouped(read: Sequence[tuple[LoadCase, Array]]) -> tuple[Repeats, ...]:

@@ -17,7 +17,7 @@ from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.findings import settling
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 OWN = "calibrated"
 _RUN = ["specimen", "pose", "stiffness", "test", "cycle"]
@@ -48,8 +48,7 @@ def errors_figure(
         if simulations[f"error_{column}"].notna().any()
     ]
     runs = _failed_runs(simulations)
-    if cohort.zeroed_at_step_0:
-        simulations = simulations[simulations["step"] > 0]
+    simulations = simulations[has_reading(simulations["step"], cohort.zeroed_at_step_0)]
     if not measured:
         total = count(len(runs), "simulation")
         return saying(f"No error can be shown: none of {total} reached a measured equilibrium.")
