@@ -26,9 +26,6 @@ Place = Mapping[str, str]
 HEADER_ALONE = {"start_model", "range_of_motion.draw_stiffness", "global_sensitivity.design"}
 """Jobs that read no specimen."""
 
-ALL_SPECIMENS = {"cohort_stiffness.pool"}
-"""Jobs that read all although their files are of one."""
-
 MAKES_MODEL = {"joint_pose_sensitivity": "start_model", "discrepancy": "discrepancy.search"}
 """Job that writes the model files of a kind of study."""
 
@@ -86,14 +83,14 @@ class Expected:
     def _specimens(self, job: str, place: Place) -> tuple[str, ...] | None:
         if job in HEADER_ALONE:
             return ()
-        if "specimen" not in place or job in ALL_SPECIMENS:
+        if "specimen" not in place:
             return None
         return (place["specimen"],)
 
     def _others(self, job: str, place: Place) -> list[str]:
         """What else a job reads that decides, as the job itself names it."""
         study: Any = self.study
-        base = self._base() if job in WITH_BASE else []
+        base = self._base if job in WITH_BASE else []
         if job == "cohort_stiffness.left_out":
             where = (place[name] for name in ("specimen", "representation", "fitted_to"))
             fits = self.files.fits_of_others(*where)  # type: ignore[attr-defined]
@@ -108,20 +105,26 @@ class Expected:
         best = Path(self.root, self.files.folder, "best.json")
         return ranked_set(str(best), specimen, stiffness) if best.is_file() else ""
 
+    @cached_property
     def _base(self) -> list[str]:
         """The mark of the model file that the study builds on, also if it is yet to be made."""
         study: Any = self.study
         if study.base is None or study.base.model is None:
             return []
         root = Path(self.root)
-        maker = made_by(root / study.base.model, root)
-        if maker is None:
-            return base_marks(self.root, study.base.model)
-        return [Expected(self.root, *check(root, maker, starting=False)).of_models()]
+        path = root / study.base.model
+        maker = made_by(path, root)
+        if maker is not None:
+            other = Expected(self.root, *check(root, maker, starting=False))
+            if path in other.models:
+                return [other.of_job(MAKES_MODEL[other.study.kind], {})]
+        return base_marks(self.root, study.base.model)
 
-    def of_models(self) -> str:
-        """The mark of the model files of the study."""
-        return self.of_job(MAKES_MODEL[self.study.kind], {})
+    @property
+    def models(self) -> list[Path]:
+        """The model files that the study makes."""
+        names = [name for name in self.files.others if name.endswith(".yaml")]
+        return [Path(self.root, self.files.folder, name) for name in names]
 
 
 def place_of(path: str) -> dict[str, str]:

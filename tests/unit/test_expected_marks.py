@@ -12,7 +12,9 @@ import pytest
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import read_mark
+from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.studies.range_of_motion import draw as draw_stiffness
 from spinepipe.studies.range_of_motion import draw as sample_frames
 from spinepipe.studies.range_of_motion import simulate
@@ -169,7 +171,7 @@ start_bootstrap: {{sets: 2}}
 """
 
 
-def on_the_phantom(root: Path, name: str) -> Expected:
+def expected_of(root: Path, name: str) -> Expected:
     return Expected(str(root), *check(root, name))
 
 
@@ -186,11 +188,34 @@ def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, stud
     rows = loads.read_text().splitlines(keepends=True)
     at = next(place for place, row in enumerate(rows) if row.startswith("s03,flexion,2,9,"))
     rows[at] = re.sub(r"(\d)(\n)$", lambda m: f"{(int(m[1]) + 1) % 10}{m[2]}", rows[at])
-    again = changed(
-        lambda: on_the_phantom(tmp_path, study), lambda: loads.write_text("".join(rows))
-    )
-    files = {name for name in jobs(on_the_phantom(tmp_path, study)) if name.endswith(".parquet")}
+    again = changed(lambda: expected_of(tmp_path, study), lambda: loads.write_text("".join(rows)))
+    files = {name for name in jobs(expected_of(tmp_path, study)) if name.endswith(".parquet")}
     joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
     own = {name for name in files if "specimen=s03/" in name}
     assert own
     assert again & files == own | joint
+
+
+def test_a_model_made_by_another_study_counts_before_it_is_there(tmp_path: Path) -> None:
+    """By the mark that it will have; a file of one's own beside it by its content."""
+    for part in ("cohorts/stiffening_spines", "studies"):
+        shutil.copytree(ROOT / "config" / part, tmp_path / "config" / part)
+    maker = expected_of(tmp_path, "stiffening_spines")
+    model = maker.files.folder + "/model_with_effects.yaml"
+    place = {"specimen": "s01", "representation": "per_specimen", "fitted_to": "all"}
+
+    def mark_of_fit() -> str:
+        study = expected_of(tmp_path, "stiffening_spines_stiffness")
+        return study.of_job("cohort_stiffness.fit", place)
+
+    before = mark_of_fit()
+    made = maker.of_job("discrepancy.search", {})
+    entry = EffectEntry(effect="linear_bushing")
+    whole = ModelFile(model="m", cohort="stiffening_spines", effects=(entry,))
+    (tmp_path / model).parent.mkdir(parents=True)
+    write_model(whole, tmp_path / model, made)
+    assert mark_of_fit() == before
+    assert base_marks(str(tmp_path), model) == [made]
+    file = tmp_path / "config/studies/stiffening_spines.yaml"
+    file.write_text(file.read_text() + "seed: 77\n")
+    assert mark_of_fit() != before

@@ -17,15 +17,34 @@ STUDY = "probe"
 FOLDER = f"results/{STUDY}/discrepancy"
 HANDING_OVER = '''"""Job: made-up results instead of a search."""
 
-import shutil
+import json
 from pathlib import Path
+
+import pyarrow.parquet as pq
+
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.provenance import provenance
+from spinepipe.marks import KEY, with_mark, write_marked
+from spinepipe.studies import Discrepancy
+from spinepipe.tables import write
 
 
 def run(root: str, study: str, **files: str) -> None:
-    """Copy each result from the folder ``made_up``."""
+    """Copy each result from the folder ``made_up``, marked."""
     assert study == "probe"
+    settings, cohort = study_of_kind(Discrepancy, root, study)
+    marks = base_marks(root, settings.base.model)
+    made_by = provenance("discrepancy.search", settings, cohort, None, marks)
     for path in files.values():
-        shutil.copy(Path(root, "made_up", Path(path).name), path)
+        source = Path(root, "made_up", Path(path).name)
+        if source.suffix == ".parquet":
+            write(pq.read_table(source), path, made_by)
+        elif source.suffix == ".yaml":
+            write_marked(source.read_text(), path, made_by[KEY])
+        else:
+            data = with_mark(json.loads(source.read_text()), made_by[KEY])
+            Path(path).write_text(json.dumps(data))
 '''
 
 

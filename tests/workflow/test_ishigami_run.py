@@ -39,6 +39,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
+from spinepipe.jobs.provenance import provenance
 from spinepipe.studies import check
 from spinepipe.tables import RESPONSES, to_arrow, write
 
@@ -60,7 +61,9 @@ def run(root, study, design, specimen, batch, output):
         status=["converged"] * len(part),
         message=[""] * len(part),
     )
-    write(to_arrow(table, columns), output, {})
+    job = "global_sensitivity.respond"
+    made_by = provenance(job, settings, cohort, [specimen], [str(size)])
+    write(to_arrow(table, columns), output, made_by)
 '''
 
 

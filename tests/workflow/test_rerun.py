@@ -27,7 +27,7 @@ OF_SIMULATIONS = {
 }
 """Tables that are made of the table of simulations."""
 
-# Appended to the ranking of the copied package: other bytes, same meaning.
+# Appended to the ranking of the copied package: another number in one of its sets.
 OTHER_RANKING = """
 
 _run = run
@@ -35,8 +35,11 @@ _run = run
 
 def run(**arguments):
     _run(**arguments)
-    with open(arguments["output"], "a") as file:
-        file.write(" ")
+    with open(arguments["output"]) as file:
+        data = json.load(file)
+    data["s01"][1]["stiffness"][0][0] *= 1.01
+    with open(arguments["output"], "w") as file:
+        json.dump(data, file)
 """
 
 
@@ -106,11 +109,11 @@ def test_a_new_limit_computes_no_fit_again(project: Project) -> None:
     assert not [name for name in again if name.startswith(folders)]
 
 
-def test_a_new_ranking_reruns_the_simulations_that_use_it(project: Project) -> None:
+def test_a_new_ranked_set_reruns_the_simulations_that_use_it(project: Project) -> None:
     path = project.path("spinepipe/jobs/rank.py")
     path.write_text(path.read_text() + OTHER_RANKING)
     again = simulations(rerun(project))
-    assert again == {name for name in simulations(set(project.files())) if "best" in name}
+    assert again == {name for name in simulations(set(project.files())) if "best02" in name}
     assert rerun(project) == set()
 
 

@@ -71,7 +71,7 @@ def origin(
     others: Sequence[str] = (),
 ) -> dict[str, str]:
     """Metadata of a file, see `provenance`, with the digest of the model file."""
-    base = base_marks(root, study.base and study.base.model)
+    base = base_marks(root, None if study.base is None else study.base.model)
     job = f"cohort_stiffness.{job}"
     whole = provenance(job, study, cohort, specimens, [*base, *others])
     return {**whole, "base_model_digest": _digest(root, study)} if base else whole
