@@ -12,7 +12,9 @@ import pytest
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import read_mark
+from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.studies.range_of_motion import draw, simulate
 from spinepipe.studies.read import check
 from spinepipe.tables import metadata_of, read
@@ -169,7 +171,7 @@ landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 """
 
 
-def on_the_phantom(root: Path, name: str) -> Expected:
+def expected_of(root: Path, name: str) -> Expected:
     return Expected(str(root), *check(root, name))
 
 
@@ -196,21 +198,21 @@ def test_limits_are_applied_to_fits_that_are_there(
 ) -> None:
     """No job file changes; what judges the fits does."""
     study = poses(tmp_path)
-    before = on_the_phantom(tmp_path, "poses").of_job(job, {})
-    again = changed(lambda: on_the_phantom(tmp_path, "poses"), lambda: replace(study, old, new))
+    before = expected_of(tmp_path, "poses").of_job(job, {})
+    again = changed(lambda: expected_of(tmp_path, "poses"), lambda: replace(study, old, new))
     assert again == set()
-    assert on_the_phantom(tmp_path, "poses").of_job(job, {}) != before
+    assert expected_of(tmp_path, "poses").of_job(job, {}) != before
 
 
 def test_another_seed_samples_again_in_its_own_study_alone(tmp_path: Path) -> None:
     study = poses(tmp_path)
     (study.parent / "twin.yaml").write_text(JOINT_POSES.replace("study: poses", "study: twin"))
-    twin = jobs(on_the_phantom(tmp_path, "twin"))
+    twin = jobs(expected_of(tmp_path, "twin"))
     again = changed(
-        lambda: on_the_phantom(tmp_path, "poses"), lambda: replace(study, "seed: 1", "seed: 2")
+        lambda: expected_of(tmp_path, "poses"), lambda: replace(study, "seed: 1", "seed: 2")
     )
     assert {"table landmarks", "table simulations", "landmarks s03"} <= again
-    assert jobs(on_the_phantom(tmp_path, "twin")) == twin
+    assert jobs(expected_of(tmp_path, "twin")) == twin
 
 
 @pytest.mark.parametrize("study", ["poses", "t12s1_cohort_stiffness", "t12s1_range_of_motion"])
@@ -223,11 +225,33 @@ def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, stud
     rows = loads.read_text().splitlines(keepends=True)
     at = next(place for place, row in enumerate(rows) if row.startswith("s03,flexion,2,9,"))
     rows[at] = re.sub(r"(\d)(\n)$", lambda m: f"{(int(m[1]) + 1) % 10}{m[2]}", rows[at])
-    again = changed(
-        lambda: on_the_phantom(tmp_path, study), lambda: loads.write_text("".join(rows))
-    )
-    files = {name for name in jobs(on_the_phantom(tmp_path, study)) if name.endswith(".parquet")}
+    again = changed(lambda: expected_of(tmp_path, study), lambda: loads.write_text("".join(rows)))
+    files = {name for name in jobs(expected_of(tmp_path, study)) if name.endswith(".parquet")}
     joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
     own = {name for name in files if "specimen=s03/" in name}
     assert own
     assert again & files == own | joint
+
+
+def test_a_model_made_by_another_study_counts_before_it_is_there(tmp_path: Path) -> None:
+    """By the mark that it will have; a file of one's own beside it by its content."""
+    for part in ("cohorts/stiffening_spines", "studies"):
+        shutil.copytree(ROOT / "config" / part, tmp_path / "config" / part)
+    maker = expected_of(tmp_path, "stiffening_spines")
+    model = maker.files.folder + "/model_with_effects.yaml"
+    place = {"specimen": "s01", "representation": "per_specimen", "fitted_to": "all"}
+
+    def mark_of_fit() -> str:
+        return expected_of(tmp_path, "stiffening_spines_stiffness").of_job("fit", place)
+
+    before = mark_of_fit()
+    made = maker.of_job("search", {})
+    entry = EffectEntry(effect="linear_bushing")
+    whole = ModelFile(model="m", cohort="stiffening_spines", effects=(entry,))
+    (tmp_path / model).parent.mkdir(parents=True)
+    write_model(whole, tmp_path / model, made)
+    assert mark_of_fit() == before
+    assert base_marks(str(tmp_path), model) == [made]
+    file = tmp_path / "config/studies/stiffening_spines.yaml"
+    file.write_text(file.read_text() + "seed: 77\n")
+    assert mark_of_fit() != before

@@ -214,7 +214,6 @@ KIND = Kind(
         Job(
             "pool",
             ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
-            specimens="all",
             reads_base=True,
         ),
         *_ANALYSES,

@@ -11,7 +11,6 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
-from spinepipe.studies.cohort_stiffness.draw import DRAW
 
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.report.words import short

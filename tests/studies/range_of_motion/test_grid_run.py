@@ -112,6 +112,16 @@ def test_other_draws_of_stiffness_leave_the_frames_alone(grid: Project) -> None:
     assert len(jobs(planned)) == 48
 
 
+def test_one_changed_number_of_a_specimen_reruns_its_jobs_alone(grid: Project) -> None:
+    grid.edit("config/cohorts/stack/joints.csv", "b,L2L3,0,36,", "b,L2L3,0,37,")
+    of_b = {name for name in jobs(set(grid.files())) if "specimen=b/" in name}
+    planned = grid.planned()
+    assert len(of_b) == 16
+    assert jobs(planned) == of_b
+    frames = {name for name in planned if name.startswith(f"{RESULTS}frames")}
+    assert frames == {f"{RESULTS}frames{part}.parquet" for part in ("", "/specimen=b")}
+
+
 def test_the_report_holds_its_figures_and_fetches_nothing(computed: Project) -> None:
     page = computed.path(f"results/{RESULTS}report.html").read_text()
     for name in FIGURES:
