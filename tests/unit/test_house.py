@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from spinepipe.jobs.digest import closure
+from spinepipe.jobs.code import closure
 from spinepipe.studies.registry import kind_names, kind_of, place_of
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 TOY = Path(__file__).parents[1] / "cases" / "toy_kind"
 DIGESTS = """
-from spinepipe.jobs.digest import code_digest
+from spinepipe.jobs.code import code_digest
 from spinepipe.studies.registry import kind_of, place_of
 for kind in ("joint_pose_sensitivity", "cohort_stiffness"):
     for job in kind_of(kind).jobs:

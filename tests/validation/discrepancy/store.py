@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.digest import code_digest, value_digest
+from spinepipe.jobs.code import code_digest
+from spinepipe.jobs.digest import value_digest
 from tests.validation.discrepancy.row import Row
 from tests.validation.discrepancy.targets import Target
 
