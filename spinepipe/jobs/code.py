@@ -130,7 +130,7 @@ def _read(module: str, path: Path) -> _File:
 @cache
 def _known() -> dict[str, list[Any]]:
     """What was known of files when the last process ended, by this version of Python."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, TypeError, KeyError):
         kept = json.loads(_KEPT.read_text("utf-8"))
         if kept["python"] == sys.version:
             return dict(kept["files"])
