@@ -20,6 +20,9 @@ JOB_FOLDERS = ("jobs", "bootstrap", "calibrations", "methods", "precision")
 # Appended to the ranking of the copied package: another second set, all others the same.
 OTHER_RANKING = """
 
+import json
+from pathlib import Path
+
 _run = run
 
 
