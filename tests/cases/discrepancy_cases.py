@@ -40,6 +40,8 @@ _NAMED = {
     "name": "neutral_zone",
     "kind": "joint law",
     "scope": _SCOPE,
+    "variant": {"coordinate": "extension"},
+    "spread": "one joint",
     "parameters": [
         {"name": "half_width", "value": 1.55, "unit": "deg", "ci95": [1.42, 1.69]},
         {"name": "stiffness_ratio", "value": 0.21, "unit": "", "ci95": [0.17, 0.26]},
@@ -86,7 +88,7 @@ _COMMON = {
         {"name": name, "gap": round(0.15 + 0.3 * absorbed, 2)}
         for name, (_, absorbed, _) in EFFECTS.items()
     ],
-    "unknown": {"where": "", "shape": ""},
+    "unknown": None,
     "suspected_data_errors": [],
     "why": "",
     "threshold": {"log_evidence": 6.2, "false_alarm": 0.01, "draws": 500},
@@ -115,22 +117,13 @@ VERDICTS: dict[str, dict[str, Any]] = {
         "verdict": "NAMED",
         "effects": [_NAMED],
         "why": "the neutral zone beats every rival by more than the margin",
-        "detected_from": "flexion",
     },
     "NULL": _COMMON | {"verdict": "NULL"},
     "SET": _COMMON
     | _OPEN
     | {
         "verdict": "SET",
-        "candidates_in_set": [
-            _NAMED,
-            {
-                "name": "nonlinear_stiffening",
-                "kind": "joint law",
-                "scope": _SCOPE,
-                "log_evidence": 86.5,
-            },
-        ],
+        "candidates_in_set": ["neutral_zone", "nonlinear_stiffening"],
         "suspected_data_errors": [
             {
                 "where": "specimen b, flexion, cycle 2, L3L4",
@@ -151,8 +144,9 @@ VERDICTS: dict[str, dict[str, Any]] = {
     | {
         "verdict": "UNKNOWN",
         "unknown": {
-            "where": "L4L5, flexion-extension, in flexion above 5 N m",
+            "where": "L4L5, extension, test flexion (gap 9.3)",
             "shape": "one side only, grows with the cube of the angle",
+            "reason": "no_known_effect",
         },
         "gap": {
             **_OPEN["gap"],

@@ -34,12 +34,20 @@ from spinepipe.studies.discrepancy.findings import findings, headline, how_sure,
 from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import Answer, Estimate, verdict_of
+from spinepipe.studies.discrepancy.verdict import (
+    Answer,
+    Estimate,
+    Reason,
+    Verdict,
+    plain_data,
+    verdict_of,
+)
 from spinepipe.studies.discrepancy.words import estimate_of, readable, value_of
 from spinepipe.studies.read import check
 from spinepipe.tables import Tables
 
 ROOT = Path(__file__).resolve().parents[3]
+NOWHERE = pd.DataFrame()
 FIGURES = [figure.name for figure in KIND.figures]
 
 
@@ -155,10 +163,10 @@ def test_a_look_in_the_place_of_an_effect_is_no_further_panel() -> None:
 
 
 def test_names_values_and_units_read_as_words() -> None:
-    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", 16.26, 19.1)
+    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", (16.26, 19.1))
     assert estimate_of(growth) == "growth (L4L5, s01) 17.7 1/rad² (95 % interval 16.3 to 19.1)"
     assert value_of(growth) == "17.7 [16.3, 19.1]"
-    assert value_of(Estimate("gap", 0.0, "deg", 0.0, 0.1, at_bound=True)) == "0, at its bound"
+    assert value_of(Estimate("gap", 0.0, "deg", (0.0, 0.1), at_bound=True)) == "0, at its bound"
     assert plain("flexion_extension_asymmetry") == "flexion–extension asymmetry"
     assert readable("marker_bias: try base per_joint") == "marker bias: try base per_joint"
 
@@ -183,16 +191,16 @@ HEADLINES = {
     "NAMED": "The model lacks a neutral zone at L4L5, in flexion–extension.",
     "NULL": "Nothing is missing above the noise. An effect would have been named from a gap of "
     "0.19 noise SD (the easiest to see) to 0.35 (the hardest).",
-    "SET": "One of these is missing, at L4L5, in flexion–extension, and these tests cannot tell "
-    "which: a neutral zone or nonlinear stiffening.",
+    "SET": "One of these is missing, and these tests cannot tell which: a neutral zone or "
+    "nonlinear stiffening.",
     "UNKNOWN": "Something is missing that is none of the known effects. It shows most at L4L5, "
-    "flexion-extension, in flexion above 5 N m.",
+    "flexion–extension, test flexion.",
 }
 
 
 @pytest.mark.parametrize(("answer", "words"), HEADLINES.items())
 def test_the_verdict_is_one_sentence(answer: str, words: str) -> None:
-    assert headline(verdict_of(VERDICTS[answer])) == words
+    assert headline(verdict_of(VERDICTS[answer]), frames(answer)["where"]) == words
 
 
 def test_how_sure_a_name_is() -> None:
@@ -205,12 +213,14 @@ def test_how_sure_a_name_is() -> None:
 
 
 def test_two_effects_and_a_set_beside_a_name() -> None:
-    second = {"name": "hysteresis", "scope": {"joints": ["*"], "specimens": ["a", "b"]}}
-    both = VERDICTS["NAMED"] | {"effects": [*VERDICTS["NAMED"]["effects"], second]}
-    told = headline(verdict_of(both))
+    (first,) = VERDICTS["NAMED"]["effects"]
+    scope = {"joints": ["*"], "specimens": ["a", "b"]}
+    second = first | {"name": "hysteresis", "scope": scope}
+    both = VERDICTS["NAMED"] | {"effects": [first, second]}
+    told = headline(verdict_of(both), NOWHERE)
     assert told.endswith("; and hysteresis at all joints, in specimens a and b.")
     beside = VERDICTS["SET"] | {"effects": [second], "candidates_in_set": ["creep", "marker_bias"]}
-    assert headline(verdict_of(beside)) == (
+    assert headline(verdict_of(beside), NOWHERE) == (
         "The model lacks hysteresis at all joints, in specimens a and b. Besides, one of these is "
         "missing, and these tests cannot tell which: creep or a marker bias."
     )
@@ -219,7 +229,7 @@ def test_two_effects_and_a_set_beside_a_name() -> None:
 def test_keys_that_are_not_there_are_not_needed() -> None:
     for answer in Answer:
         bare = verdict_of({"cohort": "c", "verdict": answer.value})
-        assert headline(bare)
+        assert headline(bare, NOWHERE)
         assert how_sure(bare) == ""
         assert findings(bare, rows_of({})) == []
         assert shown_tables(bare, rows_of({})) == []
@@ -249,7 +259,6 @@ def test_findings_have_sizes_places_and_noise() -> None:
     assert (
         "SD of one reading 0.10°, from repeated cycles, correlation from step to step 0.30" in words
     )
-    assert "Detected from: flexion." in words
     assert "What would show them: joint centre offset: measured translations" in words
     assert "agree within the noise" in told("NULL")
     assert "facet contact 0.20" in told("NULL")  # 0.15 + 0.3 * 0.18, rounded
@@ -292,13 +301,19 @@ def test_tables_of_the_page_hold_the_verdict() -> None:
 
 
 def test_the_nearest_effect_of_something_unknown_is_told_but_not_named() -> None:
-    shape = VERDICTS["UNKNOWN"]["unknown"]["shape"]
-    words = told("UNKNOWN", why=f"a discrepancy that no known effect explains: {shape}")
-    assert "Nearest known effect: neutral zone, log evidence 88.0." in words
-    assert "Nearest" not in told("UNKNOWN", why="the data look wrong")
-    place = {"where": "L5S1, right bending, test flexion_extension (gap 4.5); L4L5", "shape": ""}
-    unknown = verdict_of(VERDICTS["UNKNOWN"] | {"unknown": place})
-    assert headline(unknown).endswith("at L5S1, lateral bending, test flexion–extension.")
+    unknown = VERDICTS["UNKNOWN"]["unknown"]
+    assert "Nearest known effect: neutral zone, log evidence 88.0." in told("UNKNOWN")
+    for reason in set(Reason) - {Reason.NO_KNOWN_EFFECT}:
+        assert "Nearest" not in told("UNKNOWN", unknown=unknown | {"reason": reason.value})
+
+
+def test_what_is_unknown_shows_most_where_the_gap_is_largest() -> None:
+    where = frames("UNKNOWN")["where"]
+    moved = {"L4L5": "L5S1", "extension": "right_bending", "flexion": "flexion_extension"}
+    told = headline(verdict_of(VERDICTS["UNKNOWN"]), where.replace(moved))
+    assert told.endswith("at L5S1, lateral bending, test flexion–extension.")
+    within = where.assign(gap_low=0.0)
+    assert "most" not in headline(verdict_of(VERDICTS["UNKNOWN"]), within)
 
 
 def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
@@ -307,10 +322,10 @@ def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
         "cohort": "c",
         "verdict": "UNKNOWN",
         "why": why,
-        "unknown": {"where": "no start has a pose", "shape": "not known"},
+        "unknown": {"where": "no start has a pose", "shape": "not known", "reason": "no_base"},
     }
     verdict = verdict_of(data)
-    assert headline(verdict).startswith("Nothing can be said of what is missing")
+    assert headline(verdict, NOWHERE).startswith("Nothing can be said of what is missing")
     assert why in how_sure(verdict)
     empty = {name: rows.iloc[:0] for name, rows in frames("NULL").items()}
     assert findings(verdict, rows_of(empty)) == []
@@ -319,20 +334,32 @@ def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
 
 
 def test_no_name_is_not_always_an_unknown_effect() -> None:
-    shape = {"unknown": {"where": "no single place stands out", "shape": "load over bending"}}
-    stiffness = verdict_of(
-        VERDICTS["UNKNOWN"] | shape | {"why": "level_dependence is no more: try base per_joint"}
-    )
-    assert headline(stiffness) == "Something is missing, but no name is believed."
+    def of(reason: str, **more: Any) -> Verdict:
+        unknown = {"where": "anywhere", "shape": "load over bending", "reason": reason}
+        return verdict_of(VERDICTS["UNKNOWN"] | {"unknown": unknown} | more)
+
+    why = "level_dependence is no more: try base per_joint"
+    stiffness = of("stiffness_of_each_joint", why=why)
+    assert headline(stiffness, NOWHERE) == "Something is missing, but no name is believed."
     assert "Why no name: level dependence is no more: try base per_joint." in how_sure(stiffness)
     assert "load over bending" not in how_sure(stiffness)
-    wrong = {
-        "why": "the data look wrong, so nothing is named: a sign (L4L5)",
-        "suspected_data_errors": [{"where": "L4L5", "what": "a sign", "evidence": ""}],
-    }
-    suspected = verdict_of(VERDICTS["UNKNOWN"] | shape | wrong)
-    assert headline(suspected) == "The data look wrong, so nothing is named: a sign (L4L5)."
+    errors = [{"where": "L4L5", "what": "a sign", "evidence": ""}]
+    why = "the data look wrong, so nothing is named: a sign (L4L5)"
+    suspected = of("data_errors", why=why, suspected_data_errors=errors)
+    assert headline(suspected, NOWHERE) == (
+        "The data look wrong, so nothing is named: a sign (L4L5)."
+    )
     assert "load over bending" not in how_sure(suspected)
+    for reason in ("a_part_stays", "most_stays"):
+        stays = of(reason, why="much stays")
+        assert headline(stays, NOWHERE).endswith("none of the known effects.")
+        assert "Why no name: much stays. Its shape: load over bending." in how_sure(stays)
+
+
+@pytest.mark.parametrize("answer", VERDICTS)
+def test_what_is_written_is_read(answer: str) -> None:
+    verdict = verdict_of(VERDICTS[answer])
+    assert verdict_of(json.loads(json.dumps(plain_data(verdict)))) == verdict
 
 
 def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:

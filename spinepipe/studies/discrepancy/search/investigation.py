@@ -11,13 +11,11 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
 from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters, trials
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.noise import (
-    DECLARED,
     Noise,
     estimated_noise,
     without_outliers,
@@ -28,6 +26,7 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, spec
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
 
 PER_SPECIMEN = "per_specimen"
