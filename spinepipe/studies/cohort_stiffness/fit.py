@@ -15,6 +15,7 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
     SHARED_ERROR,
     criteria,
     independent,
+    joined,
     no_fit,
     stiffness_rows,
 )
@@ -28,13 +29,11 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
-IN_FOLDERS = ("specimen", "representation", "fitted_to")
-"""Columns that the folders of a job file carry."""
 
 
 def run(
@@ -124,7 +123,7 @@ def _record(problem: Problem, found: Fit) -> Row:
     several = f"{found.n_optima} optima: the answer depends on the start"
     alone = independent(problem)
     shared = "" if alone or cost is None else SHARED_ERROR
-    notes = [found.message, several if found.n_optima > 1 else "", shared]
+    notes = found.message, several if found.n_optima > 1 else "", shared
     return {
         "readings": readings,
         "unknowns": unknowns,
@@ -135,7 +134,7 @@ def _record(problem: Problem, found: Fit) -> Row:
         "evaluations": found.evaluations,
         "n_optima": found.n_optima,
         "status": found.status.value,
-        "message": "; ".join(note for note in notes if note),
+        "message": joined(*notes),
     }
 
 

@@ -25,15 +25,10 @@ OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""
 
 _ANALYSES = (
-    Job("mae", "ranking:mae", ("errors",), ("mae",)),
-    Job("ranking", "ranking:ranking", ("errors", "fits", "pooling"), ("ranking",)),
+    Job("mae", "", ("errors",), ("mae",)),
+    Job("ranking", "", ("errors", "fits", "pooling"), ("ranking",)),
     Job("statistics", "significance", ("errors", "fits"), ("statistics",)),
-    Job(
-        "findings",
-        "claims_of_stiffness",
-        ("stiffness", "errors", "statistics", "pooling"),
-        ("findings",),
-    ),
+    Job("findings", "", ("stiffness", "errors", "statistics", "pooling"), ("findings",)),
     Job(
         "against_gould_2024b",
         "gould_2024b.against",

@@ -1,7 +1,4 @@
-"""The study kind that asks how stiffness differs between specimens, levels and load cases.
-
-What fits of a cohort study are fitted to, and what that is called in files and tables.
-"""
+"""What a cohort study asks, and what its fits are fitted to under which name."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal

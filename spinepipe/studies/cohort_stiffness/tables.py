@@ -1,9 +1,4 @@
-"""Tables of studies of kind cohort_stiffness that are made of job files: fits and their errors.
-
-Columns that tables of studies of kind cohort_stiffness share.
-
-Tables of studies of kind cohort_stiffness that are computed from its fits and their errors.
-"""
+"""Tables of studies of kind cohort_stiffness: fits, their errors, and what follows from them."""
 
 from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
@@ -405,6 +400,9 @@ FINDINGS = Table(
 )
 
 AGAINST_GOULD_2024B = against_paper("against_gould_2024b")
+
+IN_FOLDERS = ("specimen", "representation", "fitted_to")
+"""Columns that the folders of a file of one fit carry."""
 
 TABLES = (
     *(STIFFNESS, FITS, ERRORS, POOLING, SIGN_CHECKS),

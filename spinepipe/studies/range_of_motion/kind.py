@@ -112,7 +112,7 @@ KIND = Kind(
             header_alone=True,
         ),
         Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES)),
-        Job("rom_summary", "analyse:summary", ("range_of_motion",), ("rom_summary",)),
-        Job("rom_variance", "analyse:variance", ("range_of_motion",), ("rom_variance",)),
+        Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
+        Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),
 )

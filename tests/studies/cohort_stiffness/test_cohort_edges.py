@@ -29,9 +29,7 @@ from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
 from spinepipe.studies import read as studies
-from spinepipe.studies.cohort_stiffness import claims_of_stiffness as findings
-from spinepipe.studies.cohort_stiffness import literature, pool, ranking
-from spinepipe.studies.cohort_stiffness import ranking as mae
+from spinepipe.studies.cohort_stiffness import findings, literature, mae, pool, ranking
 from spinepipe.studies.cohort_stiffness import significance as statistics
 from spinepipe.studies.cohort_stiffness.kind import KIND, CohortLayout
 from spinepipe.studies.cohort_stiffness.predict import predicted
@@ -667,8 +665,8 @@ def analysed(project: Written) -> Tables:
 
 
 JOBS = {
-    "mae": mae.mae,
-    "ranking": ranking.ranking,
+    "mae": mae.run,
+    "ranking": ranking.run,
     "statistics": statistics.run,
     "findings": findings.run,
 }

@@ -16,10 +16,12 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion.analyse import read_grid, summary_rows, variance_rows
 from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
+from spinepipe.studies.range_of_motion.grid import read_grid
 from spinepipe.studies.range_of_motion.page import document, findings
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.summary import summary_rows
+from spinepipe.studies.range_of_motion.variance import variance_rows
 from spinepipe.studies.read import check
 from spinepipe.tables import Tables, read_frame
 
