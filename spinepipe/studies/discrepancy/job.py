@@ -36,10 +36,9 @@ from spinepipe.studies.discrepancy.search.hypothesis import BUSHING, Form
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
-    declared_sd,
+    Prepared,
     investigate,
-    measured,
-    with_noise,
+    prepared,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import fitted_values, model_file
@@ -134,76 +133,63 @@ def run(
 def searched(study: Discrepancy, cohort: Cohort, root: str, run: Run) -> Results:
     """All that the files of a study hold, whether or not its base has a fit."""
     file = None if study.base.model is None else read_model(Path(root) / study.base.model)
+    ready = prepared(study, cohort, file)
     try:
-        ended = investigate(study, cohort, file, run)
+        ended = investigate(ready, run)
     except NoBase as trouble:
-        return _without_base(study, cohort, file, trouble)
-    return _with_base(study, cohort, file, ended, run)
+        return _without_base(ready, trouble)
+    return _with_base(ready, ended, run)
 
 
-def _without_base(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, trouble: NoBase
-) -> Results:
-    """The results of a study whose base has no fit.
-
-    Parameters
-    ----------
-    file : the model file that the study starts from, if it does.
-    trouble : where the fit failed, and why.
-    """
-    readings = measured(study, cohort)
-    _, noise = with_noise(study, cohort, readings)
-    errors = before_a_fit(readings, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
+def _without_base(ready: Prepared, trouble: NoBase) -> Results:
+    """The results of a study whose base has no fit; ``trouble`` says where and why."""
+    cohort, noise = ready.cohort, ready.noise
+    errors = before_a_fit(ready.measured, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
     verdict = Verdict(
         cohort=cohort.name,
         verdict=Answer.UNKNOWN,
         why=f"the base model cannot be fitted: {trouble}",
         noise=_noise(noise),
         unknown=Unknown(str(trouble), NO_SHAPE, Reason.NO_BASE),
-        suspected_data_errors=tuple(errors),
-        threshold=Threshold(false_alarm=study.false_alarm),
+        suspected_data_errors=errors,
+        threshold=Threshold(false_alarm=ready.study.false_alarm),
     )
     return Results(
         verdict=verdict,
         rows={},
-        model_base=_start_model(study, cohort, file, "base"),
-        model_with_effects=_start_model(study, cohort, file, "with_effects"),
+        model_base=_start_model(ready, "base"),
+        model_with_effects=_start_model(ready, "with_effects"),
     )
 
 
-def _start_model(study: Discrepancy, cohort: Cohort, file: ModelFile | None, of: str) -> ModelFile:
+def _start_model(ready: Prepared, of: str) -> ModelFile:
     """The model where the fit started, under a name that says so."""
+    study, file = ready.study, ready.file
     start = dict(zip(STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True))
     bushing = EffectEntry(effect=BUSHING, values=(Values.model_validate(start),))
     effects = file.effects if file is not None else (bushing,)
-    return ModelFile(
-        model=f"{study.study}_{of}_{STARTED_FROM}", cohort=cohort.name, effects=effects
-    )
+    name = f"{study.study}_{of}_{STARTED_FROM}"
+    return ModelFile(model=name, cohort=ready.cohort.name, effects=effects)
 
 
-def _with_base(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, ended: Investigation, run: Run
-) -> Results:
-    """The results of an investigation, and what the tests could tell apart.
-
-    Parameters
-    ----------
-    file : the model file that the study starts from, if it does.
-    """
-    needed = ended.found.stages[0].screen.threshold + study.margin
-    declared = declared_sd(study, cohort)
-    told = told_apart(ended.grounds, ended.rules.trials, needed, declared, study.seed, run)
+def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
+    """The results of an investigation, and what the tests could tell apart."""
+    needed = ended.found.stages[0].screen.threshold + ended.rules.margin
+    seed, trials = ended.rules.seed, ended.rules.trials
+    told = told_apart(ended.grounds, trials, needed, ready.declared, seed, run)
     ended = ended.as_told()
     return Results(
-        verdict=_verdict(study, cohort, ended, told),
-        rows=_rows(cohort, ended, told),
-        model_base=_model(study, cohort, ended.grounds.fit, file, "base"),
-        model_with_effects=_model(study, cohort, ended.found.final.fit, file, "with_effects"),
+        verdict=_verdict(ready, ended, told),
+        rows=_rows(ready.cohort.joint_names, ended, told),
+        model_base=_model(ready, ended.grounds.fit, "base"),
+        model_with_effects=_model(ready, ended.found.final.fit, "with_effects"),
     )
 
 
-def _rows(cohort: Cohort, ended: Investigation, told: ToldApart) -> Mapping[str, Sequence[Row]]:
-    joints, found, proof = cohort.joint_names, ended.found, ended.proof
+def _rows(
+    joints: Sequence[str], ended: Investigation, told: ToldApart
+) -> Mapping[str, Sequence[Row]]:
+    found, proof = ended.found, ended.proof
     return {
         GAP.name: gap_rows(found, joints, held_out_readings(proof)),
         CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
@@ -213,16 +199,14 @@ def _rows(cohort: Cohort, ended: Investigation, told: ToldApart) -> Mapping[str,
     }
 
 
-def _model(
-    study: Discrepancy, cohort: Cohort, fit: JointFit, file: ModelFile | None, of: str
-) -> ModelFile:
+def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
+    file = ready.file
     base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
-    return model_file(fit, f"{study.study}_{of}", cohort.name, base)
+    return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base)
 
 
-def _verdict(
-    study: Discrepancy, cohort: Cohort, investigation: Investigation, told: ToldApart
-) -> Verdict:
+def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> Verdict:
+    cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
     final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
     screen = found.stages[0].screen
@@ -248,7 +232,7 @@ def _verdict(
         smallest_detectable=told.smallest_detectable,
         unknown=_unknown(found, ended, final),
         suspected_data_errors=investigation.errors,
-        threshold=Threshold(screen.threshold, study.false_alarm, screen.draws),
+        threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
         families=told.families,
     )
 
