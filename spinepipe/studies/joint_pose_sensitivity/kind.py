@@ -332,7 +332,7 @@ _ANALYSES = (
     _analysis("counts", "success:counts", ("success", "bootstrap")),
     _analysis("summary", "summary", (*_FITTED, "bootstrap", "best.json")),
     _analysis("statistics", "significance", (*_FITTED, "best.json")),
-    _analysis("agreement", "errors", ("simulations", "success")),
+    _analysis("agreement", "agreement", ("simulations", "success")),
     _analysis(
         "two_factor",
         "two_factor",

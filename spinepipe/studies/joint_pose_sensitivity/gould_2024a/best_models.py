@@ -19,17 +19,16 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     MEASURED_JOINTS,
     MOTION_KEY,
-    MOTION_UNIT,
     NO_RAW_DATA,
     PAPER,
     STIFFNESS_KEY,
-    STIFFNESS_UNIT,
     measured,
     summary_cell,
     summary_largest,
     summary_median,
     summary_percent,
 )
+from spinepipe.units import COORDINATE_UNITS, STIFFNESS_UNITS
 
 _BEST = PAPER["best_model"]
 _CALIBRATED = "calibrated"
@@ -45,14 +44,14 @@ def claims_of_ten_best() -> Iterator[Claim]:
             where = {**BEST, "quantity": "error", "joint": joint, "coordinate": name}
             printed = PAPER["ten_best_error"][joint]
             numbers = {kind: float(printed[kind][MOTION_KEY[name]]) for kind in printed}
-            words, unit = f"{name} error at {joint}", MOTION_UNIT[name]
+            words, unit = f"{name} error at {joint}", COORDINATE_UNITS[name]
             yield from _cells(f"ten_best.error.{joint}.{name}", words, unit, numbers, where)
         where = {**BEST, "quantity": "stiffness", "joint": "*", "coordinate": name}
         printed = PAPER["ten_best_stiffness"]
         numbers = {
             kind: float(printed[kind][STIFFNESS_KEY[name]]) for kind in ("median", "iqr", "range")
         }
-        unit = STIFFNESS_UNIT[name]
+        unit = STIFFNESS_UNITS[name]
         yield from _cells(f"ten_best.stiffness.{name}", f"{name} stiffness", unit, numbers, where)
     yield from _percent_of_median()
     yield from _in_discussion()
@@ -115,7 +114,7 @@ def _in_discussion() -> Iterator[Claim]:
             f"discussion.ten_best.{name}.{kind}",
             "section 4",
             f"{kind} of {name} error of the ten best, larger of two joints",
-            MOTION_UNIT[name],
+            COORDINATE_UNITS[name],
             paper,
             exactly(paper),
             _larger(kind, name),
@@ -137,7 +136,7 @@ def claims_of_best_model() -> Iterator[Claim]:
             f"best_model.stiffness.{name}",
             "section 3.3",
             f"{name} stiffness of the best model",
-            STIFFNESS_UNIT[name],
+            STIFFNESS_UNITS[name],
             paper,
             within_width(paper, spread, "range over the ten best"),
             _stiffness(name),
@@ -149,7 +148,7 @@ def claims_of_best_model() -> Iterator[Claim]:
             f"best_model.error.{name}",
             "section 3.3",
             f"{name} error of the best model, larger of two joints",
-            MOTION_UNIT[name],
+            COORDINATE_UNITS[name],
             paper,
             no_larger(paper),
             _error(name, MEASURED_JOINTS),

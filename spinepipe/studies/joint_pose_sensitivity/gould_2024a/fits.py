@@ -17,17 +17,16 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     MEASURED_JOINTS,
     MOTION_KEY,
-    MOTION_UNIT,
     NO_RAW_DATA,
     PAPER,
     STIFFNESS_KEY,
-    STIFFNESS_UNIT,
     measured,
     summary_cell,
     summary_largest,
     summary_median,
     summary_value,
 )
+from spinepipe.units import COORDINATE_UNITS, STIFFNESS_UNITS
 
 _SOURCE = {"part": "damping_bootstrap", "loading": "equilibrium", "dataset": "all"}
 """Fits in the cohort's own poses from the study's start; at rest damping does not enter."""
@@ -89,7 +88,7 @@ def claims_of_nominal() -> Iterator[Claim]:
             f"nominal_model.{name}.error",
             "section 3.1",
             f"{name} error in the cohort's own joint poses, larger of two joints",
-            MOTION_UNIT[name],
+            COORDINATE_UNITS[name],
             paper,
             factor_of_two(paper),
             summary_largest("median", MEASURED_JOINTS, **where),
@@ -115,7 +114,7 @@ def claims_of_nominal() -> Iterator[Claim]:
 def _implied_nominal(error: float, percent: float, name: str) -> str:
     parts = [f"{100.0 * error / measured(joint, name):.1f}" for joint in MEASURED_JOINTS]
     return (
-        f"{error:g} {MOTION_UNIT[name]} are {' or '.join(parts)} % of the printed motion, "
+        f"{error:g} {COORDINATE_UNITS[name]} are {' or '.join(parts)} % of the printed motion, "
         f"not {percent:g} %"
     )
 
@@ -140,7 +139,7 @@ def _cell(what: str, loading: str, joint: str, name: str) -> Iterator[Claim]:
         f"{key}.median",
         TABLE[what],
         f"median {words}, over {SETS[what]}",
-        MOTION_UNIT[name],
+        COORDINATE_UNITS[name],
         median,
         within_width(median, width, "range"),
         summary_median(**where),
@@ -150,7 +149,7 @@ def _cell(what: str, loading: str, joint: str, name: str) -> Iterator[Claim]:
         f"{key}.range",
         TABLE[what],
         f"range of {words}, over {SETS[what]}",
-        MOTION_UNIT[name],
+        COORDINATE_UNITS[name],
         width,
         factor_of_two(width),
         summary_cell("range", **where),
@@ -256,7 +255,7 @@ def _stiffness_ranges(name: str) -> Iterator[Claim]:
             f"stiffness_range.{key}.{name}",
             "section 3.1",
             f"range of fitted {name} stiffness {words}, quasi-static",
-            STIFFNESS_UNIT[name],
+            STIFFNESS_UNITS[name],
             paper,
             factor_of_two(paper),
             _stiffness_range(what, dataset, name),

@@ -19,7 +19,6 @@ from spinepipe.comparison.claim import (
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     JOINTS,
     MOTION_KEY,
-    MOTION_UNIT,
     PAPER,
     REDUCED,
     SAMPLES,
@@ -27,7 +26,7 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     summary_median,
     summary_value,
 )
-from spinepipe.units import ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATE_UNITS, ROTATIONS, TRANSLATIONS
 
 DATASETS = {"complete": ("all", SAMPLES), "reduced": ("reduced", REDUCED)}
 """The paper's word to the dataset of the summary and the paper's number of poses."""
@@ -80,7 +79,7 @@ def _coordinate(quantity: str, table: str, dataset: str, joint: str, name: str) 
         **{"part": "poses", "loading": "equilibrium", "dataset": ours},
         **{"quantity": quantity, "joint": joint, "coordinate": name},
     }
-    key, unit = f"joint_{quantity}.{dataset}.{joint}.{name}", MOTION_UNIT[name]
+    key, unit = f"joint_{quantity}.{dataset}.{joint}.{name}", COORDINATE_UNITS[name]
     free = quantity == "orientation" and joint not in END_JOINTS  # nothing was left to choose
     words = f"of {name} {quantity} of {joint}, {dataset} dataset"
     yield Claim(

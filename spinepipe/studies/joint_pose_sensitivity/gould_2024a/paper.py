@@ -10,9 +10,7 @@ from spinepipe.comparison.claim import NotComputed, Ours, Run
 from spinepipe.units import (
     COORDINATE_COLUMNS,
     COORDINATES,
-    ROTATIONS,
     STIFFNESS_COLUMNS,
-    TRANSLATIONS,
 )
 
 PAPER = published("gould_2024a")
@@ -30,13 +28,6 @@ JOINTS = ("L1L2", "L2L3", "L3L4")
 
 FITTED = ("anterior", "superior", "extension")
 """Directions whose stiffness is fitted and whose error is reported."""
-
-MOTION_UNIT = {**dict.fromkeys(TRANSLATIONS, "mm"), **dict.fromkeys(ROTATIONS, "deg")}
-
-STIFFNESS_UNIT = {
-    **dict.fromkeys(TRANSLATIONS, "N/m"),
-    **dict.fromkeys(ROTATIONS, "N m/rad"),
-}
 
 MOTION_KEY = dict(zip(COORDINATES, COORDINATE_COLUMNS, strict=True))
 

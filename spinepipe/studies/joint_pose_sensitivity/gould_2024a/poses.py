@@ -22,19 +22,17 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     JOINTS,
     MEASURED_JOINTS,
-    MOTION_UNIT,
     NO_RAW_DATA,
     P_BELOW,
     PAPER,
     REDUCED,
     STIFFNESS_KEY,
-    STIFFNESS_UNIT,
     summary_cell,
     summary_median,
     summary_percent,
     summary_value,
 )
-from spinepipe.units import ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATE_UNITS, ROTATIONS, STIFFNESS_UNITS, TRANSLATIONS
 
 _CONFOUNDED = (
     "which errors remain at a best fit hangs on measured motion, weights and joint frames "
@@ -83,7 +81,7 @@ def claims_of_pose_sampling() -> Iterator[Claim]:
             f"reduced.largest_error.{name_of}",
             "section 3.3, Fig 7",
             f"largest error of a {name_of} in the reduced dataset",
-            MOTION_UNIT[names[0]],
+            COORDINATE_UNITS[names[0]],
             bound,
             at_most(bound),
             partial(_largest, names),
@@ -106,7 +104,7 @@ def claims_of_pose_sampling() -> Iterator[Claim]:
 def _stiffness(name: str) -> Iterator[Claim]:
     low, middle, high = _quartiles(name)
     where = {**REDUCED_SET, "quantity": "stiffness", "joint": "*", "coordinate": name}
-    unit, reason = STIFFNESS_UNIT[name], _ARM if name == "extension" else NO_RAW_DATA
+    unit, reason = STIFFNESS_UNITS[name], _ARM if name == "extension" else NO_RAW_DATA
     yield Claim(
         f"reduced.stiffness.{name}.median",
         "section 3.3, Fig 8",
