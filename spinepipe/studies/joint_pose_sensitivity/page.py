@@ -15,13 +15,13 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     TREE,
     importance_by_factor,
 )
 from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
@@ -46,7 +46,7 @@ def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, resul
 
 def _false(cohort: Cohort, results: Results) -> Iterator[str]:
     """How the sentences begin that speak of something else than this study shows."""
-    if paper_of(cohort.name, OF_JOINT_POSE) is None:
+    if not GOULD_2024A.stands_for(cohort.name):
         yield "For the cohort rebuilt from"
     several = len(cohort.specimen_names) > 1
     yield "With one specimen," if several else "With several specimens,"

@@ -29,10 +29,10 @@ from spinepipe.report.panels import (
     mark_start,
     sections,
 )
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BLACK, GREY, OURS, TALLEST_MM, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
@@ -67,7 +67,7 @@ def write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float)
 
 def _paper(cohort: str) -> Mapping[str, Any]:
     """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
-    found = paper_of(cohort, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort)
     return {} if found is None else found[1]
 
 
@@ -282,7 +282,7 @@ def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
 
 def _bars(cohort: str) -> dict[str, str]:
     bars = {OURS: "fits in the cohort's own joint poses"}
-    paper = paper_of(cohort, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort)
     return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
 
 

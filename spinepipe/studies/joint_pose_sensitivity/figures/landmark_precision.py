@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain, head
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 
@@ -192,7 +192,7 @@ def _mark_required(
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
     """The SD that the paper reports for its landmarks."""
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     if paper is None:
         return
     sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
@@ -228,6 +228,6 @@ def _words(
         for _, row in both.iterrows()
         if specimens == 1
     ]
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     resultant = "the paper's SD is the largest resultant, not per axis" if paper else ""
     return "; ".join(part for part in (poses, lines, shown, *told, resultant) if part) + "."

@@ -33,10 +33,10 @@ from spinepipe.report.panels import (
     row_height,
     rows_of,
 )
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
@@ -84,7 +84,7 @@ def stiffness_figure(
         _draw(panel, axis, rows, solved)
     found = len(solved[["specimen", "pose"]].drop_duplicates())
     bars = {OURS: "calibrated, over all sampled joint poses"}
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     if paper:
         bars[THEIRS] = f"{paper[0]}, {paper[1]['counts']['pose_samples_reduced']} poses"
     words = _words(study.calibration.bound_factor, found, poses, rows)
@@ -108,7 +108,7 @@ def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Pan
 
 
 def _paper(cohort: Cohort, column: str) -> Quartiles | None:
-    found = paper_of(cohort.name, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort.name)
     if found is None:
         return None
     reduced = found[1]["reduced_stiffness"]

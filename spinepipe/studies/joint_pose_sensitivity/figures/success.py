@@ -15,10 +15,10 @@ from statsmodels.stats.proportion import proportion_confint
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import STRIP_KEY, draw_interval, draw_strip, finite
 from spinepipe.report.panels import explain, head, log_ticks
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number, percent, tick
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 
@@ -79,7 +79,7 @@ def method_name(name: str) -> str:
 
 def _paper(cohort: Cohort) -> tuple[str, int, int] | None:
     """Name, successful fits and fits of the paper."""
-    found = paper_of(cohort.name, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort.name)
     if found is None:
         return None
     counts = found[1]["counts"]
