@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.status import Status
+from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.inputs import start_stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
@@ -39,7 +39,7 @@ def _judged(
     near = pd.DataFrame(near_start(values, start[:, free], rule.near_start_percent))
     above = pd.DataFrame(above_start(values, start[:, free], rule.outlier_times_start))
     rows = fits[keys].reset_index(drop=True)
-    rows["solved"] = fits["status"].isin([s.value for s in Status if s.usable]).to_numpy()
+    rows["solved"] = fits["status"].isin(USABLE).to_numpy()
     rows["near_start_any"], rows["near_start_all"] = near.any(axis=1), near.all(axis=1)
     rows["outlier"] = above.any(axis=1)
     how = {"solved": "all", "near_start_any": "any", "near_start_all": "all", "outlier": "any"}

@@ -7,7 +7,7 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.jobs.digest import provenance
-from spinepipe.status import Status
+from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap, judge_poses
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
@@ -83,7 +83,7 @@ def count_by_method(fits: pd.DataFrame, failed_when: str) -> list[dict[str, Any]
 
 
 def _counted(fits: pd.DataFrame, failed_when: str) -> dict[str, Any]:
-    solved = fits["status"].isin([status.value for status in Status if status.usable])
+    solved = fits["status"].isin(USABLE)
     near = {how: fits[f"near_start_{how}"].eq(True) & solved for how in ("any", "all")}
     successful = int((solved & ~near[failed_when]).sum())
     low, high = proportion_confint(successful, len(fits), method="wilson")

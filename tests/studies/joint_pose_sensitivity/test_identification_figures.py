@@ -14,7 +14,7 @@ from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM
 from spinepipe.report.words import number
 from spinepipe.studies import joint_pose_sensitivity
-from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_errors
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_paper
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     importance_by_factor,
 )
@@ -157,13 +157,13 @@ def test_published_median_and_range_are_drawn(
 ) -> None:
     axis = Figure().subplots()
     row = pd.DataFrame([{"bootstrap": sampled, "loading": loading, "joint": joint}])
-    draw_errors(axis, "palanca_l1l4", name, row, 0.0)
+    draw_paper(axis, "palanca_l1l4", name, row, 0.0)
     line, tick, diamond = axis.lines
     np.testing.assert_allclose(line.get_xdata(), ends, atol=1e-12)
     assert float(tick.get_xdata()[0]) == float(diamond.get_xdata()[0]) == median
     other = Figure().subplots()
-    draw_errors(other, "straight", name, row, 0.0)
-    draw_errors(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
+    draw_paper(other, "straight", name, row, 0.0)
+    draw_paper(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
     assert not other.lines, "no paper, or a loading that the paper does not have"
 
 

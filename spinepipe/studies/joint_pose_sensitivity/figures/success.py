@@ -1,7 +1,4 @@
-"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by.
-
-Ways of fitting that were refused, and why.
-"""
+"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,18 +17,6 @@ from spinepipe.report.words import count, number, percent, tick
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-
-
-def refused(fits: pd.DataFrame) -> dict[str, str]:
-    """Message of each method of which every fit was refused, in the order of the table."""
-    if fits.empty:
-        return {}
-    return {
-        str(method): "; ".join(dict.fromkeys(rows["message"]))
-        for method, rows in fits.groupby("method", sort=False)
-        if (rows["status"] == Status.REFUSED.value).all()
-    }
-
 
 _ROW_MM, _AROUND_MM = 12.0, 36.0
 _LEAST = 1e-16
@@ -70,6 +55,17 @@ def success_figure(
         bars[THEIRS] = f"{paper[0]}, {paper[2]} poses"
     explain(figure, bars, _words(study, len(set(shares["specimen"])), why))
     return figure
+
+
+def refused(fits: pd.DataFrame) -> dict[str, str]:
+    """Message of each method of which every fit was refused, in the order of the table."""
+    if fits.empty:
+        return {}
+    return {
+        str(method): "; ".join(dict.fromkeys(rows["message"]))
+        for method, rows in fits.groupby("method", sort=False)
+        if (rows["status"] == Status.REFUSED.value).all()
+    }
 
 
 def method_name(name: str) -> str:
