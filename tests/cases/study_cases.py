@@ -1,16 +1,22 @@
 """Projects of any size with results as a run would write them: tables made up, not computed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.jobs import draw
 from spinepipe.studies.joint_pose_sensitivity.kind import KIND
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
-from spinepipe.tables import Table, to_arrow, write
+from spinepipe.studies.registry import PACKAGE
+from spinepipe.tables import Table, Tables, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"
@@ -111,6 +117,14 @@ def drawn(root: Path, name: str) -> Path:
     tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
     draw.run(str(root), STUDY, name, tables, str(svg), str(png))
     return svg
+
+
+def drawing(name: str) -> Callable[[JointPoseSensitivity, Cohort, Tables], Figure]:
+    """The function that draws a figure, as the kind declares it."""
+    module, _, function = KIND.figure(name).at.partition(":")
+    found = import_module(f"{PACKAGE}.joint_pose_sensitivity.{module}")
+    draws: Callable[[JointPoseSensitivity, Cohort, Tables], Figure] = getattr(found, function)
+    return draws
 
 
 def _write(table: Table, path: Path, rows: list[dict[str, object]]) -> None:

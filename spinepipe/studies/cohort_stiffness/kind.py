@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.published import OF_COHORTS, stands_for
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -91,7 +91,7 @@ class CohortLayout(StudyFiles):
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
-        rebuilt = stands_for(cohort.name, OF_COHORTS)
+        rebuilt = GOULD_2024B.stands_for(cohort.name)
         return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt)
 
     @property

@@ -1,6 +1,5 @@
 """Figures of the study's later parts: drawn for any cohort, and their words true to the tables."""
 
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -9,18 +8,17 @@ import pytest
 from identification_cases import identification, write_table
 from matplotlib.figure import Figure
 from PIL import Image
-from study_cases import FIGURES, Size, drawn, project, results
+from study_cases import FIGURES, Size, drawing, drawn, project, results
 
 from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM
 from spinepipe.report.words import number
 from spinepipe.studies import joint_pose_sensitivity
-from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_errors
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_paper
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     importance_by_factor,
 )
 from spinepipe.studies.joint_pose_sensitivity.kind import KIND
-from spinepipe.studies.registry import PACKAGE
 from spinepipe.units import COORDINATES
 
 NEW = (
@@ -53,9 +51,7 @@ def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
     folder = Path(joint_pose_sensitivity.__file__).parent
     assert {path.stem for path in folder.glob("figures/*.rst")} == set(FIGURES)
     for figure in KIND.figures:
-        module, _, function = figure.at.partition(":")
-        found = import_module(f"{PACKAGE}.joint_pose_sensitivity.{module}")
-        assert callable(getattr(found, function)), figure.name
+        assert callable(drawing(figure.name)), figure.name
 
 
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
@@ -161,13 +157,13 @@ def test_published_median_and_range_are_drawn(
 ) -> None:
     axis = Figure().subplots()
     row = pd.DataFrame([{"bootstrap": sampled, "loading": loading, "joint": joint}])
-    draw_errors(axis, "palanca_l1l4", name, row, 0.0)
+    draw_paper(axis, "palanca_l1l4", name, row, 0.0)
     line, tick, diamond = axis.lines
     np.testing.assert_allclose(line.get_xdata(), ends, atol=1e-12)
     assert float(tick.get_xdata()[0]) == float(diamond.get_xdata()[0]) == median
     other = Figure().subplots()
-    draw_errors(other, "straight", name, row, 0.0)
-    draw_errors(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
+    draw_paper(other, "straight", name, row, 0.0)
+    draw_paper(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
     assert not other.lines, "no paper, or a loading that the paper does not have"
 
 

@@ -13,8 +13,8 @@ from study_cases import START, STUDY, TABLES, Size, project, results
 
 from spinepipe.designs import sample_log_uniform
 from spinepipe.studies.joint_pose_sensitivity import (
+    agreement,
     bootstrap,
-    errors,
     landmark_errors,
     landmark_precision,
     rank,
@@ -23,17 +23,18 @@ from spinepipe.studies.joint_pose_sensitivity import (
     summary,
     two_factor,
 )
-from spinepipe.studies.joint_pose_sensitivity.errors import (
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
+from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
     measured_coordinates,
     measured_size,
+    pose_factors,
+    pose_parameters,
     readings,
 )
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
-from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
 from spinepipe.tables import Table, read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
@@ -280,7 +281,7 @@ class Run:
                 both = self._files("variance_shares", "importance")
                 two_factor.run(self.root, STUDY, base, self.best, *both)
             case "agreement":
-                errors.run(self.root, STUDY, base, output)
+                agreement.run(self.root, STUDY, base, output)
         return read_frame(output)
 
 
