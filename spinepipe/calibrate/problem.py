@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.solvers import AtRest, Settling
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
 from spinepipe.statics import (
     Course,
     FreeParameter,
@@ -31,7 +31,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
-from spinepipe.units import BORDER_PER_SI, less_step_0, without_step_0
+from spinepipe.units import BORDER_PER_SI, less_step_0
 from spinepipe.world import Chain
 
 
@@ -78,21 +78,6 @@ def shared_sums(rows: Array, sharing: NDArray[np.int64]) -> Array:
     sums = np.zeros((group.max(initial=-1) + 1, rows.shape[1]))
     np.add.at(sums, group, rows)
     return sums[1:] if (sharing < 0).any() else sums
-
-
-@dataclass(frozen=True)
-class MeasuredCase:
-    """One cycle of one test with its measured motion.
-
-    Attributes
-    ----------
-    measured : (T, J, 6) m and rad by load step, NaN where not measured.
-    zeroed : whether the step-0 coordinates were subtracted from the measurement.
-    """
-
-    case: LoadCase
-    measured: Array
-    zeroed: bool = False
 
 
 @dataclass(frozen=True)
@@ -267,6 +252,5 @@ def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
 
 def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:
     """(T, J, 6) which readings enter the cost; the zeros that zeroing makes of step 0 are none."""
-    readings = without_step_0(measured.measured, measured.zeroed)
-    used: NDArray[np.bool_] = np.isfinite(readings) & (weights > 0.0)
+    used: NDArray[np.bool_] = np.isfinite(measured.readings) & (weights > 0.0)
     return used

@@ -22,7 +22,6 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
-    TestedCycle,
     base_effects,
     calibration_problem,
     origin,
@@ -78,7 +77,7 @@ def _fit(
     others: tuple[ScopedEffect, ...],
 ) -> tuple[Problem | None, Fit | None, str]:
     """The problem and its fit, or why there is none."""
-    chosen: tuple[TestedCycle, ...] = tests.fitted_to(fitted_to)
+    chosen = tests.fitted_to(fitted_to)
     if not chosen:
         return None, None, f"{specimen}: {tests.why_none(fitted_to)}"
     try:

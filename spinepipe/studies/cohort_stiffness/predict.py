@@ -6,17 +6,13 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import System, follow, observe
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.problem import (
-    SpecimenTests,
-    TestedCycle,
-    driven,
-    stiff_model,
-)
+from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven, stiff_model
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, less_step_0
 from spinepipe.world import Chain
 
@@ -27,7 +23,7 @@ def predicted(
     cohort: Cohort,
     specimen: str,
     frames: tuple[Pose, ...],
-    tested: Sequence[TestedCycle],
+    tested: Sequence[MeasuredCycle],
     k: Array,
     others: tuple[ScopedEffect, ...] = (),
 ) -> list[tuple[Array | None, Status, str]]:
@@ -94,14 +90,14 @@ def error_rows(
 
 
 def _numbers(
-    here: Sequence[tuple[TestedCycle, tuple[Array | None, Status, str]]],
+    here: Sequence[tuple[MeasuredCycle, tuple[Array | None, Status, str]]],
     joint: int,
     place: int,
     lost: bool,
 ) -> Row | None:
     """Mean errors of one joint and coordinate over steps and cycles; None where not measured."""
     border = BORDER_PER_SI[place]
-    measured = [one.measured[:, joint, place] * border for one, _ in here]
+    measured = [one.readings[:, joint, place] * border for one, _ in here]
     read = [np.isfinite(values) for values in measured]
     if not any(known.any() for known in read):
         return None

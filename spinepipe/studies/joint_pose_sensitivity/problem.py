@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.calibrate import MeasuredCase, Problem
-from spinepipe.cohort.specimen import in_frames
+from spinepipe.calibrate import Problem
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.model import MeasuredCase
 from spinepipe.statics import free_parameters
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
@@ -21,7 +21,6 @@ from spinepipe.units import (
     COORDINATES,
     STIFFNESS_COLUMNS,
     less_step_0,
-    without_step_0,
 )
 
 
@@ -51,10 +50,7 @@ def calibration_problem(
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
     free = free_parameters(model, 0, names, options.grouping)
     reach = np.full(len(free), np.log(options.bound_factor))
-    cases = tuple(
-        MeasuredCase(case, in_frames(motion, inputs.nominal, frames).q, cohort.zeroed_at_step_0)
-        for case, motion in zip(inputs.cases, inputs.motions, strict=True)
-    )
+    cases = tuple(one.in_frames(inputs.frames, frames) for one in inputs.tested)
     weights = np.array(options.weights.in_order(), dtype=float)
     return Problem(model, cases, free, weights, -reach, reach)
 
@@ -71,15 +67,10 @@ def absolute_errors(cases: Sequence[MeasuredCase], poses: Sequence[Array]) -> Ar
     if not poses:
         return np.concatenate([np.full_like(case.measured, np.nan) for case in cases])
     error = np.concatenate(
-        [_predicted(case, q) - _readings(case) for q, case in zip(poses, cases, strict=True)]
+        [_predicted(case, q) - case.readings for q, case in zip(poses, cases, strict=True)]
     )
     absolute: Array = np.abs(error) * BORDER_PER_SI
     return absolute
-
-
-def _readings(measured: MeasuredCase) -> Array:
-    """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
-    return without_step_0(measured.measured, measured.zeroed)
 
 
 def _predicted(measured: MeasuredCase, poses: Array) -> Array:
