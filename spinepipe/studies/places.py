@@ -10,7 +10,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 
 def at(document: Document, key: str) -> tuple[str, int | None, str]:
@@ -76,8 +76,8 @@ def readings(
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if name in (coordinates or COORDINATES)
     ]
-    zeros = cohort.zeroed_at_step_0 & (cohort.motion["step"] == 0)
-    read = cohort.motion[columns].notna().any(axis=1) & ~zeros
+    there = has_reading(cohort.motion["step"], cohort.zeroed_at_step_0)
+    read = cohort.motion[columns].notna().any(axis=1) & there
     chosen = cohort.motion["test"].isin(list(tests or cohort.tests))
     return cohort.motion.loc[read & chosen, [*_PLACE, "cycle", *columns]]
 

@@ -12,25 +12,24 @@ from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    SHARED_ERROR,
     criteria,
     independent,
-    joined,
     no_fit,
     stiffness_rows,
 )
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
-    TestedCycle,
     base_effects,
     calibration_problem,
     origin,
     specimen_tests,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
@@ -78,7 +77,7 @@ def _fit(
     others: tuple[ScopedEffect, ...],
 ) -> tuple[Problem | None, Fit | None, str]:
     """The problem and its fit, or why there is none."""
-    chosen: tuple[TestedCycle, ...] = tests.fitted_to(fitted_to)
+    chosen = tests.fitted_to(fitted_to)
     if not chosen:
         return None, None, f"{specimen}: {tests.why_none(fitted_to)}"
     try:

@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.published import OF_COHORTS, stands_for
-from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
+from spinepipe.studies.base_checks import BaseCheck
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -90,7 +91,7 @@ class CohortLayout(StudyFiles):
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
-        rebuilt = stands_for(cohort.name, OF_COHORTS)
+        rebuilt = GOULD_2024B.stands_for(cohort.name)
         return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt)
 
     @property
@@ -199,7 +200,7 @@ KIND = Kind(
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
-    checks_of_files=(check_cohort_base,),
+    checks_of_files=(BaseCheck(own_bushings=True),),
     tables=TABLES,
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
@@ -208,7 +209,6 @@ KIND = Kind(
         Job(
             "pool",
             ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
-            specimens="all",
             reads_base=True,
         ),
         *_ANALYSES,

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.published import OF_JOINT_POSE, stands_for
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
@@ -135,7 +135,7 @@ class Layout(StudyFiles):
     @classmethod
     def of(cls, study: JointPoseSensitivity, cohort: Cohort) -> "Layout":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort.name, OF_JOINT_POSE))
+        return cls(study, cohort.specimen_names, GOULD_2024A.stands_for(cohort.name))
 
     @cached_property
     def stiffnesses(self) -> list[str]:
@@ -269,7 +269,7 @@ _SAMPLED = (
     Job(
         "start_model",
         ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
-        specimens="none",
+        header_alone=True,
     ),
     Job(
         "sample_landmarks",
@@ -332,7 +332,7 @@ _ANALYSES = (
     _analysis("counts", "success:counts", ("success", "bootstrap")),
     _analysis("summary", "summary", (*_FITTED, "bootstrap", "best.json")),
     _analysis("statistics", "significance", (*_FITTED, "best.json")),
-    _analysis("agreement", "errors", ("simulations", "success")),
+    _analysis("agreement", "agreement", ("simulations", "success")),
     _analysis(
         "two_factor",
         "two_factor",

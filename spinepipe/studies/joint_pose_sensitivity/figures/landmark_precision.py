@@ -1,7 +1,4 @@
-"""Figure: how precise landmarks must be for errors below a limit.
-
-A required landmark SD in words.
-"""
+"""Figure: how precise landmarks must be for errors below a limit."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,34 +9,20 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain, head
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
-
-def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
-    """``1.20 mm (1.05–1.40)``, or why there is no such SD.
-
-    An end of the interval that lies outside the sampled SDs, mm, is told as such:
-    ``0.95 mm (0.65 to above 4 mm)``.
-    """
-    if not np.isfinite(row["sd_mm"]):
-        return str(row["message"]) or "none"
-    low, high = row["sd_low_mm"], row["sd_high_mm"]
-    if np.isfinite(low) and np.isfinite(high):
-        return f"{fixed(row['sd_mm'])} mm ({fixed(low)}–{fixed(high)})"
-    start = fixed(low) if np.isfinite(low) else f"below {tick(min(sampled))}"
-    end = f"{fixed(high)} mm" if np.isfinite(high) else f"above {tick(max(sampled))} mm"
-    return f"{fixed(row['sd_mm'])} mm ({start} to {end})"
-
-
 COLORS = {"calibrated": OURS, "nominal": BEST}
+
 WHOSE = {
     "calibrated": "stiffness fitted to each pose",
     "nominal": "stiffness of the cohort's own pose",
 }
+
 MOTIONS = {"translation": "mm", "rotation": "°"}
+
 _HEIGHT_MM = 125.0
 
 
@@ -68,6 +51,22 @@ def landmark_precision_figure(
     }
     explain(figure, bars, _words(study, cohort, curves, required))
     return figure
+
+
+def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
+    """``1.20 mm (1.05–1.40)``, or why there is no such SD.
+
+    An end of the interval that lies outside the sampled SDs, mm, is told as such:
+    ``0.95 mm (0.65 to above 4 mm)``.
+    """
+    if not np.isfinite(row["sd_mm"]):
+        return str(row["message"]) or "none"
+    low, high = row["sd_low_mm"], row["sd_high_mm"]
+    if np.isfinite(low) and np.isfinite(high):
+        return f"{fixed(row['sd_mm'])} mm ({fixed(low)}–{fixed(high)})"
+    start = fixed(low) if np.isfinite(low) else f"below {tick(min(sampled))}"
+    end = f"{fixed(high)} mm" if np.isfinite(high) else f"above {tick(max(sampled))} mm"
+    return f"{fixed(row['sd_mm'])} mm ({start} to {end})"
 
 
 def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
@@ -105,13 +104,6 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
     )
     axis.set_ylim(0.0, None)
     axis.set_ylabel(f"error ({symbol})")
-
-
-def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
-    """Median over the specimens as a thick line."""
-    for whose, rows in here.groupby("stiffness"):
-        middle = factor * rows.groupby("sd_mm")[column].median()
-        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
 
 
 def _draw_shares(
@@ -155,6 +147,13 @@ def _draw_shares(
     axis.set_xlim(0.0, None)
 
 
+def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
+    """Median over the specimens as a thick line."""
+    for whose, rows in here.groupby("stiffness"):
+        middle = factor * rows.groupby("sd_mm")[column].median()
+        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
+
+
 def _mark_required(
     axis: Axes, rows: pd.DataFrame, color: str, y: float, sampled: Sequence[float]
 ) -> None:
@@ -192,7 +191,7 @@ def _mark_required(
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
     """The SD that the paper reports for its landmarks."""
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     if paper is None:
         return
     sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
@@ -228,6 +227,6 @@ def _words(
         for _, row in both.iterrows()
         if specimens == 1
     ]
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     resultant = "the paper's SD is the largest resultant, not per axis" if paper else ""
     return "; ".join(part for part in (poses, lines, shown, *told, resultant) if part) + "."
