@@ -19,8 +19,126 @@ from spinepipe.studies.global_sensitivity.settings import DUMMY
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
 
+
+@dataclass(frozen=True)
+class Measures:
+    """Indices of one kind of design.
+
+    Attributes
+    ----------
+    main : the index that factors are put in order by. shown : those that are drawn, main first.
+    of_variance : whether they are shares of the output's variance.
+    in_units : whether they are in the output's unit.
+    """
+
+    main: str
+    shown: tuple[str, ...]
+    of_variance: bool = False
+    in_units: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One output: a coordinate in a test, of one joint, or of all joints and specimens together.
+
+    Attributes
+    ----------
+    joint : the joint; empty where several places are together.
+    rows : those of the table ``indices`` or ``convergence`` that have a result.
+    """
+
+    output: str
+    test: str
+    step: int
+    coordinate: str
+    joint: str
+    rows: pd.DataFrame
+
+    @property
+    def places(self) -> int:
+        """How many joints and specimens are together."""
+        return len(self.rows[PLACE].drop_duplicates())
+
+    def of(self, rows: pd.DataFrame) -> "Panel":
+        """The same output in another table."""
+        kept = _chosen(rows, self.output, self.test, self.step, self.coordinate)
+        kept = kept[kept["joint"] == self.joint] if self.joint else kept
+        return Panel(self.output, self.test, self.step, self.coordinate, self.joint, kept)
+
+
+NAME = {
+    "ST": "total index ST",
+    "S1": "first-order index S1",
+    "mu_star": "mean size of effects μ*",
+    "sigma": "SD of effects σ",
+    "PAWN": "PAWN",
+    "delta": "δ",
+    "S1_RBD": "S1 (RBD-FAST)",
+}
+
+_KNOWN = (
+    Measures("ST", ("ST", "S1"), of_variance=True),
+    Measures("mu_star", ("mu_star", "sigma"), in_units=True),
+    Measures("PAWN", ("PAWN", "delta", "S1_RBD")),
+)
+
+COLORS = (BLUE, GREEN, VERMILLION)
+"""Of the shown indices, the main one first."""
+
+DONE = "done"
+PLACE = ["specimen", "joint"]
+
+OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrated stiffness"}
+"""Outputs in their order."""
+
+_LONGEST = 34
+
 _DRIVEN = ("right_bending", "left_rotation", "extension")
 """Coordinate that a moment about x, y and z of ground drives."""
+
+
+def measures_of(indices: pd.DataFrame) -> Measures | None:
+    """The measures of a study's indices; None where none of them is known."""
+    names = set(indices["index"])
+    return next((known for known in _KNOWN if known.main in names), None)
+
+
+def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[Panel]:
+    """One panel for each output and test: the coordinate that the test loads, at its peak.
+
+    Of stiffness, and of a test of which no loaded coordinate was asked for, every coordinate.
+    """
+    rows = with_results(indices, measures)
+    found = []
+    for (output, test), part in rows.groupby(["output", "test"], sort=False):
+        known = loaded(cohort, str(test))
+        steps = set(part["step"])
+        step = known[1] if known and known[1] in steps else max(steps)
+        for name in _coordinates(part[part["step"] == step], known[0] if known else ""):
+            chosen = _chosen(part, str(output), str(test), step, name)
+            found.append(Panel(str(output), str(test), step, name, "", chosen))
+    return sorted(found, key=lambda panel: list(OUTPUT).index(panel.output))
+
+
+def with_results(rows: pd.DataFrame, measures: Measures) -> pd.DataFrame:
+    """Rows of the shown indices that have a result; test, joint and step of all are empty and 0."""
+    kept = rows[rows["estimate"].notna() & rows["index"].isin(measures.shown)]
+    names = {name: kept[name].replace(EVERY, "") for name in ("test", "joint")}
+    return kept.assign(**names, step=kept["step"].fillna(0).astype(int))
+
+
+def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: str) -> pd.DataFrame:
+    return rows[
+        (rows["output"] == output)
+        & (rows["test"] == test)
+        & (rows["step"] == step)
+        & (rows["coordinate"] == coordinate)
+    ]
+
+
+def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
+    there = [name for name in COORDINATES if name in set(rows["coordinate"])]
+    return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
 
 
 def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
@@ -53,148 +171,6 @@ def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
     return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
 
 
-@dataclass(frozen=True)
-class Measures:
-    """Indices of one kind of design.
-
-    Attributes
-    ----------
-    main : the index that factors are put in order by. shown : those that are drawn, main first.
-    of_variance : whether they are shares of the output's variance.
-    in_units : whether they are in the output's unit.
-    """
-
-    main: str
-    shown: tuple[str, ...]
-    of_variance: bool = False
-    in_units: bool = False
-
-
-_KNOWN = (
-    Measures("ST", ("ST", "S1"), of_variance=True),
-    Measures("mu_star", ("mu_star", "sigma"), in_units=True),
-    Measures("PAWN", ("PAWN", "delta", "S1_RBD")),
-)
-NAME = {
-    "ST": "total index ST",
-    "S1": "first-order index S1",
-    "mu_star": "mean size of effects μ*",
-    "sigma": "SD of effects σ",
-    "PAWN": "PAWN",
-    "delta": "δ",
-    "S1_RBD": "S1 (RBD-FAST)",
-}
-COLORS = (BLUE, GREEN, VERMILLION)
-"""Of the shown indices, the main one first."""
-
-DONE = "done"
-
-
-def measures_of(indices: pd.DataFrame) -> Measures | None:
-    """The measures of a study's indices; None where none of them is known."""
-    names = set(indices["index"])
-    return next((known for known in _KNOWN if known.main in names), None)
-
-
-def unit_of(output: str, coordinate: str) -> str:
-    """Unit of an output as printed."""
-    along = coordinate in TRANSLATIONS
-    if output == "stiffness":
-        return "N/m" if along else "N m/rad"
-    if output == "joint_load":
-        return "N" if along else "N m"
-    return unit(coordinate)
-
-
-OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrated stiffness"}
-"""Outputs in their order."""
-
-_LONGEST = 34
-
-
-def factor_name(factor: str, longest: int = _LONGEST) -> str:
-    """``stiffness_L1L2_extension`` as ``stiffness L1L2 extension``."""
-    return f"{DUMMY} (no effect)" if factor == DUMMY else short(plain(factor), longest)
-
-
-def what(output: str, coordinate: str) -> str:
-    """``motion in flexion–extension``; a load along a rotation is a moment."""
-    return f"{kind(output, coordinate)} in {AXIS[coordinate].lower()}"
-
-
-def kind(output: str, coordinate: str) -> str:
-    """``motion``, ``force``, ``moment`` or ``stiffness``."""
-    if output == "joint_load":
-        return "force" if coordinate in TRANSLATIONS else "moment"
-    return output
-
-
-def where(test: str, joint: str) -> str:
-    """``flexion, L1L2``: what there is of them."""
-    return ", ".join(part for part in (capital(plain(test)), joint) if part)
-
-
-def whole(n: int) -> str:
-    """``20 480``."""
-    return f"{n:,}".replace(",", "\u2009")
-
-
-PLACE = ["specimen", "joint"]
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One output: a coordinate in a test, of one joint, or of all joints and specimens together.
-
-    Attributes
-    ----------
-    joint : the joint; empty where several places are together.
-    rows : those of the table ``indices`` or ``convergence`` that have a result.
-    """
-
-    output: str
-    test: str
-    step: int
-    coordinate: str
-    joint: str
-    rows: pd.DataFrame
-
-    @property
-    def places(self) -> int:
-        """How many joints and specimens are together."""
-        return len(self.rows[PLACE].drop_duplicates())
-
-    def of(self, rows: pd.DataFrame) -> "Panel":
-        """The same output in another table."""
-        kept = _chosen(rows, self.output, self.test, self.step, self.coordinate)
-        kept = kept[kept["joint"] == self.joint] if self.joint else kept
-        return Panel(self.output, self.test, self.step, self.coordinate, self.joint, kept)
-
-
-def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[Panel]:
-    """One panel for each output and test: the coordinate that the test loads, at its peak.
-
-    Of stiffness, and of a test of which no loaded coordinate was asked for, every coordinate.
-    """
-    rows = with_results(indices, measures)
-    found = []
-    for (output, test), part in rows.groupby(["output", "test"], sort=False):
-        known = loaded(cohort, str(test))
-        steps = set(part["step"])
-        step = known[1] if known and known[1] in steps else max(steps)
-        for name in _coordinates(part[part["step"] == step], known[0] if known else ""):
-            chosen = _chosen(part, str(output), str(test), step, name)
-            found.append(Panel(str(output), str(test), step, name, "", chosen))
-    return sorted(found, key=lambda panel: list(OUTPUT).index(panel.output))
-
-
-def with_results(rows: pd.DataFrame, measures: Measures) -> pd.DataFrame:
-    """Rows of the shown indices that have a result; test, joint and step of all are empty and 0."""
-    kept = rows[rows["estimate"].notna() & rows["index"].isin(measures.shown)]
-    names = {name: kept[name].replace(EVERY, "") for name in ("test", "joint")}
-    return kept.assign(**names, step=kept["step"].fillna(0).astype(int))
-
-
 def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
     """At most so many panels; of a single specimen a joint each, where there is room."""
     apart = [one for panel in found for one in by_joint(panel, joints)]
@@ -221,20 +197,6 @@ def by_joint(panel: Panel, joints: Sequence[str]) -> list[Panel]:
     return [
         replace(panel, joint=name, rows=panel.rows[panel.rows["joint"] == name]) for name in there
     ] or [panel]
-
-
-def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
-    there = [name for name in COORDINATES if name in set(rows["coordinate"])]
-    return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
-
-
-def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: str) -> pd.DataFrame:
-    return rows[
-        (rows["output"] == output)
-        & (rows["test"] == test)
-        & (rows["step"] == step)
-        & (rows["coordinate"] == coordinate)
-    ]
 
 
 def pooled(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
@@ -281,6 +243,43 @@ def title(index: int, panel: Panel) -> str:
     first = where(panel.test, panel.joint)
     second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
     return f"{chr(ord('a') + index)}   " + "\n".join(part for part in (first, second) if part)
+
+
+def factor_name(factor: str, longest: int = _LONGEST) -> str:
+    """``stiffness_L1L2_extension`` as ``stiffness L1L2 extension``."""
+    return f"{DUMMY} (no effect)" if factor == DUMMY else short(plain(factor), longest)
+
+
+def what(output: str, coordinate: str) -> str:
+    """``motion in flexion–extension``; a load along a rotation is a moment."""
+    return f"{kind(output, coordinate)} in {AXIS[coordinate].lower()}"
+
+
+def kind(output: str, coordinate: str) -> str:
+    """``motion``, ``force``, ``moment`` or ``stiffness``."""
+    if output == "joint_load":
+        return "force" if coordinate in TRANSLATIONS else "moment"
+    return output
+
+
+def where(test: str, joint: str) -> str:
+    """``flexion, L1L2``: what there is of them."""
+    return ", ".join(part for part in (capital(plain(test)), joint) if part)
+
+
+def unit_of(output: str, coordinate: str) -> str:
+    """Unit of an output as printed."""
+    along = coordinate in TRANSLATIONS
+    if output == "stiffness":
+        return "N/m" if along else "N m/rad"
+    if output == "joint_load":
+        return "N" if along else "N m"
+    return unit(coordinate)
+
+
+def whole(n: int) -> str:
+    """``20 480``."""
+    return f"{n:,}".replace(",", "\u2009")
 
 
 def sections_of(
