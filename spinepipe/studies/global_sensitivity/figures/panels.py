@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.report.marks import Array
 from spinepipe.report.panels import sections
@@ -93,9 +94,6 @@ OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrat
 
 _LONGEST = 34
 
-_DRIVEN = ("right_bending", "left_rotation", "extension")
-"""Coordinate that a moment about x, y and z of ground drives."""
-
 
 def measures_of(indices: pd.DataFrame) -> Measures | None:
     """The measures of a study's indices; None where none of them is known."""
@@ -159,7 +157,7 @@ def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
     if not size.any():
         return None
     peak = int(size.argmax())
-    return _DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
+    return DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
 
 
 def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
