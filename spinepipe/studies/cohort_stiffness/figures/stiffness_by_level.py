@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -200,21 +201,23 @@ def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
 
 def _draw_published(axis: Axes, published: pd.DataFrame, levels: Sequence[str]) -> None:
     """The same value for all joints as a dashed line, values of levels as short bars."""
-    by_level = published["representation"].map(lambda name: named(name).by_level).astype(bool)
-    for _, rows in published[~by_level].groupby("representation", sort=False):
-        for value in finite(rows["stiffness"])[:1]:
-            axis.axhline(value, color=GREY, lw=0.8, ls=_DASHES, zorder=1.5)
-    each = published[by_level]
-    for joint, value in each.groupby("joint")["stiffness"].first().dropna().items():
-        x = list(levels).index(str(joint))
-        axis.plot(
-            [x - 0.46, x + 0.46],
-            [value, value],
-            color=THEIRS,
-            lw=1.4,
-            solid_capstyle="butt",
-            zorder=1.6,
-        )
+    for name, rows in published.groupby("representation", sort=False):
+        look = _look(str(name))
+        if not named(str(name)).by_level:
+            for value in finite(rows["stiffness"])[:1]:
+                axis.axhline(value, **look, zorder=1.5)
+            continue
+        for joint, value in rows.groupby("joint")["stiffness"].first().dropna().items():
+            x = list(levels).index(str(joint))
+            ends = [x - 0.46, x + 0.46]
+            axis.plot(ends, [value, value], **look, solid_capstyle="butt", zorder=1.6)
+
+
+def _look(published: str) -> dict[str, Any]:
+    """Line of a published set."""
+    if named(published).by_level:
+        return {"color": THEIRS, "lw": 1.4}
+    return {"color": GREY, "lw": 0.8, "ls": _DASHES}
 
 
 def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
@@ -305,10 +308,7 @@ def _explain(
         handles += [handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
     for name in (name for name in PUBLISHED if name in published):
-        look = {"color": THEIRS, "lw": 1.4}
-        if not named(name).by_level:
-            look = {"color": GREY, "lw": 0.8, "ls": _DASHES}
-        handles.append(Line2D([], [], **look, label=IN_WORDS[name]))
+        handles.append(Line2D([], [], **_look(name), label=IN_WORDS[name]))
     doubt = bool(doubted(rows[rows["stiffness"].notna()]).any())
     if doubt and not _crowded(cohort):
         handles.append(handle(_MARKS[0].hollow(), "not identifiable or at a bound"))
