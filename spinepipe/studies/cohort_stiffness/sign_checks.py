@@ -8,10 +8,11 @@ from scipy import stats
 
 from spinepipe.calibrate.problem import whitened
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
 from spinepipe.studies.cohort_stiffness.predict import predicted
-from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, TestedCycle, driven
+from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
@@ -68,16 +69,16 @@ def sign_rows(
     return rows
 
 
-def _independent(one: TestedCycle, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
+def _independent(one: MeasuredCycle, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
     """Measured and expected motion (T, J, 6), NaN where there is none.
 
     Zeroed readings share the error of step 0, which would pass for motion: both are whitened.
     """
-    read = np.isfinite(one.measured)
+    read = np.isfinite(one.readings)
     expected = np.full(read.shape, np.nan) if motion is None else motion
     if not zeroed:
-        return one.measured, expected
-    measured = np.where(read, whitened(one.measured, read), np.nan)
+        return one.readings, expected
+    measured = np.where(read, whitened(one.readings, read), np.nan)
     return measured, expected if motion is None else whitened(motion, read)
 
 

@@ -22,7 +22,7 @@ from spinepipe.sensitivity.global_indices import (
     noise_floor,
 )
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import design_of
+from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED, CONVERGENCE, INDICES, RESPONSES
 from spinepipe.tables import Table, to_arrow, write
