@@ -206,7 +206,7 @@ class Shared:
     def _built(self, name: str, build: Callable[[Path], Project]) -> Project:
         folder, listing = self.folder / name, self.folder / f"{name}.json"
         if not listing.exists():
-            shutil.rmtree(folder, ignore_errors=True)  # of a build that failed
+            assert not folder.exists(), f"the shared project {name} could not be built, see above"
             listing.write_text(json.dumps(build(folder).files()))
         return Project(folder)
 
