@@ -24,12 +24,16 @@ from spinepipe.calibrate.forward_runs import (
     relative_error,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, specimen_inputs, study_and_cohort
 from spinepipe.model import LoadStep, SpineModel
 from spinepipe.statics import Course, Program, System, settle
 from spinepipe.studies.joint_pose_sensitivity import bootstrap
 from spinepipe.studies.joint_pose_sensitivity import poses as build_models
 from spinepipe.studies.joint_pose_sensitivity import poses as sample_landmarks
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
+    sampled_poses,
+    specimen_inputs,
+    study_and_cohort,
+)
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.success import near_start
 from tests.reference.bridge import system
@@ -121,7 +125,7 @@ def problems(numbers: Sequence[int] = SAMPLED) -> Iterator[tuple[str, Problem]]:
         sample_landmarks.sample(ROOT, STUDY, SPECIMEN, landmarks)
         build_models.build(ROOT, STUDY, landmarks, SPECIMEN, poses)
         sampled = sampled_poses(poses)
-    own = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).nominal
+    own = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).frames
     yield "the cohort's own", calibration_problem(ROOT, settings, SPECIMEN, own)
     for pose in numbers:
         frames, reason = sampled.of(SPECIMEN, pose)
@@ -192,7 +196,7 @@ def speeds() -> Iterator[Speed]:
 def _bootstrap_fit() -> float:
     """Median CPU seconds of a fit from a sampled start, in the cohort's own joint poses."""
     settings, cohort = study_and_cohort(ROOT, STUDY)
-    frames = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).nominal
+    frames = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).frames
     starts = [start for start, _ in bootstrap.sampled(settings, SPECIMEN, "start")[:BOOTSTRAP_FITS]]
     seconds = [
         cpu_seconds(partial(fit, calibration_problem(ROOT, settings, SPECIMEN, frames, start)), 1)

@@ -1,4 +1,8 @@
-"""Units at the border: degrees and millimetres in files and tables, SI inside the code."""
+"""The six coordinates of a joint: their names, their units, and the load step they count from.
+
+Degrees and millimetres in files and tables, SI inside the code. Motion may have been zeroed at
+step 0: its coordinates there were subtracted from all others, and its own zeros are no readings.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,3 +51,20 @@ def to_si(coordinates: ArrayLike) -> NDArray[np.float64]:
 def from_si(coordinates: ArrayLike) -> NDArray[np.float64]:
     """(…, 6) coordinates in m and rad to mm and deg."""
     return np.asarray(coordinates, dtype=float) * BORDER_PER_SI
+
+
+def less_step_0(motion: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64]:
+    """(T, ...) motion by load step, or what is linear in it, as it is read: zeroed or not."""
+    return motion - motion[0] if zeroed else motion
+
+
+def without_step_0(readings: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64]:
+    """(T, ...) readings, NaN in step 0 where zeroing made what stands there."""
+    kept = readings.copy()
+    kept[0] = np.nan if zeroed else kept[0]
+    return kept
+
+
+def has_reading(step: ArrayLike, zeroed: bool) -> NDArray[np.bool_]:
+    """Whether there can be a reading at load steps of these numbers."""
+    return (np.asarray(step) != 0) | (not zeroed)

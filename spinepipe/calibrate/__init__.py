@@ -2,8 +2,9 @@
 
 from spinepipe.calibrate.fit import Fit, Optimum, fit
 from spinepipe.calibrate.pooling import CohortSpread, Pooled, PooledSpecimen, pool
-from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty
+from spinepipe.model import MeasuredCase
 
 __all__ = [
     "CohortSpread",

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
+from spinepipe.model import MeasuredCase
 from spinepipe.statics import moved
 from spinepipe.status import Status
 

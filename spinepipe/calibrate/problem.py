@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.solvers import AtRest, Settling
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
 from spinepipe.statics import (
     Course,
     FreeParameter,
@@ -31,7 +31,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
-from spinepipe.units import BORDER_PER_SI
+from spinepipe.units import BORDER_PER_SI, less_step_0
 from spinepipe.world import Chain
 
 
@@ -78,21 +78,6 @@ def shared_sums(rows: Array, sharing: NDArray[np.int64]) -> Array:
     sums = np.zeros((group.max(initial=-1) + 1, rows.shape[1]))
     np.add.at(sums, group, rows)
     return sums[1:] if (sharing < 0).any() else sums
-
-
-@dataclass(frozen=True)
-class MeasuredCase:
-    """One cycle of one test with its measured motion.
-
-    Attributes
-    ----------
-    measured : (T, J, 6) m and rad by load step, NaN where not measured.
-    zeroed : whether the step-0 coordinates were subtracted from the measurement.
-    """
-
-    case: LoadCase
-    measured: Array
-    zeroed: bool = False
 
 
 @dataclass(frozen=True)
@@ -220,8 +205,8 @@ class Evaluator:
         """(N,) weighted residuals of the readings of one case that enter the cost."""
         measured = self.problem.cases[number]
         seen = np.stack([observe(system, q) for q in poses])
-        seen = seen - seen[0] if measured.zeroed else seen
-        return self._entering(number, (seen - measured.measured) * self._scale)
+        errors = less_step_0(seen, measured.zeroed) - measured.measured
+        return self._entering(number, errors * self._scale)
 
     def _jacobian(self, number: int, system: System, poses: Array, by_x: Array) -> Array:
         """(N, m) derivative of the residuals of one case by the unknowns."""
@@ -231,7 +216,7 @@ class Evaluator:
                 for q, dq in zip(poses, by_x, strict=True)
             ]
         )
-        seen = seen - seen[0] if self.problem.cases[number].zeroed else seen
+        seen = less_step_0(seen, self.problem.cases[number].zeroed)
         return self._entering(number, seen * self._scale[:, None])
 
     def _entering(self, number: int, errors: Array) -> Array:
@@ -267,7 +252,5 @@ def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
 
 def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:
     """(T, J, 6) which readings enter the cost; the zeros that zeroing makes of step 0 are none."""
-    used = np.isfinite(measured.measured) & (weights > 0.0)
-    if measured.zeroed:
-        used[0] = False
+    used: NDArray[np.bool_] = np.isfinite(measured.readings) & (weights > 0.0)
     return used

@@ -1,7 +1,6 @@
-"""From a cohort's tables to what the engine takes: frames, bodies, load cases, motion. SI."""
+"""From a cohort's tables to what the engine takes: frames, bodies, models, load cases. SI."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -13,7 +12,7 @@ from spinepipe.cohort.cohort import Cohort
 from spinepipe.decomposition import eigh
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose, joint_pose, reexpress, rotation_zxy
+from spinepipe.frames import Pose, joint_pose, rotation_zxy
 from spinepipe.model import (
     STANDARD_GRAVITY,
     Body,
@@ -22,7 +21,7 @@ from spinepipe.model import (
     ScopedEffect,
     SpineModel,
 )
-from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, to_si
+from spinepipe.units import MM_PER_M, ROTATIONS
 
 Landmarks = Mapping[str, Mapping[str, Array]]
 """Points in m, ground: vertebra to landmark to (3,)."""
@@ -33,20 +32,6 @@ STRICTLY_INSIDE = 1e-6
 _POINT = ["x_mm", "y_mm", "z_mm"]
 _ORIENTATION = [f"{name}_deg" for name in ROTATIONS]
 _INERTIA = ["ixx_kg_m2", "iyy_kg_m2", "izz_kg_m2", "ixy_kg_m2", "ixz_kg_m2", "iyz_kg_m2"]
-
-
-@dataclass(frozen=True)
-class MeasuredMotion:
-    """Motion of one cycle of one test.
-
-    Attributes
-    ----------
-    q : (T, J, 6) m and rad by the load case's steps, NaN where not measured.
-    """
-
-    test: str
-    cycle: int
-    q: Array
 
 
 def landmarks(cohort: Cohort, specimen: str) -> dict[str, dict[str, Array]]:
@@ -211,48 +196,6 @@ def _wrench(
     force = np.array([row["fx_n"], row["fy_n"], row["fz_n"]], dtype=float)
     moment = np.array([row["mx_nm"], row["my_nm"], row["mz_nm"]], dtype=float)
     return Wrench(body, point + shift, force, moment)
-
-
-def measured_motion(
-    cohort: Cohort, specimen: str, cases: Sequence[LoadCase]
-) -> tuple[MeasuredMotion, ...]:
-    """Measured motion of each case in the cohort's own joint frames, NaN where there is none."""
-    joints = {name: index for index, name in enumerate(cohort.joint_names)}
-    return tuple(_motion(cohort, specimen, case, joints) for case in cases)
-
-
-def _motion(
-    cohort: Cohort, specimen: str, case: LoadCase, joints: Mapping[str, int]
-) -> MeasuredMotion:
-    q = np.full((len(case.steps), len(joints), 6), np.nan)
-    if cohort.motion is not None:
-        table = cohort.motion
-        rows = table[
-            (table["specimen"] == specimen)
-            & (table["test"] == case.test)
-            & (table["cycle"] == case.cycle)
-        ]
-        at = {step.step: index for index, step in enumerate(case.steps)}
-        values = to_si(rows[list(COORDINATE_COLUMNS)].to_numpy(float))
-        for step, joint, value in zip(rows["step"], rows["joint"], values, strict=True):
-            q[at[int(step)], joints[joint]] = value
-    return MeasuredMotion(case.test, case.cycle, q)
-
-
-def in_frames(
-    motion: MeasuredMotion, nominal: Sequence[Pose], sampled: Sequence[Pose]
-) -> MeasuredMotion:
-    """The same motion of the vertebrae, expressed in other joint frames.
-
-    The motion belongs to the vertebrae, so all six components are needed: those not measured are
-    taken as zero for the purpose, and stay NaN in the result.
-    """
-    q = motion.q.copy()
-    for step, joint in zip(*np.nonzero(np.isfinite(motion.q).any(axis=2)), strict=True):
-        known = np.isfinite(q[step, joint])
-        moved = reexpress(np.nan_to_num(q[step, joint]), nominal[joint], sampled[joint])
-        q[step, joint] = np.where(known, moved, np.nan)
-    return MeasuredMotion(motion.test, motion.cycle, q)
 
 
 def on_bushings(

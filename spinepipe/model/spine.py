@@ -8,6 +8,7 @@ import numpy as np
 from spinepipe.effects import Effect, Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.units import without_step_0
 
 STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
 """m/s2 in ground axes: y points up."""
@@ -92,6 +93,26 @@ class LoadCase:
             for load in step.wrenches:
                 if not np.isfinite([*load.point, *load.force, *load.moment]).all():
                     raise RefusedModel(f"test {self.test}, step {step.step}: a load is not finite")
+
+
+@dataclass(frozen=True)
+class MeasuredCase:
+    """One cycle of one test with its measured motion.
+
+    Attributes
+    ----------
+    measured : (T, J, 6) m and rad by load step, NaN where not measured.
+    zeroed : whether the step-0 coordinates were subtracted from the measurement.
+    """
+
+    case: LoadCase
+    measured: Array
+    zeroed: bool = False
+
+    @cached_property
+    def readings(self) -> Array:
+        """(T, J, 6) what was read: the zeros that zeroing makes of step 0 are no readings."""
+        return without_step_0(self.measured, self.zeroed)
 
 
 @dataclass(frozen=True)

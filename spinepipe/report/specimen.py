@@ -9,14 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.measured import MeasuredCycle, measured_specimen
 from spinepipe.cohort.specimen import (
     Landmarks,
-    MeasuredMotion,
     bodies,
     joint_frames,
     landmarks,
-    load_cases,
-    measured_motion,
 )
 from spinepipe.effects.contract import Array, Wrench
 from spinepipe.frames import Pose
@@ -34,15 +32,19 @@ class SpecimenView:
     Attributes
     ----------
     frames : of the joints, caudal to cranial. points : landmarks, empty where there are none.
-    bodies : the moving vertebrae that have a mass. cases, motions : one per test and cycle.
+    bodies : the moving vertebrae that have a mass. tested : one per test and cycle.
     """
 
     specimen: str
     frames: tuple[Pose, ...]
     points: Landmarks
     bodies: tuple[Body, ...]
-    cases: tuple[LoadCase, ...]
-    motions: tuple[MeasuredMotion, ...]
+    tested: tuple[MeasuredCycle, ...]
+
+    @property
+    def cases(self) -> tuple[LoadCase, ...]:
+        """The loads of every cycle."""
+        return tuple(one.case for one in self.tested)
 
 
 def view_of(
@@ -59,16 +61,13 @@ def view_of(
         z right.
     """
     shift = np.array(load_shift_mm) / MM_PER_M
-    cases = (
-        () if cohort.loads is None else load_cases(cohort, specimen, tests or cohort.tests, shift)
-    )
+    asked = () if cohort.loads is None else tests or cohort.tests
     return SpecimenView(
         specimen=specimen,
         frames=joint_frames(cohort, specimen),
         points={} if cohort.landmarks is None else landmarks(cohort, specimen),
         bodies=tuple(body for body in bodies(cohort, specimen) if body.mass > 0.0),
-        cases=cases,
-        motions=measured_motion(cohort, specimen, cases),
+        tested=measured_specimen(cohort, specimen, asked, shift).tested,
     )
 
 

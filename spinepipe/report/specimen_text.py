@@ -74,8 +74,9 @@ def _loads(cohort: Cohort, view: SpecimenView) -> Iterator[Cells]:
 
 def _motion(cohort: Cohort, view: SpecimenView) -> Iterator[Cells]:
     yield ("test", "cycle", "step", "joint", *COORDINATE_COLUMNS)
-    for case, motion in zip(view.cases, view.motions, strict=True):
-        for step, measured in zip(case.steps, from_si(motion.q), strict=True):
+    for one in view.tested:
+        case = one.case
+        for step, measured in zip(case.steps, from_si(one.measured), strict=True):
             for joint, row in zip(cohort.joint_names, measured, strict=True):
                 if np.isfinite(row).any():
                     yield (case.test, case.cycle, step.step, joint, *row)

@@ -25,16 +25,6 @@ POSITIVE = {
 }
 """What a positive value of the coordinate is."""
 
-NAME = {
-    "literature": "published, one value",
-    "literature_levels": "published, level by level",
-    "per_specimen": "one value per specimen",
-    "level_ratio": "published ratio of levels",
-    "per_joint": "each joint its own",
-    "partially_pooled": "partially pooled",
-}
-"""Representations of stiffness in words."""
-
 _MINUS, _THIN_SPACE = "\u2212", "\u2009"
 _LONGEST = 22
 _MOST = 4

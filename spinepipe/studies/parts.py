@@ -1,12 +1,7 @@
-"""Choices that are made for each of the six coordinates of a joint.
+"""What settings of studies are made of: stiffness, damping, weights, lists without repeats."""
 
-Lists in study files: something in them, and nothing twice.
-
-Published stiffness that studies start from where a study file names none.
-"""
-
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -15,46 +10,105 @@ from pydantic import (
     ConfigDict,
     Field,
     StringConstraints,
+    create_model,
     model_validator,
 )
 
 from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.units import TRANSLATIONS
+from spinepipe.units import (
+    COORDINATES,
+    ROTATIONS,
+    STIFFNESS_COLUMNS,
+    STIFFNESS_UNITS,
+    TRANSLATIONS,
+)
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 """Unknown keys, `yes` for a number and NaN are errors."""
 
 Coordinate = Literal["anterior", "superior", "right", "extension", "right_bending", "left_rotation"]
 
-Translational = Annotated[float, Field(ge=1.0, le=1e9)]
-Rotational = Annotated[float, Field(ge=1e-4, le=1e6)]
+_Translational = Annotated[float, Field(ge=1.0, le=1e9)]
+_Rotational = Annotated[float, Field(ge=1e-4, le=1e6)]
 _Weight = Annotated[float, Field(ge=0, le=1e6)]
 _Millimetres = Annotated[float, Field(ge=-200, le=200)]
 
 
-class Stiffness(BaseModel):
-    """Diagonal stiffness of a joint."""
+_Fields = TypeVar("_Fields", bound=BaseModel)
 
+_IN_WORDS = {
+    "anterior": "anterior",
+    "superior": "superior",
+    "right": "lateral",
+    "extension": "flexion-extension",
+    "right_bending": "lateral bending",
+    "left_rotation": "axial rotation",
+}
+"""What the stiffness along each coordinate is called."""
+
+
+def with_stiffness(
+    defaults: Mapping[str, float] | None, coordinates: Sequence[str] = COORDINATES
+) -> Callable[[type[_Fields]], type[_Fields]]:
+    """Give a class of settings a field for the stiffness along each of these coordinates.
+
+    Parameters
+    ----------
+    defaults : N/m and N m/rad by the names of the fields; None where each must be given.
+    """
+
+    def made(settings: type[_Fields]) -> type[_Fields]:
+        fields: dict[str, Any] = {}
+        for name, column in zip(COORDINATES, STIFFNESS_COLUMNS, strict=True):
+            if name in coordinates:
+                default = ... if defaults is None else float(defaults[column])
+                about = f"{_IN_WORDS[name]} stiffness, {STIFFNESS_UNITS[name]}"
+                kind = _Translational if name in TRANSLATIONS else _Rotational
+                fields[column] = (kind, Field(default=default, description=about))
+        return create_model(
+            settings.__name__,
+            __base__=settings,
+            __doc__=settings.__doc__,
+            __module__=settings.__module__,
+            **fields,
+        )
+
+    return made
+
+
+class _InOrder(BaseModel):
     model_config = FORM
 
-    anterior_n_per_m: Translational = Field(default=24600.0, description="anterior stiffness, N/m")
-    superior_n_per_m: Translational = Field(default=110000.0, description="superior stiffness, N/m")
-    right_n_per_m: Translational = Field(default=13500.0, description="lateral stiffness, N/m")
-    extension_nm_per_rad: Rotational = Field(
-        default=37.0, description="flexion-extension stiffness, N m/rad"
-    )
-    right_bending_nm_per_rad: Rotational = Field(
-        default=64.0, description="lateral bending stiffness, N m/rad"
-    )
-    left_rotation_nm_per_rad: Rotational = Field(
-        default=268.0, description="axial rotation stiffness, N m/rad"
-    )
-
     def in_order(self) -> tuple[float, ...]:
-        """(6,) N/m and N m/rad in the order of the coordinates."""
+        """N/m and N m/rad of what has a field, in the order of the coordinates."""
         return tuple(dict(self).values())
+
+
+@with_stiffness(dict(zip(STIFFNESS_COLUMNS, (24600, 110000, 13500, 37, 64, 268), strict=True)))
+class Stiffness(_InOrder):
+    """Diagonal stiffness of a joint."""
+
+
+@with_stiffness(published("gould_2024b")["uniform_stiffness"])
+class PublishedStiffness(Stiffness):
+    """Diagonal stiffness of a joint; what is not named is that of Gould 2024b, Table 2, uniform."""
+
+
+@with_stiffness(None, ROTATIONS)
+class LevelStiffness(_InOrder):
+    """Rotational stiffness of one joint, where joints differ."""
+
+
+def stiffness_of_joints(
+    cohort: Cohort, every: Stiffness, levels: Mapping[str, LevelStiffness]
+) -> Array:
+    """(J, 6) SI: one stiffness of all joints, with the rotations of levels that have their own."""
+    values = np.tile(np.array(every.in_order(), dtype=float), (len(cohort.joint_names), 1))
+    for joint, level in levels.items():
+        values[cohort.joint_names.index(joint), len(TRANSLATIONS) :] = level.in_order()
+    return values
 
 
 class Damping(BaseModel):
@@ -134,59 +188,3 @@ Tests = EachOnce[Annotated[str, StringConstraints(min_length=1)]]
 
 Coordinates = EachOnce[Coordinate]
 """Coordinates of a joint."""
-
-
-_UNIFORM = {
-    name: float(value)
-    for name, value in published("gould_2024b")["uniform_stiffness"].items()
-    if name != "where"
-}
-
-
-class PublishedStiffness(Stiffness):
-    """Diagonal stiffness of a joint; what is not named is that of Gould 2024b, Table 2, uniform."""
-
-    anterior_n_per_m: Translational = Field(
-        default=_UNIFORM["anterior_n_per_m"], description="anterior stiffness, N/m"
-    )
-    superior_n_per_m: Translational = Field(
-        default=_UNIFORM["superior_n_per_m"], description="superior stiffness, N/m"
-    )
-    right_n_per_m: Translational = Field(
-        default=_UNIFORM["right_n_per_m"], description="lateral stiffness, N/m"
-    )
-    extension_nm_per_rad: Rotational = Field(
-        default=_UNIFORM["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
-    )
-    right_bending_nm_per_rad: Rotational = Field(
-        default=_UNIFORM["right_bending_nm_per_rad"],
-        description="lateral bending stiffness, N m/rad",
-    )
-    left_rotation_nm_per_rad: Rotational = Field(
-        default=_UNIFORM["left_rotation_nm_per_rad"],
-        description="axial rotation stiffness, N m/rad",
-    )
-
-
-class LevelStiffness(BaseModel):
-    """Rotational stiffness of one joint, where joints differ."""
-
-    model_config = FORM
-
-    extension_nm_per_rad: Rotational = Field(description="flexion-extension stiffness, N m/rad")
-    right_bending_nm_per_rad: Rotational = Field(description="lateral bending stiffness, N m/rad")
-    left_rotation_nm_per_rad: Rotational = Field(description="axial rotation stiffness, N m/rad")
-
-    def in_order(self) -> tuple[float, ...]:
-        """(3,) N m/rad in the order of the rotations."""
-        return tuple(dict(self).values())
-
-
-def stiffness_of_joints(
-    cohort: Cohort, every: Stiffness, levels: Mapping[str, LevelStiffness]
-) -> Array:
-    """(J, 6) SI: one stiffness of all joints, with the rotations of levels that have their own."""
-    values = np.tile(np.array(every.in_order(), dtype=float), (len(cohort.joint_names), 1))
-    for joint, level in levels.items():
-        values[cohort.joint_names.index(joint), len(TRANSLATIONS) :] = level.in_order()
-    return values

@@ -3,14 +3,14 @@
 Which readings of a cohort a study has before it: what was measured, and what again.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 
 def at(document: Document, key: str) -> tuple[str, int | None, str]:
@@ -45,6 +45,17 @@ def unknown_names(
             yield Problem(*place, f"unknown {what} '{name}'", one_of(known), remedy)
 
 
+def unknown_levels(
+    document: Document, levels: Iterable[str], joints: Sequence[str]
+) -> Iterator[Problem]:
+    """Joints that ``level_stiffness`` has values for and the cohort does not have."""
+    for name in levels:
+        if name not in joints:
+            remedy = did_you_mean(name, joints, "delete it or correct its name")
+            place = at(document, f"level_stiffness.{name}")
+            yield Problem(*place, f"unknown joint '{name}'", one_of(joints), remedy)
+
+
 _PLACE = ["specimen", "test", "step", "joint"]
 
 
@@ -65,8 +76,8 @@ def readings(
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if name in (coordinates or COORDINATES)
     ]
-    zeros = cohort.zeroed_at_step_0 & (cohort.motion["step"] == 0)
-    read = cohort.motion[columns].notna().any(axis=1) & ~zeros
+    there = has_reading(cohort.motion["step"], cohort.zeroed_at_step_0)
+    read = cohort.motion[columns].notna().any(axis=1) & there
     chosen = cohort.motion["test"].isin(list(tests or cohort.tests))
     return cohort.motion.loc[read & chosen, [*_PLACE, "cycle", *columns]]
 

@@ -10,7 +10,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from spinepipe.cohort import read
-from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion, spine_model
+from spinepipe.cohort.measured import measured_cycles
+from spinepipe.cohort.specimen import joint_frames, load_cases, spine_model
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.problems import InputError
@@ -72,12 +73,12 @@ def test_spinepipe_finds_the_same_null_motion_from_the_files(
         model = spine_model(cohort, name, frames, (bushing,), DAMPING)
         chain = LoadedChain(model)
         cases = load_cases(cohort, name, cohort.tests, np.zeros(3))
-        told = measured_motion(cohort, name, cases)
+        told = measured_cycles(cohort, name, cases)
         for case, measured in zip(cases, told, strict=True):
             steps = follow(System(chain, model, case))
             assert all(step.usable for step in steps)
             found = np.stack([step.equilibrium.q.reshape(6, 6) for step in steps])
-            np.testing.assert_allclose(measured.q, found, rtol=0, atol=1e-8)
+            np.testing.assert_allclose(measured.measured, found, rtol=0, atol=1e-8)
 
 
 def test_opensims_own_forces_hold_the_same_pose() -> None:

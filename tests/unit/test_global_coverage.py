@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.unit.known_indices import FUNCTIONS, KnownFunction, morris_truth
+from known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 from spinepipe.sensitivity.global_indices import Settings, convergence, draw, indices
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from known_indices import FUNCTIONS, Array
 from SALib.analyze import delta, fast, morris, pawn, rbd_fast, sobol
 from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
-from tests.unit.known_indices import FUNCTIONS, Array
 
 from spinepipe.sensitivity.global_indices import (
     DUMMY,

@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from spinepipe.status import Status
+from spinepipe.studies.registry import every_kind
 from spinepipe.tables import (
-    TABLES,
     BadTable,
     Column,
     Table,
@@ -35,6 +35,7 @@ TABLE = Table(
         MESSAGE,
     ),
 )
+TABLES = {f"{name}.{t.name}": t for name, kind in every_kind().items() for t in kind.tables}
 ROWS = {
     "specimen": ["a", "a", "b"],
     "pose": [0, 1, 0],

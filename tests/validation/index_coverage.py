@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from SALib.analyze import fast
-from tests.unit.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 from spinepipe.sensitivity.global_indices import Design, Index, Settings, draw, indices
+from tests.cases.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 SEEDS = 40
 SAMPLES = {

@@ -1,7 +1,4 @@
-"""Information criteria of a least-squares fit whose scatter is estimated.
-
-Rows of the table ``stiffness`` from logarithms of stiffness and their errors.
-"""
+"""Rows of the tables ``stiffness`` and ``fits``, whatever the fit."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,9 +11,68 @@ from spinepipe.calibrate import Problem
 from spinepipe.effects.contract import Array
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
+Row = dict[str, Any]
+
+LEVEL = 0.975
+"""Upper end of the intervals: 95 % lie between the ends."""
+
+_BOUND = {-1: "lower", 0: "no", 1: "upper"}
+
 SHARED_ERROR = (
     "readings zeroed at step 0 share its error, which the published cost takes no account of"
 )
+
+
+def stiffness_rows(
+    joints: Sequence[str],
+    free: Sequence[str],
+    values: Array,
+    log_error: Array,
+    degrees_of_freedom: float,
+    identifiable: NDArray[np.bool_] | None,
+    at_bound: NDArray[np.int64],
+) -> list[Row]:
+    """One row per joint and free coordinate.
+
+    Parameters
+    ----------
+    values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
+        where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
+    degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
+    """
+    reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
+    rows = []
+    for row, joint in enumerate(joints):
+        for name in free:
+            at = row, COORDINATES.index(name)
+            rows.append(
+                {
+                    "joint": joint,
+                    "coordinate": name,
+                    "unit": STIFFNESS_UNITS[name],
+                    **interval(values[at], log_error[at], reach),
+                    "identifiable": None if identifiable is None else bool(identifiable[at]),
+                    "at_bound": _BOUND[int(at_bound[at])],
+                }
+            )
+    return rows
+
+
+def interval(value: float, log_error: float, reach: float) -> Row:
+    """Value, standard error and ends of the interval, normal in the logarithm."""
+    empty: Row = {"standard_error": None, "low": None, "high": None}
+    if not np.isfinite(value):
+        return {"stiffness": None, **empty}
+    with np.errstate(over="ignore"):  # an end beyond all numbers is none
+        low, high = value * np.exp([-reach * log_error, reach * log_error])
+    if not np.isfinite(log_error) or not np.isfinite(high):
+        return {"stiffness": float(value), **empty}
+    return {
+        "stiffness": float(value),
+        "standard_error": float(value * log_error),
+        "low": float(low),
+        "high": float(high),
+    }
 
 
 def criteria(
@@ -72,60 +128,6 @@ def no_fit(status: str, message: str) -> dict[str, Any]:
     return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
 
 
-Row = dict[str, Any]
-LEVEL = 0.975
-"""Upper end of the intervals: 95 % lie between the ends."""
-
-_BOUND = {-1: "lower", 0: "no", 1: "upper"}
-
-
-def stiffness_rows(
-    joints: Sequence[str],
-    free: Sequence[str],
-    values: Array,
-    log_error: Array,
-    degrees_of_freedom: float,
-    identifiable: NDArray[np.bool_] | None,
-    at_bound: NDArray[np.int64],
-) -> list[Row]:
-    """One row per joint and free coordinate.
-
-    Parameters
-    ----------
-    values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
-        where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
-    degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
-    """
-    reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
-    rows = []
-    for row, joint in enumerate(joints):
-        for name in free:
-            at = row, COORDINATES.index(name)
-            rows.append(
-                {
-                    "joint": joint,
-                    "coordinate": name,
-                    "unit": STIFFNESS_UNITS[name],
-                    **interval(values[at], log_error[at], reach),
-                    "identifiable": None if identifiable is None else bool(identifiable[at]),
-                    "at_bound": _BOUND[int(at_bound[at])],
-                }
-            )
-    return rows
-
-
-def interval(value: float, log_error: float, reach: float) -> Row:
-    """Value, standard error and ends of the interval, normal in the logarithm."""
-    empty: Row = {"standard_error": None, "low": None, "high": None}
-    if not np.isfinite(value):
-        return {"stiffness": None, **empty}
-    with np.errstate(over="ignore"):  # an end beyond all numbers is none
-        low, high = value * np.exp([-reach * log_error, reach * log_error])
-    if not np.isfinite(log_error) or not np.isfinite(high):
-        return {"stiffness": float(value), **empty}
-    return {
-        "stiffness": float(value),
-        "standard_error": float(value * log_error),
-        "low": float(low),
-        "high": float(high),
-    }
+def joined(*notes: str) -> str:
+    """Notes as one message."""
+    return "; ".join(note for note in notes if note)

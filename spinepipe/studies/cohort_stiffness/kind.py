@@ -6,12 +6,13 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.studies.cohort_stiffness.checks import check_cohort_base, check_cohort_stiffness
+from spinepipe.studies.base_checks import BaseCheck
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
+from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
-    POOLED,
     CohortStiffness,
     load_sets,
     tests_of,
@@ -24,15 +25,10 @@ OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""
 
 _ANALYSES = (
-    Job("mae", "ranking:mae", ("errors",), ("mae",)),
-    Job("ranking", "ranking:ranking", ("errors", "fits", "pooling"), ("ranking",)),
+    Job("mae", "", ("errors",), ("mae",)),
+    Job("ranking", "", ("errors", "fits", "pooling"), ("ranking",)),
     Job("statistics", "significance", ("errors", "fits"), ("statistics",)),
-    Job(
-        "findings",
-        "claims_of_stiffness",
-        ("stiffness", "errors", "statistics", "pooling"),
-        ("findings",),
-    ),
+    Job("findings", "", ("stiffness", "errors", "statistics", "pooling"), ("findings",)),
     Job(
         "against_gould_2024b",
         "gould_2024b.against",
@@ -204,7 +200,7 @@ KIND = Kind(
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
-    checks_of_files=(check_cohort_base,),
+    checks_of_files=(BaseCheck(own_bushings=True),),
     tables=TABLES,
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
@@ -213,7 +209,6 @@ KIND = Kind(
         Job(
             "pool",
             ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
-            specimens="all",
             reads_base=True,
         ),
         *_ANALYSES,

@@ -10,9 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import read_mark
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.claims import joined
-from spinepipe.studies.cohort_stiffness.fit import IN_FOLDERS
-from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
+from spinepipe.studies.cohort_stiffness.fit_rows import joined, stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
@@ -22,7 +20,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.units import COORDINATES
 

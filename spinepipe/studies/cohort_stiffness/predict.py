@@ -6,18 +6,14 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import System, follow, observe
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.problem import (
-    SpecimenTests,
-    TestedCycle,
-    driven,
-    stiff_model,
-)
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven, stiff_model
+from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, less_step_0
 from spinepipe.world import Chain
 
 Row = dict[str, Any]
@@ -27,7 +23,7 @@ def predicted(
     cohort: Cohort,
     specimen: str,
     frames: tuple[Pose, ...],
-    tested: Sequence[TestedCycle],
+    tested: Sequence[MeasuredCycle],
     k: Array,
     others: tuple[ScopedEffect, ...] = (),
 ) -> list[tuple[Array | None, Status, str]]:
@@ -52,7 +48,7 @@ def _motion(system: System, zeroed: bool) -> tuple[Array | None, Status, str]:
         if not step.usable:
             return None, step.equilibrium.status, step.equilibrium.message
     q = np.stack([observe(system, step.equilibrium.q) for step in steps])
-    return (q - q[0] if zeroed else q), Status.CONVERGED, ""
+    return less_step_0(q, zeroed), Status.CONVERGED, ""
 
 
 def error_rows(
@@ -94,14 +90,14 @@ def error_rows(
 
 
 def _numbers(
-    here: Sequence[tuple[TestedCycle, tuple[Array | None, Status, str]]],
+    here: Sequence[tuple[MeasuredCycle, tuple[Array | None, Status, str]]],
     joint: int,
     place: int,
     lost: bool,
 ) -> Row | None:
     """Mean errors of one joint and coordinate over steps and cycles; None where not measured."""
     border = BORDER_PER_SI[place]
-    measured = [one.measured[:, joint, place] * border for one, _ in here]
+    measured = [one.readings[:, joint, place] * border for one, _ in here]
     read = [np.isfinite(values) for values in measured]
     if not any(known.any() for known in read):
         return None

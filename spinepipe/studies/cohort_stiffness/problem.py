@@ -16,20 +16,27 @@ import numpy as np
 
 from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.load_tests import coupled_range, loaded_coordinate, peak_step
-from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion, on_bushings
+from spinepipe.cohort.load_tests import coupled_range
+from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen, measured_specimen
+from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.model_mark import base_marks
-from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.parts import Damping, stiffness_of_joints
-from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
+from spinepipe.units import (
+    COORDINATES,
+    ROTATIONS,
+    STIFFNESS_COLUMNS,
+    TRANSLATIONS,
+)
 
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
 
@@ -79,41 +86,16 @@ def _digest(root: str, study: CohortStiffness) -> str:
 FIRST_CYCLE = 1
 
 
-@dataclass(frozen=True)
-class TestedCycle:
-    """One cycle of one test.
-
-    Attributes
-    ----------
-    measured : (T, J, 6) m and rad, NaN where not measured; zeros that zeroing makes are no reading.
-    peak : place of the load step with the largest moment.
-    loaded : coordinate that the main moment drives, None without a moment.
-    """
-
-    case: LoadCase
-    measured: Array
-    peak: int
-    loaded: str | None
-
-
-def driven(cycles: Sequence[TestedCycle]) -> str | None:
+def driven(cycles: Sequence[MeasuredCycle]) -> str | None:
     """The coordinate that most cycles of a test load; of equally many that of the first."""
     return Counter(one.loaded for one in cycles).most_common(1)[0][0]
 
 
 @dataclass(frozen=True)
-class SpecimenTests:
-    """Joint frames of a specimen in the neutral pose, and its tests."""
+class SpecimenTests(MeasuredSpecimen):
+    """The tests of a specimen that a study uses, and what its labels of them mean."""
 
-    frames: tuple[Pose, ...]
-    tested: tuple[TestedCycle, ...]
-
-    @property
-    def tests(self) -> tuple[str, ...]:
-        """Names of the tests with readings."""
-        return tuple(dict.fromkeys(one.case.test for one in self.tested))
-
-    def fitted_to(self, label: str) -> tuple[TestedCycle, ...]:
+    def fitted_to(self, label: str) -> tuple[MeasuredCycle, ...]:
         """The tests that a label of ``fitted_to`` means, as far as the specimen has them."""
         if label == ALL:
             return self.tested
@@ -146,26 +128,14 @@ def specimen_tests(study: CohortStiffness, cohort: Cohort, specimen: str) -> Spe
 def _specimen_tests(
     cohort: Cohort, specimen: str, tests: tuple[str, ...], cycles: str
 ) -> SpecimenTests:
-    cases = load_cases(cohort, specimen, tests, np.zeros(3))
-    motions = measured_motion(cohort, specimen, cases)
-    found = [
-        TestedCycle(case, _readings(motion.q, cohort), peak_step(case), loaded_coordinate(case))
-        for case, motion in zip(cases, motions, strict=True)
-    ]
-    read = [one for one in found if np.isfinite(one.measured).any()]
-    return SpecimenTests(joint_frames(cohort, specimen), tuple(_chosen(cycles, read)))
+    one = measured_specimen(cohort, specimen, tests)
+    read = [cycle for cycle in one.tested if np.isfinite(cycle.readings).any()]
+    return SpecimenTests(specimen, one.frames, tuple(_chosen(cycles, read)))
 
 
-def _readings(q: Array, cohort: Cohort) -> Array:
-    readings = q.copy()
-    if cohort.zeroed_at_step_0:
-        readings[0] = np.nan
-    return readings
-
-
-def _chosen(cycles: str, found: Sequence[TestedCycle]) -> list[TestedCycle]:
+def _chosen(cycles: str, found: Sequence[MeasuredCycle]) -> list[MeasuredCycle]:
     """Cycles that are used, test by test; ``cycles`` as in the study."""
-    chosen: list[TestedCycle] = []
+    chosen: list[MeasuredCycle] = []
     for test in dict.fromkeys(one.case.test for one in found):
         of_test = [one for one in found if one.case.test == test]
         later = [one for one in of_test if one.case.cycle != FIRST_CYCLE] or of_test
@@ -177,22 +147,10 @@ def _chosen(cycles: str, found: Sequence[TestedCycle]) -> list[TestedCycle]:
     return chosen
 
 
-LEVEL_REPRESENTATIONS = ("level_ratio", "literature_levels")
-"""Representations that start from the published values of each level."""
-
-GROUPING = {
-    "per_specimen": "per_specimen",
-    "level_ratio": "per_specimen",
-    "per_joint": "per_joint",
-    "partially_pooled": "per_joint",
-}
-"""Which joints share an unknown: those that keep their ratios move together."""
-
-
 def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:
     """(J, 6) SI: the published stiffness a representation starts from."""
     levels = {}
-    if representation in LEVEL_REPRESENTATIONS:
+    if named(representation).by_level:
         levels = {joint: study.level_stiffness[joint] for joint in cohort.joint_names}
     return stiffness_of_joints(cohort, study.stiffness, levels)
 
@@ -218,7 +176,7 @@ def calibration_problem(
     specimen: str,
     representation: str,
     frames: tuple[Pose, ...],
-    tested: Sequence[TestedCycle],
+    tested: Sequence[MeasuredCycle],
     others: tuple[ScopedEffect, ...] = (),
 ) -> Problem:
     """The fit of one representation to these tests; ``others`` are effects besides the bushings.
@@ -231,7 +189,9 @@ def calibration_problem(
     start = start_stiffness(study, cohort, representation)
     model = stiff_model(cohort, specimen, frames, start, others)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
-    free = free_parameters(model, 0, names, GROUPING[representation])
+    grouping = named(representation).grouping
+    assert grouping is not None  # nothing of a published set is fitted
+    free = free_parameters(model, 0, names, grouping)
     reach = np.full(len(free), np.log(study.bound_factor))
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested
@@ -241,9 +201,9 @@ def calibration_problem(
     return Problem(model, cases, free, weights, -reach, reach, correlated=shared)
 
 
-def _in_cost(study: CohortStiffness, one: TestedCycle) -> Array:
+def _in_cost(study: CohortStiffness, one: MeasuredCycle) -> Array:
     """(T, J, 6) readings that enter the cost, NaN elsewhere."""
-    readings = one.measured.copy()
+    readings = one.readings.copy()
     if study.steps == "peak":
         others = np.arange(len(readings)) != one.peak
         readings[others] = np.nan

@@ -1,7 +1,4 @@
-"""From the table ``errors``: one error, and one motion, per specimen.
-
-Which errors a stage is told by: of fits to one load case, or of fits to all of them.
-"""
+"""From the table ``errors``: which of its rows tell a stage, and one error per specimen of them."""
 
 from collections.abc import Iterable, Mapping
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
-from spinepipe.studies.discrepancy.checks import check_base_model, check_discrepancy
+from spinepipe.studies.base_checks import BaseCheck
+from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 from spinepipe.studies.kind import Job, Kind
@@ -78,7 +79,7 @@ KIND = Kind(
     settings=Discrepancy,
     files=DiscrepancyFiles,
     checks=(check_discrepancy,),
-    checks_of_files=(check_base_model,),
+    checks_of_files=(BaseCheck(own_bushings=False),),
     tables=TABLES,
     # every setting says something about the search
     jobs=(Job("search", at="job", reads_base=True),),

@@ -1,12 +1,14 @@
 """Job: stiffness of one specimen calibrated to its measured motion, in one batch of samples."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
+from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.specimen import in_frames, joint_frames, measured_motion
+from spinepipe.cohort.measured import measured_cycles
+from spinepipe.cohort.specimen import joint_frames
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
@@ -65,17 +67,11 @@ def _problem(
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
     free = free_parameters(model, 0, names, "per_specimen")
     reach = np.full(len(free), np.log(options.bound_factor))
-    tests = tuple(test.case for test in batch.start.tests)
     nominal = joint_frames(cohort, specimen)
+    tested = measured_cycles(cohort, specimen, [test.case for test in batch.start.tests])
     cases = tuple(
-        MeasuredCase(
-            cases.case(place),
-            in_frames(motion, nominal, model.frames).q,
-            cohort.zeroed_at_step_0,
-        )
-        for cases, motion in zip(
-            batch.varied.cases, measured_motion(cohort, specimen, tests), strict=True
-        )
+        replace(one.in_frames(nominal, model.frames), case=varied.case(place))
+        for varied, one in zip(batch.varied.cases, tested, strict=True)
     )
     weights = np.array(options.weights.in_order(), dtype=float)
     return Problem(model, cases, free, weights, -reach, reach)

@@ -131,7 +131,7 @@ KIND = Kind(
     checks_at_start=(check_size_of_design,),
     tables=(DESIGN, RESPONSES, CALIBRATED, INDICES, CONVERGENCE),
     jobs=(
-        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), specimens="none"),
+        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),
         Job(
             "respond",
             many=True,

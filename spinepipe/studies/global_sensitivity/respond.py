@@ -9,12 +9,12 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.many import ManySolved, solve_many
 from spinepipe.status import Status
+from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.start import AskedTest
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
-from spinepipe.units import COORDINATE_COLUMNS, from_si
+from spinepipe.units import COORDINATE_COLUMNS, from_si, less_step_0
 
 TABLE = RESPONSES.without("specimen")
 """A job file: the specimen is in its folder's name."""
@@ -55,9 +55,9 @@ class _Rows:
 
 def _rows(batch: Batch, test: AskedTest, solved: ManySolved) -> _Rows:
     rows = _Rows(batch, test, solved.q.shape[2])
-    start = solved.q[:, :1] if test.from_first else 0.0
+    motion = less_step_0(solved.q.swapaxes(0, 1), test.from_first).swapaxes(0, 1)
     kept, stored = batch.varied.kept, test.stored
-    rows.motion[kept] = from_si(solved.q - start)[:, stored]
+    rows.motion[kept] = from_si(motion)[:, stored]
     rows.load[kept] = solved.load[:, stored]
     rows.status[kept] = solved.status[:, stored].astype(object)
     words = np.full(solved.status.shape, "", dtype=object)

@@ -102,7 +102,7 @@ def _problem(
     start: Array,
     damping: Array,
 ) -> Problem:
-    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).nominal
+    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
     problem = calibration_problem(root, settings, specimen, frames, start)
     shape = problem.model.damping.shape
     model = replace(problem.model, damping=np.broadcast_to(damping, shape).copy())

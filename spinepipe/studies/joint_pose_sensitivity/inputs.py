@@ -6,18 +6,13 @@ from functools import lru_cache
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.specimen import (
-    MeasuredMotion,
-    joint_frames,
-    load_cases,
-    measured_motion,
-    on_bushings,
-)
+from spinepipe.cohort.measured import MeasuredSpecimen, measured_specimen
+from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.model import LoadCase, SpineModel
+from spinepipe.model import SpineModel
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
@@ -76,24 +71,13 @@ def sampled_poses(path: str) -> Poses:
     return _poses(stamp(path))
 
 
-@dataclass(frozen=True)
-class SpecimenInputs:
-    """What the jobs of one specimen share: its tests, its motion and its nominal frames."""
-
-    nominal: tuple[Pose, ...]
-    cases: tuple[LoadCase, ...]
-    motions: tuple[MeasuredMotion, ...]
-
-
 @lru_cache(maxsize=16)
-def specimen_inputs(root: str, name: str, specimen: str, _digest: str) -> SpecimenInputs:
+def specimen_inputs(root: str, name: str, specimen: str, _digest: str) -> MeasuredSpecimen:
     """Tests and motion of a specimen; ``_digest`` is that of its cohort."""
     study, cohort = study_and_cohort(root, name)
     chosen = study.tests or cohort.tests
     shift = np.array(study.load_point_shift_mm.in_order()) / MM_PER_M
-    cases = load_cases(cohort, specimen, chosen, shift)
-    motions = measured_motion(cohort, specimen, cases)
-    return SpecimenInputs(joint_frames(cohort, specimen), cases, motions)
+    return measured_specimen(cohort, specimen, chosen, shift)
 
 
 def start_stiffness(study: JointPoseSensitivity) -> Array:

@@ -269,7 +269,7 @@ _SAMPLED = (
     Job(
         "start_model",
         ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
-        specimens="none",
+        header_alone=True,
     ),
     Job(
         "sample_landmarks",

@@ -63,7 +63,7 @@ def _nominal(
     root: str, settings: JointPoseSensitivity, cohort: Cohort, specimen: str
 ) -> Array | str:
     """(J, 6) stiffness fitted in the cohort's own pose, or why there is none."""
-    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).nominal
+    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
     try:
         problem = calibration_problem(root, settings, specimen, frames)
         found = _fit(settings, problem)

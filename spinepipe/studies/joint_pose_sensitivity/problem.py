@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.calibrate import MeasuredCase, Problem
-from spinepipe.cohort.specimen import in_frames
+from spinepipe.calibrate import Problem
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.model import MeasuredCase
 from spinepipe.statics import free_parameters
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
@@ -16,7 +16,12 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     study_and_cohort,
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import BORDER_PER_SI, COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import (
+    BORDER_PER_SI,
+    COORDINATES,
+    STIFFNESS_COLUMNS,
+    less_step_0,
+)
 
 
 def calibration_problem(
@@ -45,10 +50,7 @@ def calibration_problem(
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
     free = free_parameters(model, 0, names, options.grouping)
     reach = np.full(len(free), np.log(options.bound_factor))
-    cases = tuple(
-        MeasuredCase(case, in_frames(motion, inputs.nominal, frames).q, cohort.zeroed_at_step_0)
-        for case, motion in zip(inputs.cases, inputs.motions, strict=True)
-    )
+    cases = tuple(one.in_frames(inputs.frames, frames) for one in inputs.tested)
     weights = np.array(options.weights.in_order(), dtype=float)
     return Problem(model, cases, free, weights, -reach, reach)
 
@@ -65,21 +67,13 @@ def absolute_errors(cases: Sequence[MeasuredCase], poses: Sequence[Array]) -> Ar
     if not poses:
         return np.concatenate([np.full_like(case.measured, np.nan) for case in cases])
     error = np.concatenate(
-        [_predicted(case, q) - _readings(case) for q, case in zip(poses, cases, strict=True)]
+        [_predicted(case, q) - case.readings for q, case in zip(poses, cases, strict=True)]
     )
     absolute: Array = np.abs(error) * BORDER_PER_SI
     return absolute
 
 
-def _readings(measured: MeasuredCase) -> Array:
-    """(T, J, 6) readings; the zeros that zeroing makes of step 0 are none."""
-    readings = measured.measured.copy()
-    if measured.zeroed:
-        readings[0] = np.nan
-    return readings
-
-
 def _predicted(measured: MeasuredCase, poses: Array) -> Array:
     """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
     q = poses.reshape(len(poses), -1, 6)
-    return q - q[0] if measured.zeroed else q
+    return less_step_0(q, measured.zeroed)

@@ -14,18 +14,16 @@ from spinepipe.studies.parts import (
     Coordinates,
     Damping,
     EachOnce,
-    Rotational,
     Shift,
     Stiffness,
     Tests,
-    Translational,
     Weights,
+    with_stiffness,
 )
 from spinepipe.studies.study import Study
 from spinepipe.units import COORDINATES
 
 _BOX = published("gould_2024a")["start_stiffness_box"]
-_LOW, _HIGH = _BOX["low"], _BOX["high"]
 
 
 def _rising(sds: tuple[float, ...]) -> tuple[float, ...]:
@@ -77,50 +75,14 @@ class Bootstrap(BaseModel):
     )
 
 
+@with_stiffness(_BOX["low"])
 class LowestStart(Stiffness):
     """Smallest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
 
-    anterior_n_per_m: Translational = Field(
-        default=_LOW["anterior_n_per_m"], description="anterior stiffness, N/m"
-    )
-    superior_n_per_m: Translational = Field(
-        default=_LOW["superior_n_per_m"], description="superior stiffness, N/m"
-    )
-    right_n_per_m: Translational = Field(
-        default=_LOW["right_n_per_m"], description="lateral stiffness, N/m"
-    )
-    extension_nm_per_rad: Rotational = Field(
-        default=_LOW["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
-    )
-    right_bending_nm_per_rad: Rotational = Field(
-        default=_LOW["right_bending_nm_per_rad"], description="lateral bending stiffness, N m/rad"
-    )
-    left_rotation_nm_per_rad: Rotational = Field(
-        default=_LOW["left_rotation_nm_per_rad"], description="axial rotation stiffness, N m/rad"
-    )
 
-
+@with_stiffness(_BOX["high"])
 class HighestStart(Stiffness):
     """Largest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
-
-    anterior_n_per_m: Translational = Field(
-        default=_HIGH["anterior_n_per_m"], description="anterior stiffness, N/m"
-    )
-    superior_n_per_m: Translational = Field(
-        default=_HIGH["superior_n_per_m"], description="superior stiffness, N/m"
-    )
-    right_n_per_m: Translational = Field(
-        default=_HIGH["right_n_per_m"], description="lateral stiffness, N/m"
-    )
-    extension_nm_per_rad: Rotational = Field(
-        default=_HIGH["extension_nm_per_rad"], description="flexion-extension stiffness, N m/rad"
-    )
-    right_bending_nm_per_rad: Rotational = Field(
-        default=_HIGH["right_bending_nm_per_rad"], description="lateral bending stiffness, N m/rad"
-    )
-    left_rotation_nm_per_rad: Rotational = Field(
-        default=_HIGH["left_rotation_nm_per_rad"], description="axial rotation stiffness, N m/rad"
-    )
 
 
 class StartBootstrap(Bootstrap):

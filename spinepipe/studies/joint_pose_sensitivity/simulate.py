@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort.specimen import MeasuredMotion, in_frames
+from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import Program, System, follow, settle
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
-    SpecimenInputs,
     bushing_model,
     sampled_poses,
     specimen_inputs,
@@ -54,11 +53,11 @@ def run(
         except RefusedModel as error:
             reason = str(error)
     ended = _solve_all(settings, inputs, model, reason)
-    motions = [in_frames(m, inputs.nominal, frames or inputs.nominal) for m in inputs.motions]
+    tested = [one.in_frames(inputs.frames, frames or inputs.frames) for one in inputs.tested]
     rows = [
         {**row, "stiffness": stiffness, "joint": cohort.joint_names[row["joint"]]}
-        for case, motion, steps in zip(inputs.cases, motions, ended, strict=True)
-        for row in _case_rows(case, motion, _zeroed(steps) if cohort.zeroed_at_step_0 else steps)
+        for one, steps in zip(tested, ended, strict=True)
+        for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
     ]
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
     given = [] if calibration else [ranked_set(best, specimen, stiffness)]
@@ -91,7 +90,7 @@ class _Ended:
 
 
 def _solve_all(
-    settings: JointPoseSensitivity, inputs: SpecimenInputs, model: SpineModel | None, reason: str
+    settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: SpineModel | None, reason: str
 ) -> list[list[_Ended]]:
     """Ends of all steps of all cases; refused with the reason when there is no model."""
     if model is None:
@@ -128,11 +127,10 @@ def _zeroed(ended: list[_Ended]) -> list[_Ended]:
     return [replace(end, q=None if end.q is None else end.q - first.q) for end in ended]
 
 
-def _case_rows(
-    case: LoadCase, motion: MeasuredMotion, ended: list[_Ended]
-) -> Iterator[dict[str, Any]]:
+def _case_rows(one: MeasuredCycle, ended: list[_Ended]) -> Iterator[dict[str, Any]]:
     """One row per step and joint (by number) of a case; mm and deg."""
-    for step, measured, end in zip(case.steps, from_si(motion.q), ended, strict=True):
+    case = one.case
+    for step, measured, end in zip(case.steps, from_si(one.measured), ended, strict=True):
         nowhere = np.full_like(measured, np.nan)
         predicted = nowhere if end.q is None else from_si(end.q.reshape(-1, 6))
         left = None if end.remaining is None else np.abs(from_si(end.remaining.reshape(-1, 6)))

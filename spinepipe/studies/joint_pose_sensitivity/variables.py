@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS, has_reading
 
 ORIGIN_DISTANCE = "origin_distance"
 _AXES: Mapping[str, str] = {
@@ -16,7 +16,7 @@ _AXES: Mapping[str, str] = {
 
 def readings(rows: pd.DataFrame, zeroed_at_step_0: bool) -> pd.DataFrame:
     """Rows that are readings: where motion is zeroed at step 0, that step's zeros are none."""
-    return rows[rows["step"] > 0] if zeroed_at_step_0 else rows
+    return rows[has_reading(rows["step"], zeroed_at_step_0)]
 
 
 def absolute_error(simulations: pd.DataFrame) -> pd.DataFrame:

@@ -109,10 +109,10 @@ KIND = Kind(
             "draw_stiffness",
             at="draw:draw_stiffness",
             ignores=ignoring(*_MOVING, *_FRAMES),
-            specimens="none",
+            header_alone=True,
         ),
         Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES)),
-        Job("rom_summary", "analyse:summary", ("range_of_motion",), ("rom_summary",)),
-        Job("rom_variance", "analyse:variance", ("range_of_motion",), ("rom_variance",)),
+        Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
+        Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),
 )

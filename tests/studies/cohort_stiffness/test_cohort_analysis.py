@@ -9,17 +9,15 @@ import pytest
 
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.statistics import mean_of
-from spinepipe.studies.cohort_stiffness.claims import (
+from spinepipe.studies.cohort_stiffness.claims import Claim, above_zero
+from spinepipe.studies.cohort_stiffness.claims_of_errors import (
     OWN_READINGS,
-    Claim,
-    above_zero,
     error_findings,
     every_level,
     overprediction_percent,
 )
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     adjusted_share,
-    finding_rows,
     load_case_findings,
     loaded_ratios,
     mean_excess,
@@ -27,7 +25,9 @@ from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     specific,
     stiffness_spreads,
 )
-from spinepipe.studies.cohort_stiffness.ranking import mae_rows, ranked, ranking_rows
+from spinepipe.studies.cohort_stiffness.findings import finding_rows
+from spinepipe.studies.cohort_stiffness.mae import mae_rows
+from spinepipe.studies.cohort_stiffness.ranking import ranked, ranking_rows
 from spinepipe.studies.cohort_stiffness.significance import all_tests, nested_fits
 from spinepipe.studies.cohort_stiffness.stages import (
     of_joint_fits,

@@ -29,16 +29,14 @@ from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
 from spinepipe.studies import read as studies
-from spinepipe.studies.cohort_stiffness import claims_of_stiffness as findings
-from spinepipe.studies.cohort_stiffness import literature, pool, ranking
-from spinepipe.studies.cohort_stiffness import ranking as mae
+from spinepipe.studies.cohort_stiffness import findings, literature, mae, pool, ranking
 from spinepipe.studies.cohort_stiffness import significance as statistics
-from spinepipe.studies.cohort_stiffness.kind import COHORT_ANALYSES, CohortLayout
+from spinepipe.studies.cohort_stiffness.kind import KIND, CohortLayout
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import specimen_tests, start_stiffness
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.significance import load_case_specific
-from spinepipe.tables import TABLES, read, read_frame, to_arrow
+from spinepipe.tables import read, read_frame, to_arrow
 from spinepipe.tables import write as write_table
 from spinepipe.units import COORDINATES
 from tests.generators.phantom import SEED, phantom, write
@@ -650,12 +648,13 @@ def analysed(project: Written) -> Tables:
     layout = CohortLayout.of(settings, cohort)
     parts = made_of_jobs(project, settings.representations, layout.load_sets)
     for name, frames in parts.items():
-        columns = {c.name: list(pd.concat(frames)[c.name]) for c in TABLES[name].columns}
-        write_table(to_arrow(TABLES[name], columns), project.root / f"{name}.parquet", {})
+        shape = KIND.table(name)
+        columns = {c.name: list(pd.concat(frames)[c.name]) for c in shape.columns}
+        write_table(to_arrow(shape, columns), project.root / f"{name}.parquet", {})
     for name in ("mae", "ranking", "statistics", "findings"):
         files = [
             str(project.root / f"{one}.parquet")
-            for one in COHORT_ANALYSES[name]
+            for one in KIND.job(name).reads
             if one in layout.tables
         ]
         output = str(project.root / f"{name}.parquet")
@@ -666,8 +665,8 @@ def analysed(project: Written) -> Tables:
 
 
 JOBS = {
-    "mae": mae.mae,
-    "ranking": ranking.ranking,
+    "mae": mae.run,
+    "ranking": ranking.run,
     "statistics": statistics.run,
     "findings": findings.run,
 }

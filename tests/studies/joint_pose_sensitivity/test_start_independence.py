@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 
 from spinepipe.anatomy import published
-from spinepipe.calibrate import Fit, MeasuredCase, Problem, fit
+from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import read
+from spinepipe.cohort.measured import measured_cycles
 from spinepipe.cohort.specimen import (
     frames_from_landmarks,
-    in_frames,
     joint_frames,
     landmarks,
     load_cases,
-    measured_motion,
     spine_model,
 )
 from spinepipe.effects import create
@@ -47,8 +46,7 @@ def problem(pose: int, stiffness: np.ndarray) -> Problem:
     cases = load_cases(COHORT, SPECIMEN, COHORT.tests, np.zeros(3))
     nominal = joint_frames(COHORT, SPECIMEN)
     measured = tuple(
-        MeasuredCase(case, in_frames(motion, nominal, frames).q)
-        for case, motion in zip(cases, measured_motion(COHORT, SPECIMEN, cases), strict=True)
+        one.in_frames(nominal, frames) for one in measured_cycles(COHORT, SPECIMEN, cases)
     )
     free = free_parameters(model, 0, FREE, "per_specimen")
     reach = np.log(1000.0) - np.log(stiffness / START)[[0, 1, 3]]

@@ -18,7 +18,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
 from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
-from spinepipe.report.words import NAME, POSITIVE, case, count, fixed, short
+from spinepipe.report.words import POSITIVE, case, count, fixed, short
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    OF_JOINTS,
+    POOLED,
+    PUBLISHED,
+    SHARED,
+)
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 
@@ -29,19 +36,19 @@ _BY_WHOM = {
     "fitted": "fitted to this specimen",
     "left_out_specimen": "from the other specimens",
 }
-_ALL = (
-    ("literature", "literature"),
-    ("per_specimen", "fitted"),
-    ("per_joint", "fitted"),
-    ("per_joint", "left_out_specimen"),
-    ("partially_pooled", "left_out_specimen"),
-)
 _FEW = (
-    ("literature", "literature"),
-    ("per_joint", "fitted"),
-    ("partially_pooled", "left_out_specimen"),
+    (PUBLISHED[0], "literature"),
+    (OF_JOINTS[0], "fitted"),
+    (POOLED, "left_out_specimen"),
 )
-_INSTEAD = ("partially_pooled", "per_joint", "per_specimen", "level_ratio")
+_ALL = (
+    _FEW[0],
+    (SHARED[0], "fitted"),
+    _FEW[1],
+    (OF_JOINTS[0], "left_out_specimen"),
+    _FEW[2],
+)
+_INSTEAD = (*OF_JOINTS[::-1], *SHARED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +82,7 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
 
 
 def _title(representation: str, stage: str) -> str:
-    name = NAME[representation]
+    name = IN_WORDS[representation]
     words = name if stage == "literature" else f"{name}, {_BY_WHOM[stage]}"
     return words[:1].upper() + words[1:]
 

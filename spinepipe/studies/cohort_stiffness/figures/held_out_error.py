@@ -4,6 +4,7 @@ Errors of fitted and of held-out motion, one number per specimen.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,11 +16,11 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import finite, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import NAME, count, number
+from spinepipe.report.words import count, number
 from spinepipe.statistics import mean_of
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NAMES, PUBLISHED, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, specimen_rms
-from spinepipe.studies.cohort_stiffness.tables import REPRESENTATIONS
 
 KEYS = ["stage", "representation", "specimen"]
 
@@ -50,10 +51,7 @@ LEAST_DEG = 1e-3
 """Smaller errors, of exact fits, are drawn there."""
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
-_PUBLISHED: dict[str, tuple[str, tuple[int, tuple[int, int]]]] = {
-    "literature": (GREY, (0, (4, 2))),
-    "literature_levels": (THEIRS, (0, (1, 1))),
-}
+_DASHES, _DOTS = (0, (4, 2)), (0, (1, 1))
 
 
 def held_out_error_figure(
@@ -66,7 +64,7 @@ def held_out_error_figure(
     if not panels:
         return saying("No error of a fit can be shown: no fit has a result.")
     fitted = found[found["stage"].isin(panels)]
-    rows = [name for name in REPRESENTATIONS[::-1] if name in set(fitted["representation"])]
+    rows = [name for name in NAMES[::-1] if name in set(fitted["representation"])]
     published = _published(found)
     figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
     axes = side_by_side(figure, len(panels), len(panels), sharey=True, sharex=True)
@@ -77,12 +75,11 @@ def held_out_error_figure(
         axis.set_xlim(low, high)
         log_ticks(axis.xaxis, low, high, 5)
         axis.set_xlabel("root mean square error of rotations (°)")
-        axis.set_yticks(range(len(rows)), [NAME[row].replace(" of ", "\nof ") for row in rows])
+        axis.set_yticks(range(len(rows)), [IN_WORDS[row].replace(" of ", "\nof ") for row in rows])
         axis.set_ylim(-0.55, len(rows) - 0.35)
         axis.spines["left"].set_visible(False)
         for representation, value in published.items():
-            color, dashes = _PUBLISHED[representation]
-            axis.axvline(value, color=color, ls=dashes, lw=1.0, zorder=1)
+            axis.axvline(value, **_look(representation), zorder=1)
         _draw(axis, found[found["stage"] == name], rows)
     _explain(figure, published, len(cohort.specimen_names))
     return figure
@@ -92,7 +89,14 @@ def _published(found: pd.DataFrame) -> dict[str, float]:
     """Mean error over specimens of each published set."""
     rows = found[found["stage"] == "literature"]
     means = rows.groupby("representation")["error"].mean()
-    return {name: float(means[name]) for name in _PUBLISHED if name in means.index}
+    return {name: float(means[name]) for name in PUBLISHED if name in means.index}
+
+
+def _look(published: str) -> dict[str, Any]:
+    """Line of a published set."""
+    if named(published).by_level:
+        return {"color": THEIRS, "ls": _DOTS, "lw": 1.0}
+    return {"color": GREY, "ls": _DASHES, "lw": 1.0}
 
 
 def _reach(values: Sequence[float]) -> tuple[float, float]:
@@ -144,9 +148,8 @@ def _explain(figure: Figure, published: Mapping[str, float], specimens: int) -> 
     mean = "mean with 95 % interval" if specimens > 1 else "mean"
     handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
     for name, value in published.items():
-        color, dashes = _PUBLISHED[name]
-        label = f"{NAME[name]}: {number(value)}°"
-        handles.append(Line2D([], [], color=color, ls=dashes, lw=1.0, label=label))
+        label = f"{IN_WORDS[name]}: {number(value)}°"
+        handles.append(Line2D([], [], **_look(name), label=label))
     words = (
         "All measured rotations of all joints, load steps and used cycles; "
         f"{count(specimens, 'specimen')}. Vertical lines: stiffness that was not fitted at all."

@@ -16,14 +16,13 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import BAR_PT, Array, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
-from spinepipe.report.words import AXIS, NAME, case, count, short
+from spinepipe.report.words import AXIS, case, count, short
 from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, OF_JOINTS, SHARED
 from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
 
 _KEYS = ["specimen", "representation", "joint", "coordinate"]
-_SHARED = ("per_specimen", "level_ratio")
-"""Representations with one unknown for all joints of a specimen."""
 
 
 def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
@@ -39,7 +38,7 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     """
     own = stiffness[stiffness["source"] == "own"]
     first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
-    own = own[~own["representation"].isin(_SHARED) | first]
+    own = own[~own["representation"].isin(SHARED) | first]
     single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
     whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
     both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
@@ -53,7 +52,7 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
 
 
-_SHOWN = ("per_specimen", "per_joint")
+_SHOWN = (SHARED[0], OF_JOINTS[0])
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
 _LEAST_REACH, _FARTHEST = 1.15, 30.0
 _FEW, _MOST_INTERVALS = 12, 120
@@ -90,7 +89,7 @@ def load_case_stiffness_figure(
             place = axis.get_subplotspec()
             axis.tick_params(labelleft=place is None or place.is_first_col())
             if index == 0:
-                axis.set_ylabel(NAME[representation], fontweight="bold")
+                axis.set_ylabel(IN_WORDS[representation], fontweight="bold")
     tested = [_tested(study, tables["statistics"], name) for name in shown]
     _explain(figure, found[found["representation"].isin(shown)], tested)
     return figure
@@ -247,6 +246,6 @@ def _tested(study: CohortStiffness, statistics: pd.DataFrame, representation: st
         return ""
     many = int((known < study.significance).sum())
     return (
-        f"{NAME[representation].capitalize()}: separate stiffness is significantly better in "
+        f"{IN_WORDS[representation].capitalize()}: separate stiffness is significantly better in "
         f"{many} of {count(len(known), 'specimen')} (nested F test, Holm)."
     )

@@ -22,7 +22,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_upright, finite, quartiles
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
-from spinepipe.report.words import AXIS, NAME, count, listed, number, short, stiffness_unit
+from spinepipe.report.words import AXIS, count, listed, number, short, stiffness_unit
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    OF_JOINTS,
+    PUBLISHED,
+    SHARED,
+    named,
+)
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.units import COORDINATES
@@ -188,7 +195,7 @@ MOST_INTERVALS = 170
 
 _PANEL_MM, _KEY_MM = 56.0, 22.0
 _MOST_NAMES = 12
-_FROM_BEST = ("per_joint", "partially_pooled", "per_specimen", "level_ratio")
+_FROM_BEST = (*OF_JOINTS, *SHARED)
 _MARKS = (Mark(OURS, "o", 3.4), Mark(BEST, "D", 2.9))
 _DASHES: tuple[int, tuple[int, int]] = (0, (4, 2))
 
@@ -221,7 +228,7 @@ def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
     """At most two: those with a value for each joint first; one where two would crowd."""
     known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
     found = [name for name in _FROM_BEST if name in set(known["representation"])]
-    free = [name for name in found if name in _FROM_BEST[:2]] or found[:1]
+    free = [name for name in found if name in OF_JOINTS] or found[:1]
     one = len(cohort.joint_names) * len(cohort.specimen_names)
     return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
 
@@ -267,10 +274,11 @@ def _draw(
 
 def _draw_published(axis: Axes, published: pd.DataFrame, levels: Sequence[str]) -> None:
     """The same value for all joints as a dashed line, values of levels as short bars."""
-    one = finite(published.loc[published["representation"] == "literature", "stiffness"])
-    if len(one):
-        axis.axhline(one[0], color=GREY, lw=0.8, ls=_DASHES, zorder=1.5)
-    each = published[published["representation"] == "literature_levels"]
+    by_level = published["representation"].map(lambda name: named(name).by_level).astype(bool)
+    for _, rows in published[~by_level].groupby("representation", sort=False):
+        for value in finite(rows["stiffness"])[:1]:
+            axis.axhline(value, color=GREY, lw=0.8, ls=_DASHES, zorder=1.5)
+    each = published[by_level]
     for joint, value in each.groupby("joint")["stiffness"].first().dropna().items():
         x = list(levels).index(str(joint))
         axis.plot(
@@ -301,16 +309,17 @@ def _explain(
                 ms=2.2,
                 mew=0,
                 ls="",
-                label=f"{NAME[shown[0]]}, a specimen",
+                label=f"{IN_WORDS[shown[0]]}, a specimen",
             )
         )
     else:
-        handles += [handle(mark, NAME[name]) for mark, name in zip(_MARKS, shown, strict=False)]
+        handles += [handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
-    if "literature" in published:
-        handles.append(Line2D([], [], color=GREY, lw=0.8, ls=_DASHES, label=NAME["literature"]))
-    if "literature_levels" in published:
-        handles.append(Line2D([], [], color=THEIRS, lw=1.4, label=NAME["literature_levels"]))
+    for name in (name for name in PUBLISHED if name in published):
+        look = {"color": THEIRS, "lw": 1.4}
+        if not named(name).by_level:
+            look = {"color": GREY, "lw": 0.8, "ls": _DASHES}
+        handles.append(Line2D([], [], **look, label=IN_WORDS[name]))
     doubt = bool(doubted(rows[rows["stiffness"].notna()]).any())
     if doubt and not _crowded(cohort):
         handles.append(handle(_MARKS[0].hollow(), "not identifiable or at a bound"))

@@ -12,6 +12,7 @@ from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.units import without_step_0
 
 STEP_S = 10.0
 """Assumed between load steps where no times are recorded."""
@@ -148,8 +149,8 @@ def _repeats(one: Planned, zeroed: bool) -> Repeats:
     read = np.broadcast_to(
         number < one.count, (len(number), len(one.case.steps), *one.count.shape)
     ).copy()
-    read[:, 0] &= not zeroed
-    return Repeats(one.case, np.where(read, 0.0, np.nan))
+    readings = np.where(read, 0.0, np.nan)
+    return Repeats(one.case, without_step_0(readings.swapaxes(0, 1), zeroed).swapaxes(0, 1))
 
 
 def thinned(plan: Plan, steps: int) -> Plan:

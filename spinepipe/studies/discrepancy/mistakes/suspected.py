@@ -15,23 +15,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
 
 ALL = "all specimens"
-
-
-@dataclass(frozen=True)
-class SuspectedError:
-    """A mistake that the data point to; nothing is corrected.
-
-    Attributes
-    ----------
-    where : specimens, and joint, coordinate or test. what : the mistake. evidence : with numbers.
-    """
-
-    where: str
-    what: str
-    evidence: str
 
 
 def of_specimens(names: Iterable[str], every: Iterable[str]) -> str:
@@ -108,7 +94,7 @@ def joint_moments(frames: tuple[Pose, ...], case: LoadCase) -> Array:
 
 
 def _of_test(specimen: str, test: Repeats, moments: Array, zeroed: bool) -> list[Answer]:
-    centred = moments - (moments[0] if zeroed else moments.mean(axis=0))
+    centred = less_step_0(moments, True) if zeroed else moments - moments.mean(axis=0)
     power = np.sum(centred**2, axis=0)
     least = np.maximum(
         MAIN_SHARE * power.max(axis=1, keepdims=True), NEAR_OTHERS**2 * power.max(initial=0.0)
@@ -119,7 +105,7 @@ def _of_test(specimen: str, test: Repeats, moments: Array, zeroed: bool) -> list
         motion = test.mean[:, joint, COORDINATES.index(name)]
         load = moments[:, joint, number]
         there = np.isfinite(motion)
-        load, motion = load[there] - (load[0] if zeroed else 0.0), motion[there]
+        load, motion = less_step_0(load, zeroed)[there], motion[there]
         if not zeroed and len(load):
             load, motion = load - load.mean(), motion - motion.mean()
         if load @ load > 0.0:

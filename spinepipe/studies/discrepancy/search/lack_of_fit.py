@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.screen import Group
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
 from spinepipe.world import Chain
 
 SIZE = 0.1
@@ -94,7 +94,7 @@ def generic_columns(
             drift = _drift(len(motion), SIZE * reach[:, at], at)
             moved[place].append(np.concatenate([_motion(solved[place], loads, at), drift], axis=-1))
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
-    seen = [c - c[0] if zeroed else c for c in stacked]
+    seen = [less_step_0(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
 
 

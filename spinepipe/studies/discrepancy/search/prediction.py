@@ -18,6 +18,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
+from spinepipe.units import less_step_0
 from spinepipe.world import Chain
 
 
@@ -85,8 +86,7 @@ class Simulated:
 
     def _seen(self, rows: list[Array]) -> Array:
         """(T, ...) by load step, less step 0 where readings were zeroed."""
-        stacked = np.stack(rows)
-        return stacked - stacked[0] if self.zeroed else stacked
+        return less_step_0(np.stack(rows), self.zeroed)
 
 
 class Solved:
@@ -123,8 +123,7 @@ class Solved:
                 observed_by_parameters(system, step.equilibrium.q, dq, free)
                 for step, dq in zip(steps, by_parameters(system, steps, free), strict=True)
             ]
-            stacked = np.stack(seen)
-            found.append(stacked - stacked[0] if self.zeroed else stacked)
+            found.append(less_step_0(np.stack(seen), self.zeroed))
         return tuple(found)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.specimen import joint_frames, load_cases, measured_motion
+from spinepipe.cohort.measured import measured_specimen
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
@@ -59,23 +59,11 @@ def specimen_readings(
     cohort: Cohort, specimen: str, tests: Sequence[str], coordinates: Sequence[str]
 ) -> SpecimenReadings:
     """Readings of a specimen in these tests and coordinates; tests without any are left out."""
-    cases = load_cases(cohort, specimen, tests, np.zeros(3))
-    motions = measured_motion(cohort, specimen, cases)
-    read = [
-        (case, _read(motion.q, coordinates, cohort.zeroed_at_step_0))
-        for case, motion in zip(cases, motions, strict=True)
-    ]
-    read = [(case, q) for case, q in read if np.isfinite(q).any()]
-    return SpecimenReadings(specimen, joint_frames(cohort, specimen), _grouped(read))
-
-
-def _read(q: Array, coordinates: Sequence[str], zeroed: bool) -> Array:
-    """(T, J, 6) what was read: no other coordinates, and no zeros that zeroing made."""
+    one = measured_specimen(cohort, specimen, tests)
     chosen = np.array([name in coordinates for name in COORDINATES])
-    readings = np.where(chosen, q, np.nan)
-    if zeroed:
-        readings[0] = np.nan
-    return readings
+    read = [(cycle.case, np.where(chosen, cycle.readings, np.nan)) for cycle in one.tested]
+    read = [(case, q) for case, q in read if np.isfinite(q).any()]
+    return SpecimenReadings(specimen, one.frames, _grouped(read))
 
 
 def _grouped(read: Sequence[tuple[LoadCase, Array]]) -> tuple[Repeats, ...]:

@@ -1,13 +1,4 @@
-"""Which outputs the figures show, and the rows of each.
-
-Which coordinate a test loads, and at which step most: also of loads without a moment.
-
-Which indices a study has, and how they are called.
-
-What figures and sentences call outputs and factors.
-
-What stands above and below the panels of sensitivity figures.
-"""
+"""Which outputs the figures and findings show, the rows of each, and what they are called."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

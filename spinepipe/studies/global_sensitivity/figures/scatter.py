@@ -1,7 +1,4 @@
-"""Figure: outputs of all runs over the values of the factors that lead.
-
-Outputs run by run beside the factors' values.
-"""
+"""Figure: outputs of all runs over the values of the factors that lead."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,9 +1,4 @@
-"""Figure: how far every joint moves in every test, and how far specimens differ.
-
-Panels of range-of-motion figures: one for each test, a row for each joint.
-
-Figure: what the motion of every joint hangs on.
-"""
+"""Figures: how far every joint moves in every test, and what that hangs on."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,9 +15,9 @@ from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, case, count
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.tables import EVERY
 from spinepipe.units import COORDINATES
 
-EVERY = "*"
 _ABOVE_AND_BELOW_MM, _KEY_MM = 14.0, 17.0
 
 
