@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.calibrate.descent import OFF_THE_PATH
 from spinepipe.calibrate.fit import (
     AT_THE_BRINK,
-    OFF_THE_PATH,
     TIPPED,
     bounds_reached,
     names_at_bound,
@@ -26,11 +26,11 @@ from spinepipe.calibrate.fit import (
     values,
 )
 from spinepipe.calibrate.hierarchy import Hierarchy, between, change, condensed, estimated
-from spinepipe.calibrate.problem import Evaluation, Evaluator, MeasuredCase, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
 from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import RefusedModel
+from spinepipe.model import MeasuredCase, RefusedModel
 from spinepipe.status import Status
 
 
