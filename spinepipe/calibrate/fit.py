@@ -1,6 +1,7 @@
 """Bounded least squares with the exact Jacobian, from several starts, with honest status.
 
-Points of a problem: where it can start from, what is at a bound, whether loads lead there.
+An optimum counts only where the cost is level, or held by a bound, and where the loads lead to its
+poses from the neutral pose.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """A calibration problem: a model, the tests it was measured in, and what may be moved to fit.
 
-Bounds of unknowns, drawn in to what the effects declare for their parameters.
-
-Readings that were zeroed at step 0 share its error: whitening makes them independent again.
+Bounds of unknowns are drawn in to what the effects declare for their parameters. Readings that were
+zeroed at step 0 share its error: whitening makes them independent again.
 
 With one SD for every reading before zeroing, the n readings of a joint's coordinate in one cycle
 have covariance SD^2 (I + 1 1'). The inverse root of I + 1 1' is I - c 1 1' with c = (1 - 1 / sqrt(1

@@ -1,8 +1,7 @@
-"""Has every joint of every specimen a pose?
+"""Can the geometry of a cohort be that of spines?
 
-Are neighbours as far apart as in a spine? Metres taken for millimetres show here.
-
-Can the bodies exist, and are all there that gravity needs?
+Has every joint of every specimen a pose? Are neighbours as far apart as in a spine (metres taken
+for millimetres show here)? Can the bodies exist, and are all there that gravity needs?
 """
 
 from collections.abc import Iterator, Mapping

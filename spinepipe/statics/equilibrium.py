@@ -1,17 +1,15 @@
-"""Equilibrium by Newton with the exact tangent, continued along the load when it must be.
+"""Equilibrium by Newton with the exact tangent, continued along the load; is it stable?
 
-One LU factorisation of a tangent, reused for the step, the determinant and the sensitivities.
+The LU factors of a tangent serve the step, the determinant and the sensitivities.
 
-Newton held back by a line search: the way to an equilibrium across corners in a path law.
+Across corners in a path law Newton is held back by a line search. Friction meets a joint that turns
+on and one that turns back with different slopes, and full steps may jump to and fro between them.
+The load is still continuous and grows along every direction, so the work along a step has a least
+value; steps that stop near it arrive.
 
-Friction meets a joint that turns on and one that turns back with different slopes, and full
-Newton steps may jump to and fro between them. The load is still continuous and grows along every
-direction, so the work along a step has a least value; steps that stop near it arrive.
-
-Is an equilibrium stable? Decided by the linearised damped motion M x'' + C x' + K x = 0.
-
-K is not symmetric under a constant moment, so its symmetric part alone decides nothing. Cheap
-sufficient tests come first; the 2n eigenvalues are computed only when these leave a doubt.
+Stability is decided by the linearised damped motion M x'' + C x' + K x = 0. K is not symmetric
+under a constant moment, so its symmetric part alone decides nothing. Cheap sufficient tests come
+first; the 2n eigenvalues are computed only when these leave a doubt.
 """
 
 from dataclasses import dataclass

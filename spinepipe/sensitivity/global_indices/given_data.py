@@ -1,17 +1,13 @@
 """Indices from a Latin hypercube, or what is left of it: RBD-FAST, PAWN, delta, regional.
 
-Delta: how much of the output's density a factor moves. The estimator is SALib's.
+RBD-FAST gives first-order indices from any sample. PAWN tells how far the output's distribution
+moves when a factor is held in a slice of its range, delta how much of its density; regional
+sensitivity asks whether runs with extreme outputs have other factor values than the rest. Delta's
+estimator is SALib's.
 
-Kolmogorov-Smirnov distances of weighted samples, all resamples at once.
-
-scipy's `ks_2samp` gives the same statistic (tests), one resample at a time in 0.6 ms or more; PAWN
-of 24 factors and 50 outputs with 1,000 resamples asks for 12 million of them.
-
-PAWN: how far the output's distribution moves when a factor is held in a slice of its range.
-
-First-order indices from any sample by RBD-FAST.
-
-Regional sensitivity: do runs with extreme outputs have other factor values than the rest?
+Kolmogorov-Smirnov distances are those of weighted samples, all resamples at once: scipy's
+`ks_2samp` gives the same statistic (tests), one resample at a time in 0.6 ms or more; PAWN of 24
+factors and 50 outputs with 1,000 resamples asks for 12 million of them.
 """
 
 import warnings

@@ -1,10 +1,7 @@
-"""All indices of a design's outputs.
+"""All indices of a design's outputs, with status, message and noise floor.
 
-The noise floor: what an index says of a factor that changes nothing.
-
-Which runs are left when some failed, block by block.
-
-From estimates to indices with status and message.
+Where runs failed, what is left is told block by block. The noise floor is what an index says of a
+factor that changes nothing.
 """
 
 from collections.abc import Sequence

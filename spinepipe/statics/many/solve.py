@@ -1,14 +1,11 @@
-"""Equilibria of many spines that differ in numbers alone.
+"""Equilibria of many spines that differ in numbers alone, solved together in numpy.
 
-Those that Newton reaches at once and that are stable for sure are solved together, in numpy. All
-others, and models with effects that are not laws of single joints, go to the engine of record.
+Newton runs on all chains at once, each until it has arrived, as the engine judges. Those that it
+does not reach at once or that are not stable for sure, and models with effects that are not laws of
+single joints, go to the engine of record.
 
-Newton on many chains at once: each goes on until it has arrived, as the engine judges.
-
-Which of many equilibria are stable for sure, by tests that are sufficient and cheap.
-
-In coordinates where damping is one, M x'' + x' + (S + A) x = 0, with the tangent's symmetric and
-skew parts S and A. Both tests stand on an energy whose decay proves stability:
+Stable for sure: in coordinates where damping is one, M x'' + x' + (S + A) x = 0, with the tangent's
+symmetric and skew parts S and A. Both tests stand on an energy whose decay proves stability:
 
 V = x'.Mx' / 2 + e x'.Mx + x.(S + e) x / 2,  dV/dt = -x'.(1 - e M) x' - x'.A x - e x.S x,
 
