@@ -15,10 +15,8 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import AppliedLoad, Draft
 from spinepipe.cohort.text import Document
+from spinepipe.model import MOST_JOINTS
 from spinepipe.problems import Problem, did_you_mean, one_of
-
-MOST_JOINTS = 20
-"""The physics engine is wrong without notice above 120 coordinates, six to a joint."""
 
 REGIONS = "SLTC"
 """Sacral, lumbar, thoracic, cervical: caudal to cranial."""
