@@ -298,7 +298,7 @@ class Document:
         """What is shown of each of the first specimens."""
         shown = cohort.specimen_names[:_MOST_SHOWN]
         views = [view_of(cohort, name, self.tests, self.load_shift_mm) for name in shown]
-        return views if self.with_loads else [replace(v, cases=(), motions=()) for v in views]
+        return views if self.with_loads else [replace(v, tested=()) for v in views]
 
 
 def _part(name: str) -> str:
