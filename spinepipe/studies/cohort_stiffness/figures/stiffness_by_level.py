@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -305,7 +306,7 @@ def _explain(
         handles += [handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
     for name in (name for name in PUBLISHED if name in published):
-        look = {"color": THEIRS, "lw": 1.4}
+        look: dict[str, Any] = {"color": THEIRS, "lw": 1.4}
         if not named(name).by_level:
             look = {"color": GREY, "lw": 0.8, "ls": _DASHES}
         handles.append(Line2D([], [], **look, label=IN_WORDS[name]))
