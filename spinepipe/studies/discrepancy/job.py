@@ -5,7 +5,7 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -226,7 +226,10 @@ def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> 
         not_testable=told.not_testable,
         noise=_noise(found.base.noise),
         rms_residual=Sizes(UNIT, *(gap.rms if gap else None for gap in gaps)),
-        gap=Gaps(UNIT, *(gap.gap if gap else None for gap in gaps), proof.closed),
+        gap=Gaps(
+            **asdict(Sizes(UNIT, *(gap.gap if gap else None for gap in gaps))),
+            held_out_closed=proof.closed,
+        ),
         smallest_detectable=told.smallest_detectable,
         unknown=_unknown(found, ended, final),
         suspected_data_errors=investigation.errors,
