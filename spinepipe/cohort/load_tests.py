@@ -1,6 +1,7 @@
-"""Tests that nobody did: pure moments on the most cranial vertebra, in equal steps from nothing.
+"""What a load case mainly does, and virtual tests that nobody did.
 
-What a load case mainly does: its largest moment, and which joint coordinate that drives.
+Mainly: its largest moment, and which joint coordinate that drives. Virtual: pure moments on the
+most cranial vertebra, in equal steps from nothing.
 """
 
 from collections.abc import Mapping, Sequence

@@ -145,10 +145,16 @@ def across_of(n: int, most: int = MOST_ACROSS) -> int:
 
 def side_by_side(figure: Figure, n: int, across: int, **how: Any) -> list[Axes]:
     """``n`` panels line by line, so many side by side; ``how`` goes to ``subplots``."""
-    panels = list(figure.subplots(-(-n // across), across, squeeze=False, **how).ravel())
-    for spare in panels[n:]:
+    lines = lines_of(figure, n, across, **how)
+    return [panel for line in lines for panel in line][:n]
+
+
+def lines_of(figure: Figure, n: int, across: int, **how: Any) -> list[list[Axes]]:
+    """The same by lines, the last with its spare panels, which do not show."""
+    lines = figure.subplots(-(-n // across), across, squeeze=False, **how)
+    for spare in list(lines.ravel())[n:]:
         spare.set_visible(False)
-    return panels[:n]
+    return [list(line) for line in lines]
 
 
 def head(axis: Axes, index: int, words: str) -> None:

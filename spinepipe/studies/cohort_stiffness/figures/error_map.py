@@ -13,7 +13,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
-from spinepipe.report.panels import explain_marks
+from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
 from spinepipe.report.words import POSITIVE, case, count, fixed, short
 from spinepipe.studies.cohort_stiffness.representations import (
@@ -122,7 +122,7 @@ def error_map_figure(
             axis.set_title(
                 f" \n{words}" if words else " ", fontweight="normal", fontsize=6.5, linespacing=1.7
             )
-        _heading(axes[line][0], line, stage.title)
+        head_line(axes[line][0], line, stage.title, 12.5 if line == 0 else 3.5)
     assert image is not None
     _explain(figure, axes, image, scale, found, signs)
     return figure
@@ -148,8 +148,7 @@ def _room(cohort: Cohort, across: int, lines: int) -> bool:
 def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Axes]]]:
     rows = len(cohort.specimen_names) * _line_mm(cohort, lines)
     figure = blank(lines * (rows + _HEAD_MM) + _NAMES_MM + _KEY_MM)
-    axes = figure.subplots(lines, across, squeeze=False)
-    return figure, [list(line) for line in axes]
+    return figure, lines_of(figure, lines * across, across)
 
 
 def _scale(found: Sequence[Stage]) -> Normalize:
@@ -249,23 +248,6 @@ def _over(test: str, loaded: pd.DataFrame, across: int) -> str:
     room = _LETTERS // across
     words = short(case(test), room)
     return words + direction if len(words) + len(direction) <= room else words
-
-
-def _heading(axis: Axes, line: int, words: str) -> None:
-    """Letter and words above the first panel of a line, over the names of the load cases."""
-    above = 12.5 if line == 0 else 3.5
-    axis.annotate(
-        f"{chr(ord('a') + line)}   {words}",
-        (0.0, 1.0),
-        (0.0, above),
-        va="bottom",
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=7.5,
-        fontweight="bold",
-        annotation_clip=False,
-        in_layout=False,
-    )
 
 
 def _explain(

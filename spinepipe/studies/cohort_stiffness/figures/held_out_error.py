@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import finite
-from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.marks import finite, spread_out
+from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number
 from spinepipe.statistics import mean_of
@@ -32,7 +32,6 @@ LEAST_DEG = 1e-3
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
 _DASHES, _DOTS = (0, (4, 2)), (0, (1, 1))
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 def held_out_error_figure(
@@ -48,7 +47,7 @@ def held_out_error_figure(
     rows = [name for name in NAMES[::-1] if name in set(fitted["representation"])]
     published = _published(found)
     figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
-    axes = figure.subplots(1, len(panels), sharey=True, sharex=True, squeeze=False).ravel()
+    axes = side_by_side(figure, len(panels), len(panels), sharey=True, sharex=True)
     low, high = _reach([*finite(fitted["error"]), *published.values()])
     for index, (name, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, PANELS[name])
@@ -111,8 +110,16 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
             note(axis, 0.02, y, "no result", GREY)
             continue
         shown = np.maximum(values, LEAST_DEG)
-        shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * 0.3
-        axis.plot(shown, y - 0.12 + shift, "o", color=OURS, ms=3.0, mew=0, alpha=0.55, zorder=3)
+        axis.plot(
+            shown,
+            y - 0.12 + 0.3 * spread_out(len(values)),
+            "o",
+            color=OURS,
+            ms=3.0,
+            mew=0,
+            alpha=0.55,
+            zorder=3,
+        )
         words = f"{number(float(values.mean()))}°"
         interval = mean_of(values).interval
         if interval is not None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import BAR_PT, Array, finite, quartiles
+from spinepipe.report.marks import BAR_PT, Array, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
 from spinepipe.report.words import AXIS, case, count, short
@@ -22,7 +22,6 @@ from spinepipe.units import COORDINATES
 _KEYS = ["specimen", "representation", "joint", "coordinate"]
 _SHOWN = (SHARED[0], OF_JOINTS[0])
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _LEAST_REACH, _FARTHEST = 1.15, 30.0
 
 _FEW, _MOST_INTERVALS = 12, 120
@@ -202,7 +201,7 @@ def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool
 def _shifts(n: int) -> Array:
     """(n,) places around the middle of a row: in order where they are few, else mixed."""
     if n > _FEW:
-        return np.asarray((np.arange(n) * _GOLDEN % 1.0 - 0.5) * 0.5, dtype=float)
+        return 0.5 * spread_out(n)
     return 0.3 - 0.6 * (np.arange(n) + 0.5) / n
 
 

@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
-from spinepipe.report.panels import explain_marks, sections
+from spinepipe.report.panels import explain_marks, head, sections, side_by_side
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, blank, note, saying
 from spinepipe.report.words import fixed, number, plain, short, tick
 from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell, name_cells
@@ -47,14 +47,14 @@ def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
     if not rows:
         return saying("Nothing can be shown: no effect could be tried.")
     figure = blank(len(rows) * _SQUARE_MM + _BESIDE_MM + _SCALE_MM)
-    left, right = figure.subplots(1, 2, width_ratios=[3.0, 1.0], sharey=True)
+    left, right = side_by_side(figure, 2, 2, width_ratios=[3.0, 1.0], sharey=True)
     grid = _square(confusions, rows, names)
     decimals = 2 if len(rows) <= _MOST_WITH_NUMBERS else None
     image = draw_heat(left, np.where(grid < _LEAST_SHARE, 0.0, grid), Normalize(0.0, 1.0), decimals)
     name_cells(left, [plain(name) for name in rows], [plain(name) for name in names], True)
     _detectable(right, rows, hidden, _gaps(candidates, verdict))
     for index, (axis, words) in enumerate(zip((left, right), HEADINGS, strict=True)):
-        axis.set_title(f"{chr(ord('a') + index)}   {words}")
+        head(axis, index, words)
     left.set_ylabel("effect that is there")
     left.set_xlabel("effect that is taken for it")
     bar = figure.colorbar(image, ax=[left, right], location="bottom", aspect=60, shrink=0.6)
@@ -139,7 +139,7 @@ def effect_evidence_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -
         axis.set_xlim(low, high)
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
         axis.set_xlabel("log evidence for the effect")
-        axis.set_title(f"{chr(ord('a') + index)}   {_title(rounds[:index])}")
+        head(axis, index, _title(rounds[:index]))
         if threshold is not None:
             axis.axvline(threshold, color=BLACK, lw=0.8, ls="--", zorder=5)
     explain_marks(figure, _handles(verdict), _words(verdict), len(_handles(verdict)))

@@ -13,9 +13,9 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.report.marks import Array
-from spinepipe.report.panels import sections
+from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
-from spinepipe.report.words import AXIS, capital, count, plain, short, unit
+from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
 from spinepipe.studies.global_sensitivity.settings import DUMMY
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
@@ -240,7 +240,7 @@ def title(index: int, panel: Panel) -> str:
     """Letter, test and joint, and below them the output."""
     first = where(panel.test, panel.joint)
     second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
-    return f"{chr(ord('a') + index)}   " + "\n".join(part for part in (first, second) if part)
+    return lettered(index, "\n".join(part for part in (first, second) if part))
 
 
 def factor_name(factor: str, longest: int = _LONGEST) -> str:
@@ -262,7 +262,7 @@ def kind(output: str, coordinate: str) -> str:
 
 def where(test: str, joint: str) -> str:
     """``flexion, L1L2``: what there is of them."""
-    return ", ".join(part for part in (capital(plain(test)), joint) if part)
+    return ", ".join(part for part in (case(test), joint) if part)
 
 
 def unit_of(output: str, coordinate: str) -> str:

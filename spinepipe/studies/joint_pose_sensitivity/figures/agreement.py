@@ -10,7 +10,16 @@ from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import EXACT, exact, rounded
-from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
+from spinepipe.report.panels import (
+    Rows,
+    explain,
+    grid,
+    head,
+    label_rows,
+    row_height,
+    rows_of,
+    side_by_side,
+)
 from spinepipe.report.style import BLACK, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, unit
 from spinepipe.studies.joint_pose_sensitivity.findings import settling
@@ -101,10 +110,7 @@ def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
     across = min(n, n_coordinates if n_coordinates > 1 else _ACROSS_AT_MOST)
     down = -(-n // across)
     figure = blank(down * _PANEL_MM + _KEY_MM)
-    panels = list(figure.subplots(down, across, squeeze=False).ravel())
-    for spare in panels[n:]:
-        spare.set_visible(False)
-    return figure, panels[:n]
+    return figure, side_by_side(figure, n, across)
 
 
 def _draw(axis: Axes, panel: _Panel) -> None:

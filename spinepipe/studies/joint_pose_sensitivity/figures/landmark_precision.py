@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.panels import explain, head
+from spinepipe.report.panels import explain, head, lines_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import count, fixed, number, tick
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
@@ -35,7 +35,7 @@ def landmark_precision_figure(
         return saying("No error can be shown: no sampled pose has a result at any landmark SD.")
     figure = blank(_HEIGHT_MM)
     measured = [motion for motion in MOTIONS if (curves["motion"] == motion).any()]
-    axes = figure.subplots(2, len(measured), sharex=True, squeeze=False)
+    axes = lines_of(figure, 2 * len(measured), len(measured), sharex=True)
     for index, motion in enumerate(measured):
         symbol, here = MOTIONS[motion], curves[curves["motion"] == motion]
         upper, lower = axes[0][index], axes[1][index]

@@ -11,7 +11,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import STRIP_KEY, draw_interval, draw_strip, finite
-from spinepipe.report.panels import explain, head, log_ticks
+from spinepipe.report.panels import explain, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number, percent, tick
 from spinepipe.status import Status
@@ -38,7 +38,7 @@ def success_figure(
         return saying("Not compared: " + "; ".join(dict.fromkeys(why.values())) + ".")
     paper = _paper(cohort)
     figure = blank(_AROUND_MM + _ROW_MM * (len(methods) + bool(paper)))
-    axes = figure.subplots(1, 3, sharey=True)
+    axes = side_by_side(figure, 3, 3, sharey=True)
     for index, axis in enumerate(axes):
         words = ("Successful fits", "Error of the derivative", "Runs of the model per fit")
         head(axis, index, words[index])
