@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_upright, finite, quartiles
-from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
-from spinepipe.report.words import AXIS, count, first_of, number, short, stiffness_unit
+from spinepipe.report.words import AXIS, count, listed, number, short, stiffness_unit
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
     OF_JOINTS,
@@ -79,7 +79,7 @@ def stiffness_by_level_figure(
         return saying("No stiffness was found for any specimen" + (f": {why}." if why else "."))
     names = [name for name in COORDINATES if name in set(rows["coordinate"])]
     figure = blank(_PANEL_MM * len(names) + _KEY_MM)
-    axes = figure.subplots(len(names), 1, squeeze=False).ravel()
+    axes = side_by_side(figure, len(names), 1)
     for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
         head(axis, index, AXIS[name])
         published = stiffness[
@@ -335,8 +335,7 @@ def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
     else:
         several = len(cohort.specimen_names) > 1
         if several:
-            words.append(
-                f"in each level from left to right: {first_of(cohort.specimen_names, _MOST_NAMES)}"
-            )
+            names = listed(map(short, cohort.specimen_names), _MOST_NAMES, last=None)
+            words.append(f"in each level from left to right: {names}")
         words += ["line: 95 % interval, where longer than the symbol", "▲▼: beyond the axis"]
     return "; ".join(words) + "."
