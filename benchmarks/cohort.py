@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from spinepipe.jobs.layouts import files_of
 
 from benchmarks.engine import Result, off, with_moments
 from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
@@ -15,6 +14,7 @@ from spinepipe.statics import System, follow, free_parameters, moved
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.read import check
+from spinepipe.studies.registry import files_of
 from spinepipe.units import STIFFNESS_COLUMNS
 from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model

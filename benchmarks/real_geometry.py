@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow.parquet as pq
-from spinepipe.jobs.layouts import files_of
 
 from benchmarks.study import Run, copy_of_project, run_workflow
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.read import check
+from spinepipe.studies.registry import files_of
 
 STUDY = "real_geometry"
 COHORT_VARIABLE = "SPINEPIPE_REAL_COHORT"

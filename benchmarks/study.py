@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
-from spinepipe.jobs.layouts import files_of
 
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.read import check
+from spinepipe.studies.registry import files_of
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "l1l4_joint_pose"

@@ -16,7 +16,7 @@ from spinepipe.jobs.model_mark import base_marks
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.kind import Job
 from spinepipe.studies.read import check
-from spinepipe.studies.registry import kind_of
+from spinepipe.studies.registry import files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles
 
@@ -35,7 +35,7 @@ class Expected:
     @cached_property
     def files(self) -> StudyFiles:
         """Names of the files."""
-        return kind_of(self.study.kind).files.of(self.study, self.cohort)
+        return files_of(self.study, self.cohort)
 
     @cached_property
     def _known(self) -> dict[Any, str]:

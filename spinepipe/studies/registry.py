@@ -9,7 +9,10 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Kind
+from spinepipe.studies.study import Study
+from spinepipe.studies.study_files import StudyFiles
 
 _HERE = Path(__file__).resolve().parent
 PACKAGE = "spinepipe.studies"
@@ -31,6 +34,11 @@ def kind_of(name: str) -> Kind:
 def every_kind() -> dict[str, Kind]:
     """All kinds by name."""
     return {name: kind_of(name) for name in kind_names()}
+
+
+def files_of(study: Study, cohort: Cohort) -> StudyFiles:
+    """The result files of a study of a cohort."""
+    return kind_of(study.kind).files.of(study, cohort)
 
 
 def place_of(kind: str, job: str) -> str:
