@@ -105,7 +105,7 @@ def totals():
     return counts
 
 
-# How many jobs of a rule are to come that Snakemake does not know yet, by rule: functions of jobs.
+# How many jobs are to come that Snakemake does not know yet, by names of rules; functions of jobs.
 FORESEEN = {}
 progress = Progress(totals)
 

@@ -34,8 +34,9 @@ def build(folder: Path) -> Project:
 
 
 def tables(study: str) -> list[str]:
-    """The last tables of a study; all others are made for them."""
-    return [f"results/{study}/{name}.parquet" for name in ("indices", "convergence")]
+    """All tables of a study."""
+    names = ("design", "responses", "indices", "convergence")
+    return [f"results/{study}/{name}.parquet" for name in names]
 
 
 @pytest.fixture
