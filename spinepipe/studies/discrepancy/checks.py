@@ -1,7 +1,4 @@
-"""What a search for missing effects demands of its cohort.
-
-Is the model file that a search starts from there, sound, and of this spine?
-"""
+"""What a search for missing effects demands of its cohort, and of the model file it starts from."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,76 +15,6 @@ from spinepipe.studies.places import at, measured_columns, readings, repeated, u
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
 
 _KEY = "base.model"
-
-
-def check_base_model(
-    document: Document, study: Discrepancy, cohort: Cohort, root: Path
-) -> Iterator[Problem]:
-    """Every way in which the base's model file cannot be used; none where it is no model file.
-
-    A file that another study makes may be missing until that study has run.
-
-    Parameters
-    ----------
-    document : the study file, for the lines of its keys.
-    root : folder of the Snakefile.
-    """
-    if study.base.model is None:
-        return
-    path = Path(root, study.base.model)  # an absolute path replaces the root
-    maker = made_by(path, root)
-    if maker == study.study:
-        allowed = "a model file that this study does not write itself"
-        yield Problem(*at(document, _KEY), study.base.model, allowed, "copy it to another folder")
-    elif path.is_file():
-        yield from _content(document, study.base.model, path, cohort)
-    elif maker is None:
-        allowed = "a model file, or a result of another study in config/studies"
-        remedy = "correct the path (relative to the Snakefile), or use stiffness: per_joint"
-        yield Problem(*at(document, _KEY), f"no file '{study.base.model}'", allowed, remedy)
-
-
-def _content(document: Document, name: str, path: Path, cohort: Cohort) -> Iterator[Problem]:
-    """Problems of the file itself, then joints, specimens and tests that the cohort lacks."""
-    try:
-        model = read_model(path)
-    except InputError as error:
-        yield from (replace(problem, file=name) for problem in error.problems)
-        return
-    yield from _strangers(document, name, model, cohort)
-    try:
-        effects_for(model, cohort.specimen_names[0], cohort.joint_names)
-    except InputError as error:
-        for fault in error.problems:
-            found = f"{name} with '{fault.found}' in {fault.column}"
-            remedy = "take a model of this spine, or correct it"
-            yield Problem(*at(document, _KEY), found, fault.allowed, remedy)
-
-
-def _strangers(
-    document: Document, name: str, model: ModelFile, cohort: Cohort
-) -> Iterator[Problem]:
-    """Specimens and tests of a scope that are none of the cohort's."""
-    for entry in model.effects:
-        for what, named, known in _named(entry, cohort):
-            if named != "*" and named not in known:
-                found = f"{name} with effect {entry.effect} of {what} '{named}'"
-                remedy = did_you_mean(named, known, "take a model of this cohort, or correct it")
-                yield Problem(*at(document, _KEY), found, one_of(known), remedy)
-
-
-def _named(entry: EffectEntry, cohort: Cohort) -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """What kind of name, the name, and the names that there are."""
-    specimens = dict.fromkeys((*entry.scope.specimens, *(row.specimen for row in entry.values)))
-    for name in specimens:
-        yield "specimen", name, cohort.specimen_names
-    for name in entry.scope.tests:
-        yield "test", name, cohort.tests
-
-
-def effects_to_try() -> tuple[str, ...]:
-    """Names of the registered effects that say how they may be tried."""
-    return tuple(sorted(name for name, cls in registered().items() if hasattr(cls, "trial")))
 
 
 def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
@@ -171,3 +98,73 @@ def _noise(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[P
             remedy = "set measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1} to what is known"
             yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
             return
+
+
+def check_base_model(
+    document: Document, study: Discrepancy, cohort: Cohort, root: Path
+) -> Iterator[Problem]:
+    """Every way in which the base's model file cannot be used; none where it is no model file.
+
+    A file that another study makes may be missing until that study has run.
+
+    Parameters
+    ----------
+    document : the study file, for the lines of its keys.
+    root : folder of the Snakefile.
+    """
+    if study.base.model is None:
+        return
+    path = Path(root, study.base.model)  # an absolute path replaces the root
+    maker = made_by(path, root)
+    if maker == study.study:
+        allowed = "a model file that this study does not write itself"
+        yield Problem(*at(document, _KEY), study.base.model, allowed, "copy it to another folder")
+    elif path.is_file():
+        yield from _content(document, study.base.model, path, cohort)
+    elif maker is None:
+        allowed = "a model file, or a result of another study in config/studies"
+        remedy = "correct the path (relative to the Snakefile), or use stiffness: per_joint"
+        yield Problem(*at(document, _KEY), f"no file '{study.base.model}'", allowed, remedy)
+
+
+def _content(document: Document, name: str, path: Path, cohort: Cohort) -> Iterator[Problem]:
+    """Problems of the file itself, then joints, specimens and tests that the cohort lacks."""
+    try:
+        model = read_model(path)
+    except InputError as error:
+        yield from (replace(problem, file=name) for problem in error.problems)
+        return
+    yield from _strangers(document, name, model, cohort)
+    try:
+        effects_for(model, cohort.specimen_names[0], cohort.joint_names)
+    except InputError as error:
+        for fault in error.problems:
+            found = f"{name} with '{fault.found}' in {fault.column}"
+            remedy = "take a model of this spine, or correct it"
+            yield Problem(*at(document, _KEY), found, fault.allowed, remedy)
+
+
+def _strangers(
+    document: Document, name: str, model: ModelFile, cohort: Cohort
+) -> Iterator[Problem]:
+    """Specimens and tests of a scope that are none of the cohort's."""
+    for entry in model.effects:
+        for what, named, known in _named(entry, cohort):
+            if named != "*" and named not in known:
+                found = f"{name} with effect {entry.effect} of {what} '{named}'"
+                remedy = did_you_mean(named, known, "take a model of this cohort, or correct it")
+                yield Problem(*at(document, _KEY), found, one_of(known), remedy)
+
+
+def _named(entry: EffectEntry, cohort: Cohort) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """What kind of name, the name, and the names that there are."""
+    specimens = dict.fromkeys((*entry.scope.specimens, *(row.specimen for row in entry.values)))
+    for name in specimens:
+        yield "specimen", name, cohort.specimen_names
+    for name in entry.scope.tests:
+        yield "test", name, cohort.tests
+
+
+def effects_to_try() -> tuple[str, ...]:
+    """Names of the registered effects that say how they may be tried."""
+    return tuple(sorted(name for name, cls in registered().items() if hasattr(cls, "trial")))

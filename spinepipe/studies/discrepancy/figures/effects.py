@@ -1,7 +1,4 @@
-"""Figure: evidence for each effect, round by round of the search.
-
-Figure: which effects these tests could tell apart, and which gap they could show.
-"""
+"""Figures of the effects: evidence for each, which can be told apart, which gap they show."""
 
 from collections.abc import Mapping, Sequence
 
@@ -36,83 +33,6 @@ WORDS = (
 )
 HEADINGS = ("Share of one effect's gap that another explains", "Smallest gap named")
 
-
-def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
-    """Effects against effects, and beside them the smallest gap at which each is seen."""
-    verdict = read_verdict(tables.files["verdict"])
-    confusions, candidates = tables["confusions"], tables["candidates"]
-    hidden = _hidden(candidates, verdict)
-    names = list(dict.fromkeys([*confusions["effect"], *confusions["other"]]))
-    rows = [*names, *(name for name in hidden if name not in names)]
-    if not rows:
-        return saying("Nothing can be shown: no effect could be tried.")
-    figure = blank(len(rows) * _SQUARE_MM + _BESIDE_MM + _SCALE_MM)
-    left, right = figure.subplots(1, 2, width_ratios=[3.0, 1.0], sharey=True)
-    grid = _square(confusions, rows, names)
-    decimals = 2 if len(rows) <= _MOST_WITH_NUMBERS else None
-    image = draw_heat(left, np.where(grid < _LEAST_SHARE, 0.0, grid), Normalize(0.0, 1.0), decimals)
-    name_cells(left, [plain(name) for name in rows], [plain(name) for name in names], True)
-    _detectable(right, rows, hidden, _gaps(candidates, verdict))
-    for index, (axis, words) in enumerate(zip((left, right), HEADINGS, strict=True)):
-        axis.set_title(f"{chr(ord('a') + index)}   {words}")
-    left.set_ylabel("effect that is there")
-    left.set_xlabel("effect that is taken for it")
-    bar = figure.colorbar(image, ax=[left, right], location="bottom", aspect=60, shrink=0.6)
-    bar.set_label("share: 0 told apart at once, 1 not at all")
-    bar.outline.set_linewidth(0.4)
-    explain_marks(figure, [empty_cell("the same effect, or not testable here")], WORDS, 1)
-    return figure
-
-
-def _square(confusions: pd.DataFrame, rows: Sequence[str], names: Sequence[str]) -> Array:
-    """(R, N) shares; NaN on the diagonal and where there is none."""
-    other = confusions[confusions["effect"] != confusions["other"]]
-    if other.empty:
-        return np.full((len(rows), max(1, len(names))), np.nan)
-    wide = other.pivot_table("share", "effect", "other", aggfunc="first")
-    return wide.reindex(index=list(rows), columns=list(names)).to_numpy(float)
-
-
-def _hidden(candidates: pd.DataFrame, verdict: Verdict) -> list[str]:
-    """Effects of which no form can be tested."""
-    design = candidates[candidates["stage"] == "design"]
-    testable = set(design.loc[design["status"] != NOT_TESTABLE, "effect"])
-    told = [one.name for one in verdict.not_testable]
-    names = dict.fromkeys([*design["effect"], *told])
-    return [name for name in names if name not in testable or name in told]
-
-
-def _gaps(candidates: pd.DataFrame, verdict: Verdict) -> dict[str, float]:
-    """Smallest detectable gap of each effect: that of the verdict, else of its best form."""
-    design = candidates[candidates["detectable_gap"].notna()]
-    found = design.groupby("effect")["detectable_gap"].min()
-    told = {one.name: one.gap for one in verdict.smallest_detectable}
-    return {str(name): float(gap) for name, gap in found.items()} | told
-
-
-def _detectable(
-    axis: Axes, rows: Sequence[str], hidden: Sequence[str], gaps: Mapping[str, float]
-) -> None:
-    for y, name in enumerate(rows):
-        if name in hidden:
-            note(axis, 0.02, y, "not testable here", GREY)
-        elif name in gaps:
-            axis.barh(y, gaps[name], height=0.55, color=BLUE, lw=0, zorder=3)
-            axis.annotate(
-                fixed(gaps[name]),
-                (gaps[name], y),
-                (2.0, 0.0),
-                va="center",
-                textcoords="offset points",
-                fontsize=5.5,
-            )
-    most = max(finite(list(gaps.values())), default=1.0)
-    axis.set_xlim(0.0, 1.3 * most)
-    axis.set_xlabel("gap (noise SD)")
-    axis.spines["left"].set_visible(False)
-    axis.tick_params(axis="y", length=0.0, labelleft=False)
-
-
 MOST_ROUNDS, _ACROSS = 3, 2
 SCREEN, REFIT = "screen", "refit"
 PALE = "#B9B9B9"
@@ -146,37 +66,11 @@ def effect_evidence_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -
     return figure
 
 
-def looks(candidates: pd.DataFrame) -> list[pd.DataFrame]:
-    """Rounds in which effects entered and the one that found no more.
-
-    Later ones, which try each effect's rivals in its place, repeat what these show.
-    """
-    found: list[pd.DataFrame] = []
-    for one in evidence_by_round(candidates):
-        if any(one.sort_index().equals(other.sort_index()) for other in found):
-            break
-        found.append(one)
-        if not np.isfinite(one[REFIT]).any():
-            break
-    return found
-
-
-def evidence_by_round(candidates: pd.DataFrame) -> list[pd.DataFrame]:
-    """Of each round a row per effect with columns ``screen`` and ``refit``, the best one last.
-
-    The best form of an effect stands for it. NaN: not refitted, or no fit has a result.
-    """
-    found = []
-    rows = candidates[candidates["log_evidence"].notna()]
-    for round_ in range(1, 100):
-        stages = {name: rows[rows["stage"] == f"{name} {round_}"] for name in (SCREEN, REFIT)}
-        if all(part.empty for part in stages.values()):
-            break
-        best = {name: part.groupby("effect")["log_evidence"].max() for name, part in stages.items()}
-        one = pd.DataFrame(best)
-        order = one[REFIT].fillna(-np.inf).rename("order").to_frame().assign(second=one[SCREEN])
-        found.append(one.loc[order.sort_values(["order", "second"], kind="stable").index])
-    return found
+def _reach(rounds: list[pd.DataFrame], threshold: float | None) -> tuple[float, float]:
+    values = finite(pd.concat(rounds).to_numpy(float))
+    low = min(0.0, float(values.min()))
+    high = max(_LINEAR_TO, float(values.max()), 1.5 * (threshold or 0.0))
+    return 1.2 * low - 1.0, _ROOM_FOR_NUMBERS * high
 
 
 def _draw(axis: Axes, found: pd.DataFrame, verdict: Verdict) -> None:
@@ -211,13 +105,6 @@ def _color(name: str, verdict: Verdict) -> str:
     return GREEN if name in verdict.candidates_in_set else PALE
 
 
-def _reach(rounds: list[pd.DataFrame], threshold: float | None) -> tuple[float, float]:
-    values = finite(pd.concat(rounds).to_numpy(float))
-    low = min(0.0, float(values.min()))
-    high = max(_LINEAR_TO, float(values.max()), 1.5 * (threshold or 0.0))
-    return 1.2 * low - 1.0, _ROOM_FOR_NUMBERS * high
-
-
 def _title(before: list[pd.DataFrame]) -> str:
     """What the effects are beside: the best refit of each round before."""
     names = [plain(str(one[REFIT].idxmax())) for one in before]
@@ -249,3 +136,112 @@ def _words(verdict: Verdict) -> str:
         f"{told}; the threshold {number(threshold, 2)} is passed in "
         f"{tick(100.0 * false_alarm)} % of data sets that lack nothing."
     )
+
+
+def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+    """Effects against effects, and beside them the smallest gap at which each is seen."""
+    verdict = read_verdict(tables.files["verdict"])
+    confusions, candidates = tables["confusions"], tables["candidates"]
+    hidden = _hidden(candidates, verdict)
+    names = list(dict.fromkeys([*confusions["effect"], *confusions["other"]]))
+    rows = [*names, *(name for name in hidden if name not in names)]
+    if not rows:
+        return saying("Nothing can be shown: no effect could be tried.")
+    figure = blank(len(rows) * _SQUARE_MM + _BESIDE_MM + _SCALE_MM)
+    left, right = figure.subplots(1, 2, width_ratios=[3.0, 1.0], sharey=True)
+    grid = _square(confusions, rows, names)
+    decimals = 2 if len(rows) <= _MOST_WITH_NUMBERS else None
+    image = draw_heat(left, np.where(grid < _LEAST_SHARE, 0.0, grid), Normalize(0.0, 1.0), decimals)
+    name_cells(left, [plain(name) for name in rows], [plain(name) for name in names], True)
+    _detectable(right, rows, hidden, _gaps(candidates, verdict))
+    for index, (axis, words) in enumerate(zip((left, right), HEADINGS, strict=True)):
+        axis.set_title(f"{chr(ord('a') + index)}   {words}")
+    left.set_ylabel("effect that is there")
+    left.set_xlabel("effect that is taken for it")
+    bar = figure.colorbar(image, ax=[left, right], location="bottom", aspect=60, shrink=0.6)
+    bar.set_label("share: 0 told apart at once, 1 not at all")
+    bar.outline.set_linewidth(0.4)
+    explain_marks(figure, [empty_cell("the same effect, or not testable here")], WORDS, 1)
+    return figure
+
+
+def _hidden(candidates: pd.DataFrame, verdict: Verdict) -> list[str]:
+    """Effects of which no form can be tested."""
+    design = candidates[candidates["stage"] == "design"]
+    testable = set(design.loc[design["status"] != NOT_TESTABLE, "effect"])
+    told = [one.name for one in verdict.not_testable]
+    names = dict.fromkeys([*design["effect"], *told])
+    return [name for name in names if name not in testable or name in told]
+
+
+def _square(confusions: pd.DataFrame, rows: Sequence[str], names: Sequence[str]) -> Array:
+    """(R, N) shares; NaN on the diagonal and where there is none."""
+    other = confusions[confusions["effect"] != confusions["other"]]
+    if other.empty:
+        return np.full((len(rows), max(1, len(names))), np.nan)
+    wide = other.pivot_table("share", "effect", "other", aggfunc="first")
+    return wide.reindex(index=list(rows), columns=list(names)).to_numpy(float)
+
+
+def _detectable(
+    axis: Axes, rows: Sequence[str], hidden: Sequence[str], gaps: Mapping[str, float]
+) -> None:
+    for y, name in enumerate(rows):
+        if name in hidden:
+            note(axis, 0.02, y, "not testable here", GREY)
+        elif name in gaps:
+            axis.barh(y, gaps[name], height=0.55, color=BLUE, lw=0, zorder=3)
+            axis.annotate(
+                fixed(gaps[name]),
+                (gaps[name], y),
+                (2.0, 0.0),
+                va="center",
+                textcoords="offset points",
+                fontsize=5.5,
+            )
+    most = max(finite(list(gaps.values())), default=1.0)
+    axis.set_xlim(0.0, 1.3 * most)
+    axis.set_xlabel("gap (noise SD)")
+    axis.spines["left"].set_visible(False)
+    axis.tick_params(axis="y", length=0.0, labelleft=False)
+
+
+def _gaps(candidates: pd.DataFrame, verdict: Verdict) -> dict[str, float]:
+    """Smallest detectable gap of each effect: that of the verdict, else of its best form."""
+    design = candidates[candidates["detectable_gap"].notna()]
+    found = design.groupby("effect")["detectable_gap"].min()
+    told = {one.name: one.gap for one in verdict.smallest_detectable}
+    return {str(name): float(gap) for name, gap in found.items()} | told
+
+
+def looks(candidates: pd.DataFrame) -> list[pd.DataFrame]:
+    """Rounds in which effects entered and the one that found no more.
+
+    Later ones, which try each effect's rivals in its place, repeat what these show.
+    """
+    found: list[pd.DataFrame] = []
+    for one in evidence_by_round(candidates):
+        if any(one.sort_index().equals(other.sort_index()) for other in found):
+            break
+        found.append(one)
+        if not np.isfinite(one[REFIT]).any():
+            break
+    return found
+
+
+def evidence_by_round(candidates: pd.DataFrame) -> list[pd.DataFrame]:
+    """Of each round a row per effect with columns ``screen`` and ``refit``, the best one last.
+
+    The best form of an effect stands for it. NaN: not refitted, or no fit has a result.
+    """
+    found = []
+    rows = candidates[candidates["log_evidence"].notna()]
+    for round_ in range(1, 100):
+        stages = {name: rows[rows["stage"] == f"{name} {round_}"] for name in (SCREEN, REFIT)}
+        if all(part.empty for part in stages.values()):
+            break
+        best = {name: part.groupby("effect")["log_evidence"].max() for name, part in stages.items()}
+        one = pd.DataFrame(best)
+        order = one[REFIT].fillna(-np.inf).rename("order").to_frame().assign(second=one[SCREEN])
+        found.append(one.loc[order.sort_values(["order", "second"], kind="stable").index])
+    return found

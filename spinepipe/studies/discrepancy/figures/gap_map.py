@@ -1,9 +1,4 @@
-"""Figure: where model and measurement disagree, joint by coordinate, for each test.
-
-Figure: measured less modelled motion along the load steps, where they disagree most.
-
-Grids of numbers as colours, with the number in each cell where there is room.
-"""
+"""Figures of the gap: by joint, coordinate and test, and along the load where it is largest."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -55,170 +50,11 @@ LINES: dict[str, dict[str, Any]] = {
 _PANEL_MM, _STEPS_KEY_MM = 50.0, 17.0
 _BAND_SD = 1.96
 
-
-def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
-    """A panel for each of the places where the base model is farthest off."""
-    gap = tables["gap"]
-    places = worst_places(gap)
-    if not places:
-        return saying("No motion can be shown: the base model has no pose.")
-    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
-    (panels,), figure = sections([(len(places), _PANEL_MM)], _STEPS_KEY_MM)
-    for index, (axis, place) in enumerate(zip(panels, places, strict=True)):
-        rows = gap[(gap[PLACE] == list(place)).all(axis=1)].sort_values("step")
-        _draw(axis, rows, added)
-        _label_steps(axis, index, place, len(cohort.specimen_names))
-        _reach(axis, rows["measured"].to_numpy(float), unit(place[-1]))
-    explain_marks(figure, _handles(added), _words_of_steps(places, gap), 4)
-    return figure
-
-
-def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """Places of the largest residual of the base in noise SD, of like places the worst specimen."""
-    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
-    squares = ((rows["measured"] - rows["base"]) / rows["noise_sd"]) ** 2
-    size = squares.groupby([rows[key] for key in PLACE], sort=False).mean().rename("size")
-    ordered = size.sort_values(ascending=False, kind="stable").reset_index()
-    like = ordered.drop_duplicates(PLACE[1:]).head(MOST_PLACES).reset_index()
-    like = like[(like.index < FEWEST_PLACES) | (like["size"] > CLEARLY**2)]
-    return [tuple(row) for row in like[PLACE].itertuples(index=False)]
-
-
-def _draw(axis: Axes, rows: pd.DataFrame, with_effects: bool) -> None:
-    x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
-    band = _BAND_SD * rows["noise_sd"].to_numpy(float)
-    axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
-    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
-    for name, look in LINES.items() if with_effects else [("base", LINES["base"])]:
-        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **look)
-    axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
-
-
-def _label_steps(axis: Axes, index: int, place: tuple[Any, ...], specimens: int) -> None:
-    specimen, test, joint, coordinate = place
-    whose = f", {short(str(specimen), 14)}" if specimens > 1 else ""
-    axis.set_title(
-        f"{chr(ord('a') + index)}   {joint}{whose}\n{short(capital(plain(str(test))), 34)}"
-    )
-    axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
-    axis.set_xlabel("load step")
-    axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axis.tick_params(axis="y", length=2.5)
-
-
-def _reach(axis: Axes, measured: np.ndarray, of: str) -> None:
-    """How far the joint moved: the size of the motion that the difference is a part of."""
-    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
-    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
-    axis.text(
-        0.02,
-        1.0,
-        words,
-        transform=axis.transAxes,
-        va="top",
-        fontsize=SMALL_PT,
-        color=INK[GREY],
-        in_layout=False,
-    )
-    axis.margins(y=0.18)
-
-
-def _handles(with_effects: bool) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [
-        Patch(facecolor=GREY, alpha=0.25, lw=0, label="noise of the mean of the cycles, 95 %"),
-        Line2D([], [], label="measured less base model", **LINES["base"]),
-    ]
-    if with_effects:
-        label = "measured less model with the effects"
-        handles.append(Line2D([], [], label=label, **LINES["with_effects"]))
-    return handles
-
-
-def _words_of_steps(places: list[tuple[Any, ...]], gap: pd.DataFrame) -> str:
-    rows = gap[(gap[PLACE] == list(places[0])).all(axis=1)]
-    off = ((rows["measured"] - rows["base"]) / rows["noise_sd"]).to_numpy(float)
-    worst = float(np.sqrt(np.nanmean(off**2)))
-    return (
-        "The places where the base model is farthest off, each in the specimen where it is worst; "
-        f"in a the base is off by {number(worst, 2)} noise SD (root mean square)."
-    )
-
-
 COLORS = LinearSegmentedColormap.from_list("gap", (WHITE, "#FEC44F", "#D95F0E", "#662506"))
 """From white to brown: it darkens steadily, for all kinds of eyes and for print."""
 
 _EMPTY, _HATCH, _EDGE = "#E4E4E4", "#9A9A9A", "#C4C4C4"
 _DARK = 0.62
-
-
-def draw_heat(
-    axis: Axes,
-    grid: Array,
-    scale: Normalize,
-    decimals: int | None,
-    pale: NDArray[np.bool_] | None = None,
-) -> AxesImage:
-    """Cells of a grid (rows, columns), NaN hatched; no numbers where ``decimals`` is None.
-
-    Parameters
-    ----------
-    pale : (rows, columns) cells that stay white, their numbers grey.
-    """
-    quiet = np.zeros(grid.shape, dtype=bool) if pale is None else pale
-    axis.set_facecolor(_EMPTY)
-    axis.add_patch(
-        Rectangle(
-            (-0.5, -0.5),
-            grid.shape[1],
-            grid.shape[0],
-            hatch="//////",
-            lw=0,
-            facecolor="none",
-            edgecolor=_HATCH,
-            zorder=0,
-        )
-    )
-    image = axis.imshow(
-        np.ma.masked_invalid(np.where(quiet, 0.0, grid)),
-        cmap=COLORS,
-        norm=scale,
-        aspect="auto",
-        zorder=1,
-    )
-    for row, column in np.argwhere(np.isfinite(grid)) if decimals is not None else ():
-        value = grid[row, column]
-        words = fixed(value, decimals or 0) if value else "0"
-        color = GREY if quiet[row, column] else WHITE if scale(value) > _DARK else BLACK
-        axis.text(
-            column,
-            row,
-            words,
-            ha="center",
-            va="center",
-            fontsize=5.0,
-            zorder=3,
-            color=color,
-            in_layout=False,
-        )
-    for side in axis.spines.values():
-        side.set(visible=True, color=_EDGE, linewidth=0.5)
-    axis.tick_params(length=0.0, pad=2.0, labelsize=6.0)
-    return image
-
-
-def name_cells(axis: Axes, rows: Sequence[str], columns: Sequence[str], turned: bool) -> None:
-    """Names of the rows and columns of a grid."""
-    axis.set_yticks(range(len(rows)), list(rows))
-    axis.set_xticks(range(len(columns)), list(columns))
-    if turned:
-        for label in axis.get_xticklabels():
-            label.set(rotation=40.0, ha="right", rotation_mode="anchor")
-
-
-def empty_cell(label: str) -> Patch:
-    """The hatched cell as the key shows it."""
-    return Patch(facecolor=_EMPTY, edgecolor=_HATCH, hatch="//////", lw=0, label=label)
-
 
 MOST_TESTS = 6
 MODELS = {"base": "base", "with_effects": "with effects"}
@@ -355,3 +191,160 @@ def _words(rows: pd.DataFrame, tests: Sequence[str], models: Sequence[str]) -> s
     largest = float(np.max(finite(rows["gap"])))
     told.append(f"largest gap {largest:.1f}")
     return "; ".join(told) + "."
+
+
+def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+    """A panel for each of the places where the base model is farthest off."""
+    gap = tables["gap"]
+    places = worst_places(gap)
+    if not places:
+        return saying("No motion can be shown: the base model has no pose.")
+    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
+    (panels,), figure = sections([(len(places), _PANEL_MM)], _STEPS_KEY_MM)
+    for index, (axis, place) in enumerate(zip(panels, places, strict=True)):
+        rows = gap[(gap[PLACE] == list(place)).all(axis=1)].sort_values("step")
+        _draw(axis, rows, added)
+        _label_steps(axis, index, place, len(cohort.specimen_names))
+        _reach(axis, rows["measured"].to_numpy(float), unit(place[-1]))
+    explain_marks(figure, _handles(added), _words_of_steps(places, gap), 4)
+    return figure
+
+
+def _draw(axis: Axes, rows: pd.DataFrame, with_effects: bool) -> None:
+    x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
+    band = _BAND_SD * rows["noise_sd"].to_numpy(float)
+    axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
+    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
+    for name, look in LINES.items() if with_effects else [("base", LINES["base"])]:
+        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **look)
+    axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
+
+
+def _label_steps(axis: Axes, index: int, place: tuple[Any, ...], specimens: int) -> None:
+    specimen, test, joint, coordinate = place
+    whose = f", {short(str(specimen), 14)}" if specimens > 1 else ""
+    axis.set_title(
+        f"{chr(ord('a') + index)}   {joint}{whose}\n{short(capital(plain(str(test))), 34)}"
+    )
+    axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
+    axis.set_xlabel("load step")
+    axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axis.tick_params(axis="y", length=2.5)
+
+
+def _reach(axis: Axes, measured: np.ndarray, of: str) -> None:
+    """How far the joint moved: the size of the motion that the difference is a part of."""
+    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
+    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
+    axis.text(
+        0.02,
+        1.0,
+        words,
+        transform=axis.transAxes,
+        va="top",
+        fontsize=SMALL_PT,
+        color=INK[GREY],
+        in_layout=False,
+    )
+    axis.margins(y=0.18)
+
+
+def _handles(with_effects: bool) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Patch(facecolor=GREY, alpha=0.25, lw=0, label="noise of the mean of the cycles, 95 %"),
+        Line2D([], [], label="measured less base model", **LINES["base"]),
+    ]
+    if with_effects:
+        label = "measured less model with the effects"
+        handles.append(Line2D([], [], label=label, **LINES["with_effects"]))
+    return handles
+
+
+def _words_of_steps(places: list[tuple[Any, ...]], gap: pd.DataFrame) -> str:
+    rows = gap[(gap[PLACE] == list(places[0])).all(axis=1)]
+    off = ((rows["measured"] - rows["base"]) / rows["noise_sd"]).to_numpy(float)
+    worst = float(np.sqrt(np.nanmean(off**2)))
+    return (
+        "The places where the base model is farthest off, each in the specimen where it is worst; "
+        f"in a the base is off by {number(worst, 2)} noise SD (root mean square)."
+    )
+
+
+def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """Places of the largest residual of the base in noise SD, of like places the worst specimen."""
+    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
+    squares = ((rows["measured"] - rows["base"]) / rows["noise_sd"]) ** 2
+    size = squares.groupby([rows[key] for key in PLACE], sort=False).mean().rename("size")
+    ordered = size.sort_values(ascending=False, kind="stable").reset_index()
+    like = ordered.drop_duplicates(PLACE[1:]).head(MOST_PLACES).reset_index()
+    like = like[(like.index < FEWEST_PLACES) | (like["size"] > CLEARLY**2)]
+    return [tuple(row) for row in like[PLACE].itertuples(index=False)]
+
+
+def draw_heat(
+    axis: Axes,
+    grid: Array,
+    scale: Normalize,
+    decimals: int | None,
+    pale: NDArray[np.bool_] | None = None,
+) -> AxesImage:
+    """Cells of a grid (rows, columns), NaN hatched; no numbers where ``decimals`` is None.
+
+    Parameters
+    ----------
+    pale : (rows, columns) cells that stay white, their numbers grey.
+    """
+    quiet = np.zeros(grid.shape, dtype=bool) if pale is None else pale
+    axis.set_facecolor(_EMPTY)
+    axis.add_patch(
+        Rectangle(
+            (-0.5, -0.5),
+            grid.shape[1],
+            grid.shape[0],
+            hatch="//////",
+            lw=0,
+            facecolor="none",
+            edgecolor=_HATCH,
+            zorder=0,
+        )
+    )
+    image = axis.imshow(
+        np.ma.masked_invalid(np.where(quiet, 0.0, grid)),
+        cmap=COLORS,
+        norm=scale,
+        aspect="auto",
+        zorder=1,
+    )
+    for row, column in np.argwhere(np.isfinite(grid)) if decimals is not None else ():
+        value = grid[row, column]
+        words = fixed(value, decimals or 0) if value else "0"
+        color = GREY if quiet[row, column] else WHITE if scale(value) > _DARK else BLACK
+        axis.text(
+            column,
+            row,
+            words,
+            ha="center",
+            va="center",
+            fontsize=5.0,
+            zorder=3,
+            color=color,
+            in_layout=False,
+        )
+    for side in axis.spines.values():
+        side.set(visible=True, color=_EDGE, linewidth=0.5)
+    axis.tick_params(length=0.0, pad=2.0, labelsize=6.0)
+    return image
+
+
+def name_cells(axis: Axes, rows: Sequence[str], columns: Sequence[str], turned: bool) -> None:
+    """Names of the rows and columns of a grid."""
+    axis.set_yticks(range(len(rows)), list(rows))
+    axis.set_xticks(range(len(columns)), list(columns))
+    if turned:
+        for label in axis.get_xticklabels():
+            label.set(rotation=40.0, ha="right", rotation_mode="anchor")
+
+
+def empty_cell(label: str) -> Patch:
+    """The hatched cell as the key shows it."""
+    return Patch(facecolor=_EMPTY, edgecolor=_HATCH, hatch="//////", lw=0, label=label)

@@ -1,9 +1,8 @@
-"""Lack of fit: does the generic basis explain what the model leaves, and where most.
+"""Lack of fit: does a generic basis without physics explain what the model leaves, and where most.
 
-A generic basis: what could be missing without being any known effect, joint by joint.
-
-Loads that are polynomials and bumps of a joint's own rotation, cross terms of its other rotations,
-terms of the neighbouring joints' rotation, and readings that drift over the steps of a test.
+The basis, joint by joint: loads that are polynomials and bumps of a joint's own rotation, cross
+terms of its other rotations, terms of the neighbouring joints' rotation, and readings that drift
+over the steps of a test.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import SolvedStep, System
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import BUSHING
+from spinepipe.studies.discrepancy.search.hypothesis import bushing_stiffness
 from spinepipe.studies.discrepancy.search.prediction import solved_steps
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
@@ -46,6 +45,8 @@ FAMILIES = {
     "drift": "readings of {coordinate} that drift over the steps of a test",
 }
 
+SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
+
 
 @dataclass(frozen=True)
 class Term:
@@ -63,96 +64,6 @@ class GenericColumns:
 
     terms: tuple[Term, ...]
     moved: tuple[Array, ...]
-
-
-def generic_columns(
-    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, coordinates: Sequence[str]
-) -> GenericColumns:
-    """The generic basis of a specimen where its model stands."""
-    rotations = [name for name in coordinates if name in ROTATIONS]
-    chain = Chain(model)
-    systems = [System(chain, model, case) for case in cases]
-    solved = [solved_steps(system, None) for system in systems]
-    poses = [np.stack([step.equilibrium.q for step in steps]) for steps in solved]
-    shape = (-1, model.n_joints, 6)
-    motions = [q.reshape(shape) for q in poses]
-    reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
-    stiffness = _stiffness(model)
-    terms: list[Term] = []
-    moved: list[list[Array]] = [[] for _ in cases]
-    for name in rotations:
-        at = COORDINATES.index(name)
-        for family, count in _counts(len(rotations)).items():
-            terms += [
-                Term(family, name, number, joint)
-                for number in range(count)
-                for joint in range(model.n_joints)
-            ]
-        size = SIZE * stiffness[:, at] * reach[:, at]
-        for place, motion in enumerate(motions):
-            loads = _loads(motion / reach, at, rotations) * size[:, None]
-            drift = _drift(len(motion), SIZE * reach[:, at], at)
-            moved[place].append(np.concatenate([_motion(solved[place], loads, at), drift], axis=-1))
-    stacked = [np.concatenate(columns, axis=-1) for columns in moved]
-    seen = [c - c[0] if zeroed else c for c in stacked]
-    return GenericColumns(tuple(terms), tuple(seen))
-
-
-def _stiffness(model: SpineModel) -> Array:
-    """(J, 6) of the bushings, the sum where there are several; 1 where a joint has none."""
-    total = np.zeros((model.n_joints, 6))
-    for scoped in model.effects:
-        if scoped.effect.name == BUSHING:
-            total[list(scoped.joints)] += scoped.values
-    return np.where(total > 0.0, total, 1.0)
-
-
-def _counts(rotations: int) -> dict[str, int]:
-    """Terms of each family for one coordinate, in the order of `_loads`."""
-    others = rotations - 1
-    cross = 4 * others + len(list(combinations(range(others), 2)))
-    return {"own": 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
-
-
-def _loads(u: Array, at: int, rotations: Sequence[str]) -> Array:
-    """(T, J, K) terms of relative motion u (T, J, 6) that load one coordinate."""
-    own = u[..., at]
-    found = [own**2, own**3, own * np.abs(own)]
-    found += [np.exp(-(((own - b) / BUMP_WIDTH) ** 2)) for b in BUMPS]
-    others = [COORDINATES.index(n) for n in rotations if COORDINATES.index(n) != at]
-    for other in others:
-        x = u[..., other]
-        found += [x, x**2, x * own, x**2 * own]
-    found += [u[..., a] * u[..., b] for a, b in combinations(others, 2)]
-    above, below = np.zeros_like(own), np.zeros_like(own)
-    above[:, :-1], below[:, 1:] = own[:, 1:], own[:, :-1]
-    return np.stack([*found, above, below], axis=-1)
-
-
-def _motion(solved: Sequence[SolvedStep], loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) motion by each term's load at each joint alone, terms first."""
-    _, joints, count = loads.shape
-    moved = []
-    for step, load in zip(solved, loads, strict=True):
-        unit = np.zeros((6 * joints, joints))
-        unit[6 * np.arange(joints) + at, np.arange(joints)] = 1.0
-        by_load = -step.factored.solve(unit)
-        columns = by_load[:, None, :] * load.T[None]
-        moved.append(columns.reshape(joints, 6, count * joints))
-    return np.stack(moved)
-
-
-def _drift(steps: int, size: Array, at: int) -> Array:
-    """(T, J, 6, J) readings that move on with the steps, a joint each."""
-    joints = len(size)
-    drift = np.zeros((steps, joints, 6, joints))
-    ramp = np.arange(steps) / max(steps - 1, 1)
-    for joint in range(joints):
-        drift[:, joint, at, joint] = ramp * size[joint]
-    return drift
-
-
-SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
 
 
 @dataclass(frozen=True)
@@ -254,3 +165,82 @@ def _part(
 def _added(arrays: Sequence[Array]) -> Array:
     total: Array = np.sum(arrays, axis=0)
     return total
+
+
+def generic_columns(
+    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, coordinates: Sequence[str]
+) -> GenericColumns:
+    """The generic basis of a specimen where its model stands."""
+    rotations = [name for name in coordinates if name in ROTATIONS]
+    chain = Chain(model)
+    systems = [System(chain, model, case) for case in cases]
+    solved = [solved_steps(system, None) for system in systems]
+    poses = [np.stack([step.equilibrium.q for step in steps]) for steps in solved]
+    shape = (-1, model.n_joints, 6)
+    motions = [q.reshape(shape) for q in poses]
+    reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
+    stiffness = bushing_stiffness(model)
+    stiffness = np.where(stiffness > 0.0, stiffness, 1.0)
+    terms: list[Term] = []
+    moved: list[list[Array]] = [[] for _ in cases]
+    for name in rotations:
+        at = COORDINATES.index(name)
+        for family, count in _counts(len(rotations)).items():
+            terms += [
+                Term(family, name, number, joint)
+                for number in range(count)
+                for joint in range(model.n_joints)
+            ]
+        size = SIZE * stiffness[:, at] * reach[:, at]
+        for place, motion in enumerate(motions):
+            loads = _loads(motion / reach, at, rotations) * size[:, None]
+            drift = _drift(len(motion), SIZE * reach[:, at], at)
+            moved[place].append(np.concatenate([_motion(solved[place], loads, at), drift], axis=-1))
+    stacked = [np.concatenate(columns, axis=-1) for columns in moved]
+    seen = [c - c[0] if zeroed else c for c in stacked]
+    return GenericColumns(tuple(terms), tuple(seen))
+
+
+def _counts(rotations: int) -> dict[str, int]:
+    """Terms of each family for one coordinate, in the order of `_loads`."""
+    others = rotations - 1
+    cross = 4 * others + len(list(combinations(range(others), 2)))
+    return {"own": 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
+
+
+def _loads(u: Array, at: int, rotations: Sequence[str]) -> Array:
+    """(T, J, K) terms of relative motion u (T, J, 6) that load one coordinate."""
+    own = u[..., at]
+    found = [own**2, own**3, own * np.abs(own)]
+    found += [np.exp(-(((own - b) / BUMP_WIDTH) ** 2)) for b in BUMPS]
+    others = [COORDINATES.index(n) for n in rotations if COORDINATES.index(n) != at]
+    for other in others:
+        x = u[..., other]
+        found += [x, x**2, x * own, x**2 * own]
+    found += [u[..., a] * u[..., b] for a, b in combinations(others, 2)]
+    above, below = np.zeros_like(own), np.zeros_like(own)
+    above[:, :-1], below[:, 1:] = own[:, 1:], own[:, :-1]
+    return np.stack([*found, above, below], axis=-1)
+
+
+def _drift(steps: int, size: Array, at: int) -> Array:
+    """(T, J, 6, J) readings that move on with the steps, a joint each."""
+    joints = len(size)
+    drift = np.zeros((steps, joints, 6, joints))
+    ramp = np.arange(steps) / max(steps - 1, 1)
+    for joint in range(joints):
+        drift[:, joint, at, joint] = ramp * size[joint]
+    return drift
+
+
+def _motion(solved: Sequence[SolvedStep], loads: Array, at: int) -> Array:
+    """(T, J, 6, K x J) motion by each term's load at each joint alone, terms first."""
+    _, joints, count = loads.shape
+    moved = []
+    for step, load in zip(solved, loads, strict=True):
+        unit = np.zeros((6 * joints, joints))
+        unit[6 * np.arange(joints) + at, np.arange(joints)] = 1.0
+        by_load = -step.factored.solve(unit)
+        columns = by_load[:, None, :] * load.T[None]
+        moved.append(columns.reshape(joints, 6, count * joints))
+    return np.stack(moved)
