@@ -17,6 +17,26 @@ from spinepipe.studies.discrepancy.words import (
     with_article,
 )
 
+_SPREADS = {
+    ", each joint of each specimen": ", of its own in each joint of each specimen",
+    ", by joint": ", of its own in each joint",
+    ", shared": ", alike in all joints and specimens",
+}
+"""How a shape differs between places, in the words of results and of the page."""
+
+_MOST_EASY, _MOST_HARD, _MOST_ALIKE, _MOST_TESTS = 4, 3, 2, 3
+_ALIKE = 0.3
+"""Share of an effect's gap from which another is said to be like it."""
+
+_MOST_PLACES, _MOST_SIZES = 3, 4
+_BY_CHANCE = 0.025
+"""Of places with noise alone, the share whose 95 % interval lies above it."""
+
+NUISANCES = (
+    "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
+    "nuisances). Model files, and the figure of the gap along the load, do not have them."
+)
+
 
 def headline(verdict: Verdict, where: pd.DataFrame) -> str:
     """What is missing and where, or that nothing is, or that nobody can tell.
@@ -32,28 +52,6 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
     if verdict.verdict is Answer.SET:
         return _one_of(verdict)
     return _lacks(verdict.effects)
-
-
-def _lacks(effects: tuple[Missing, ...]) -> str:
-    return f"The model lacks {'; and '.join(what_of(effect) for effect in effects)}."
-
-
-def _one_of(verdict: Verdict) -> str:
-    names = listed([with_article(name) for name in verdict.candidates_in_set], 8, "or")
-    told = f"one of these is missing, and these tests cannot tell which: {names}."
-    return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
-
-
-def _nothing(verdict: Verdict) -> str:
-    gaps = [one.gap for one in verdict.smallest_detectable]
-    if not gaps:
-        return "Nothing is missing above the noise."
-    low, high = number(min(gaps), 2), number(max(gaps), 2)
-    most = "" if low == high else f" (the easiest to see) to {high} (the hardest)"
-    return (
-        "Nothing is missing above the noise. An effect would have been named from a gap of "
-        f"{low} noise SD{most}."
-    )
 
 
 def _unknown(verdict: Verdict, where: pd.DataFrame) -> str:
@@ -84,6 +82,43 @@ def _of_unknown_shape(verdict: Verdict) -> bool:
 def _shape_of(verdict: Verdict) -> str:
     """What is missing as generic shapes see it; empty where they see nothing."""
     return "" if verdict.unknown is None else verdict.unknown.shape or ""
+
+
+def _worst(where: pd.DataFrame) -> pd.DataFrame:
+    """Of these, those whose gap is above the noise, largest first."""
+    rows = _at_places(where)
+    if rows.empty:
+        return rows
+    return rows[rows["gap_low"] > 0.0].sort_values("gap", ascending=False, kind="stable")
+
+
+def _at_places(where: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the base at each joint and coordinate in each test."""
+    if where.empty:
+        return where
+    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == "base")]
+
+
+def _nothing(verdict: Verdict) -> str:
+    gaps = [one.gap for one in verdict.smallest_detectable]
+    if not gaps:
+        return "Nothing is missing above the noise."
+    low, high = number(min(gaps), 2), number(max(gaps), 2)
+    most = "" if low == high else f" (the easiest to see) to {high} (the hardest)"
+    return (
+        "Nothing is missing above the noise. An effect would have been named from a gap of "
+        f"{low} noise SD{most}."
+    )
+
+
+def _one_of(verdict: Verdict) -> str:
+    names = listed([with_article(name) for name in verdict.candidates_in_set], 8, "or")
+    told = f"one of these is missing, and these tests cannot tell which: {names}."
+    return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
+
+
+def _lacks(effects: tuple[Missing, ...]) -> str:
+    return f"The model lacks {'; and '.join(what_of(effect) for effect in effects)}."
 
 
 def how_sure(verdict: Verdict) -> str:
@@ -124,14 +159,6 @@ def _shape(verdict: Verdict) -> str:
     return f"Its shape: {shape}." if shape else ""
 
 
-_SPREADS = {
-    ", each joint of each specimen": ", of its own in each joint of each specimen",
-    ", by joint": ", of its own in each joint",
-    ", shared": ", alike in all joints and specimens",
-}
-"""How a shape differs between places, in the words of results and of the page."""
-
-
 def _misfit(verdict: Verdict) -> str:
     """Residuals in noise SD before and with the effects."""
     rms = verdict.rms_residual
@@ -152,86 +179,6 @@ def _closed(verdict: Verdict) -> str:
     before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
     sizes = "" if before is None or after is None else f", {fixed(before)} to {fixed(after)}"
     return f"On motion held out of the fits {share} of the gap is closed{sizes}."
-
-
-_MOST_EASY, _MOST_HARD, _MOST_ALIKE, _MOST_TESTS = 4, 3, 2, 3
-_ALIKE = 0.3
-"""Share of an effect's gap from which another is said to be like it."""
-
-
-def would_have_been_seen(verdict: Verdict) -> str:
-    """Of a search that named nothing: the gaps from which effects would have been named."""
-    if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
-        return ""
-    ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
-    told = [f"{plain(one.name)} {number(one.gap, 2)}" for one in ordered]
-    if len(told) <= _MOST_EASY + _MOST_HARD:
-        return f"Smallest gap, in noise SD, that would have been named: {', '.join(told)}."
-    return (
-        f"Smallest gap, in noise SD, that would have been named: {', '.join(told[:_MOST_EASY])} "
-        f"are the easiest to see; {', '.join(told[-_MOST_HARD:])} the hardest. "
-        "A table below has all."
-    )
-
-
-def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
-    """What these tests could take each named effect for."""
-    told = []
-    for effect in verdict.effects if len(confusions) else ():
-        rows = confusions[(confusions["effect"] == effect.name) & (confusions["share"] >= _ALIKE)]
-        others = rows[rows["other"] != effect.name].sort_values("share", ascending=False)
-        alike = [
-            f"{with_article(row['other'])} would explain {100.0 * row['share']:.0f} %"
-            for row in others.head(_MOST_ALIKE).to_dict("records")
-        ]
-        if alike:
-            told.append(f"{listed(alike)} of the gap that {plain(effect.name)} makes")
-    return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
-
-
-def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
-    """Of what no known effect explains: the one that comes nearest, and why it is not named."""
-    threshold = verdict.threshold.log_evidence
-    if verdict.reason is not Reason.NO_KNOWN_EFFECT or threshold is None or candidates.empty:
-        return ""
-    rows = candidates[candidates["stage"] == "refit 1"].dropna(subset="log_evidence")
-    if rows.empty:
-        return ""
-    best = max(rows.to_dict("records"), key=lambda row: row["log_evidence"])
-    if best["log_evidence"] <= threshold:
-        return ""
-    return (
-        f"Nearest known effect: {plain(best['effect'])}, log evidence "
-        f"{number(best['log_evidence'])}. Generic shapes without physics explain much more, so it "
-        "would only imitate what is missing."
-    )
-
-
-def not_testable(verdict: Verdict) -> str:
-    """Effects without a trace in these tests, and the tests that would show them."""
-    names = [plain(one.name) for one in verdict.not_testable]
-    if not names:
-        return ""
-    told = f"These tests cannot show {listed(names, 8, 'or')}"
-    if verdict.verdict is Answer.NULL:
-        told += ", so nothing is said about them"
-    by_test: dict[str, list[str]] = {}
-    for one in verdict.not_testable:
-        by_test.setdefault(readable(one.test_that_would_tell), []).append(plain(one.name))
-    would = [
-        f"{listed(shown, 8)}: {test}" for test, shown in list(by_test.items())[:_MOST_TESTS] if test
-    ]
-    return f"{told}. What would show them: {'; '.join(would)}." if would else f"{told}."
-
-
-_MOST_PLACES, _MOST_SIZES = 3, 4
-_BY_CHANCE = 0.025
-"""Of places with noise alone, the share whose 95 % interval lies above it."""
-
-NUISANCES = (
-    "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
-    "nuisances). Model files, and the figure of the gap along the load, do not have them."
-)
 
 
 def warnings(verdict: Verdict) -> tuple[str, ...]:
@@ -304,21 +251,6 @@ def _where(where: pd.DataFrame) -> str:
     )
 
 
-def _at_places(where: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the base at each joint and coordinate in each test."""
-    if where.empty:
-        return where
-    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == "base")]
-
-
-def _worst(where: pd.DataFrame) -> pd.DataFrame:
-    """Of these, those whose gap is above the noise, largest first."""
-    rows = _at_places(where)
-    if rows.empty:
-        return rows
-    return rows[rows["gap_low"] > 0.0].sort_values("gap", ascending=False, kind="stable")
-
-
 def _noise(verdict: Verdict) -> str:
     noise = verdict.noise
     if not noise.source:
@@ -330,3 +262,68 @@ def _noise(verdict: Verdict) -> str:
         return f"Noise:{size}, as declared: no cycle was repeated, so all hangs on that number."
     along = f"correlation from step to step {fixed(noise.serial_correlation)}"
     return f"Noise:{size}, from repeated cycles, {along}."
+
+
+def would_have_been_seen(verdict: Verdict) -> str:
+    """Of a search that named nothing: the gaps from which effects would have been named."""
+    if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
+        return ""
+    ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
+    told = [f"{plain(one.name)} {number(one.gap, 2)}" for one in ordered]
+    if len(told) <= _MOST_EASY + _MOST_HARD:
+        return f"Smallest gap, in noise SD, that would have been named: {', '.join(told)}."
+    return (
+        f"Smallest gap, in noise SD, that would have been named: {', '.join(told[:_MOST_EASY])} "
+        f"are the easiest to see; {', '.join(told[-_MOST_HARD:])} the hardest. "
+        "A table below has all."
+    )
+
+
+def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
+    """What these tests could take each named effect for."""
+    told = []
+    for effect in verdict.effects if len(confusions) else ():
+        rows = confusions[(confusions["effect"] == effect.name) & (confusions["share"] >= _ALIKE)]
+        others = rows[rows["other"] != effect.name].sort_values("share", ascending=False)
+        alike = [
+            f"{with_article(row['other'])} would explain {100.0 * row['share']:.0f} %"
+            for row in others.head(_MOST_ALIKE).to_dict("records")
+        ]
+        if alike:
+            told.append(f"{listed(alike)} of the gap that {plain(effect.name)} makes")
+    return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
+
+
+def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
+    """Of what no known effect explains: the one that comes nearest, and why it is not named."""
+    threshold = verdict.threshold.log_evidence
+    if verdict.reason is not Reason.NO_KNOWN_EFFECT or threshold is None or candidates.empty:
+        return ""
+    rows = candidates[candidates["stage"] == "refit 1"].dropna(subset="log_evidence")
+    if rows.empty:
+        return ""
+    best = max(rows.to_dict("records"), key=lambda row: row["log_evidence"])
+    if best["log_evidence"] <= threshold:
+        return ""
+    return (
+        f"Nearest known effect: {plain(best['effect'])}, log evidence "
+        f"{number(best['log_evidence'])}. Generic shapes without physics explain much more, so it "
+        "would only imitate what is missing."
+    )
+
+
+def not_testable(verdict: Verdict) -> str:
+    """Effects without a trace in these tests, and the tests that would show them."""
+    names = [plain(one.name) for one in verdict.not_testable]
+    if not names:
+        return ""
+    told = f"These tests cannot show {listed(names, 8, 'or')}"
+    if verdict.verdict is Answer.NULL:
+        told += ", so nothing is said about them"
+    by_test: dict[str, list[str]] = {}
+    for one in verdict.not_testable:
+        by_test.setdefault(readable(one.test_that_would_tell), []).append(plain(one.name))
+    would = [
+        f"{listed(shown, 8)}: {test}" for test, shown in list(by_test.items())[:_MOST_TESTS] if test
+    ]
+    return f"{told}. What would show them: {'; '.join(would)}." if would else f"{told}."

@@ -1,9 +1,4 @@
-"""The report of a search for missing effects.
-
-Tables of the result files as the page of a search shows them: in plain words, and shorter.
-
-Which tables the page of a search shows: those of the verdict, then those of the files.
-"""
+"""The report of a search: its verdict first, then tables of the result files in plain words."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -49,19 +44,6 @@ _TRIED = (
 
 _ONE_PLACE = "joint x coordinate x test"
 
-
-def file_tables(results: Results) -> Iterator[Parts]:
-    """File, title, what is said of it, rows and columns of each table."""
-    held_out, where = results.table("held_out"), results.table("where")
-    yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), HELD_OUT.columns
-    if len(where):
-        yield "where", "Where the models are off", _WHERE, _worded(_above(where)), WHERE.columns
-    candidates = results.table("candidates")
-    if len(candidates):
-        columns = tuple(column for column in CANDIDATES.columns if column.name in _TRIED)
-        yield "candidates", "What was tried", _CANDIDATES, _worded(_best(candidates)), columns
-
-
 _WHERE = (
     f"{WHERE.about} Largest first; of single places those above the noise. All of them, and load "
     "steps, are in where.parquet."
@@ -70,49 +52,6 @@ _CANDIDATES = (
     f"{CANDIDATES.about} On each screen the best form of an effect; all forms are in "
     "candidates.parquet."
 )
-
-
-def _above(where: pd.DataFrame) -> pd.DataFrame:
-    """Without load steps, and without single places where noise may be all."""
-    kept = (where["by"] != "step") & ((where["by"] != _ONE_PLACE) | (where["gap_low"] > 0.0))
-    return where[kept].sort_values("gap", ascending=False, kind="stable")
-
-
-def _best(candidates: pd.DataFrame) -> pd.DataFrame:
-    """Stages in their order, in each the best first; of the screens one form of each effect."""
-    rows = candidates[candidates["log_evidence"].notna()]
-    order = {stage: number for number, stage in enumerate(rows["stage"].unique())}
-    ordered = rows.assign(order=rows["stage"].map(order)).sort_values(
-        ["order", "log_evidence"], ascending=[True, False], kind="stable"
-    )
-    again = ordered.duplicated(["stage", "effect"]) & ordered["stage"].str.startswith("screen")
-    return ordered[~again]
-
-
-def _worded(frame: pd.DataFrame) -> pd.DataFrame:
-    """Effects, places and options in plain words."""
-    ways = {
-        "effect": plain,
-        "fold": plain,
-        "test": plain,
-        "model": plain,
-        "coordinate": axis,
-        "variant": _options,
-    }
-    return frame.assign(
-        **{name: frame[name].map(way) for name, way in ways.items() if name in frame}
-    )
-
-
-def _options(text: str) -> str:
-    """``flexion-extension, tangent`` of options as JSON."""
-    values = [
-        name
-        for value in json.loads(text).values()
-        for name in (value if isinstance(value, list) else [value])
-    ]
-    return ", ".join(axis(str(name)) for name in values)
-
 
 Records = list[dict[str, Any]]
 
@@ -155,6 +94,40 @@ _TITLES = {
     "detectable": ("What would have been seen", "A smaller gap may be there unseen."),
 }
 """Tables from the verdict in their order: title, and what is said of each."""
+
+QUESTION = (
+    "Where do model and measurement disagree, which effect does the model lack, what happens when "
+    "it is added, and how sure is that?"
+)
+READ = ("where", "candidates", "held_out", "confusions")
+"""Tables whose rows the page needs; of the others it tells where they come from."""
+
+
+def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    verdict = read_verdict(results.tables.files["verdict"])
+    return Document(
+        question=QUESTION,
+        findings=findings(verdict, results),
+        pictures=_ordered(results.pictures, verdict),
+        tables=shown_tables(verdict, results),
+        metadata=results.metadata,
+        left_out=tuple(left_out(study)),
+        headline=Headline(
+            headline(verdict, results.table("where")), _joined(how_sure(verdict)), warnings(verdict)
+        ),
+    )
+
+
+def _ordered(pictures: Mapping[str, Picture], verdict: Verdict) -> list[Picture]:
+    """Where nothing is missing, what could have been seen comes first."""
+    first = "effect_confusions" if verdict.verdict is Answer.NULL else ""
+    return sorted(pictures.values(), key=lambda picture: picture.name != first)
+
+
+def _joined(words: str) -> str:
+    """No line ends between a number and its percent sign."""
+    return words.replace(" %", "\u00a0%")
 
 
 def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
@@ -216,34 +189,58 @@ def _place(effect: Missing, own: str) -> str:
     return "; ".join(part for part in (where_of(effect), own or differing(effect)) if part)
 
 
-QUESTION = (
-    "Where do model and measurement disagree, which effect does the model lack, what happens when "
-    "it is added, and how sure is that?"
-)
-READ = ("where", "candidates", "held_out", "confusions")
-"""Tables whose rows the page needs; of the others it tells where they come from."""
+def file_tables(results: Results) -> Iterator[Parts]:
+    """File, title, what is said of it, rows and columns of each table."""
+    held_out, where = results.table("held_out"), results.table("where")
+    yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), HELD_OUT.columns
+    if len(where):
+        yield "where", "Where the models are off", _WHERE, _worded(_above(where)), WHERE.columns
+    candidates = results.table("candidates")
+    if len(candidates):
+        columns = tuple(column for column in CANDIDATES.columns if column.name in _TRIED)
+        yield "candidates", "What was tried", _CANDIDATES, _worded(_best(candidates)), columns
 
 
-def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
-    """What the report says and shows."""
-    verdict = read_verdict(results.tables.files["verdict"])
-    return Document(
-        question=QUESTION,
-        findings=findings(verdict, results),
-        pictures=_ordered(results.pictures, verdict),
-        tables=shown_tables(verdict, results),
-        metadata=results.metadata,
-        left_out=tuple(left_out(study)),
-        headline=Headline(
-            headline(verdict, results.table("where")), _joined(how_sure(verdict)), warnings(verdict)
-        ),
+def _worded(frame: pd.DataFrame) -> pd.DataFrame:
+    """Effects, places and options in plain words."""
+    ways = {
+        "effect": plain,
+        "fold": plain,
+        "test": plain,
+        "model": plain,
+        "coordinate": axis,
+        "variant": _options,
+    }
+    return frame.assign(
+        **{name: frame[name].map(way) for name, way in ways.items() if name in frame}
     )
 
 
-def _ordered(pictures: Mapping[str, Picture], verdict: Verdict) -> list[Picture]:
-    """Where nothing is missing, what could have been seen comes first."""
-    first = "effect_confusions" if verdict.verdict is Answer.NULL else ""
-    return sorted(pictures.values(), key=lambda picture: picture.name != first)
+def _options(text: str) -> str:
+    """``flexion-extension, tangent`` of options as JSON."""
+    values = [
+        name
+        for value in json.loads(text).values()
+        for name in (value if isinstance(value, list) else [value])
+    ]
+    return ", ".join(axis(str(name)) for name in values)
+
+
+def _above(where: pd.DataFrame) -> pd.DataFrame:
+    """Without load steps, and without single places where noise may be all."""
+    kept = (where["by"] != "step") & ((where["by"] != _ONE_PLACE) | (where["gap_low"] > 0.0))
+    return where[kept].sort_values("gap", ascending=False, kind="stable")
+
+
+def _best(candidates: pd.DataFrame) -> pd.DataFrame:
+    """Stages in their order, in each the best first; of the screens one form of each effect."""
+    rows = candidates[candidates["log_evidence"].notna()]
+    order = {stage: number for number, stage in enumerate(rows["stage"].unique())}
+    ordered = rows.assign(order=rows["stage"].map(order)).sort_values(
+        ["order", "log_evidence"], ascending=[True, False], kind="stable"
+    )
+    again = ordered.duplicated(["stage", "effect"]) & ordered["stage"].str.startswith("screen")
+    return ordered[~again]
 
 
 def left_out(study: Discrepancy) -> Iterator[str]:
@@ -262,8 +259,3 @@ def left_out(study: Discrepancy) -> Iterator[str]:
     for name, size in study.nuisance:
         if not size:
             yield f"nuisance {name} (nuisance: {name}: 0)"
-
-
-def _joined(words: str) -> str:
-    """No line ends between a number and its percent sign."""
-    return words.replace(" %", "\u00a0%")

@@ -1,9 +1,4 @@
-"""Rows of the tables where and gap: gaps pooled in every way, and every reading.
-
-Rows of the table candidates: every effect on every screen, and every refit.
-
-Rows of the tables held_out and confusions, and what was held out of each reading.
-"""
+"""Rows of the five tables, from what a search found and its proof."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,29 +23,11 @@ from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
 
 Row = dict[str, Any]
 
+MOST_FORMS_SHOWN = 5
+"""Forms of one effect on a screen that get a row; the others are far behind."""
 
-def where_rows(found: Found, joints: Sequence[str]) -> list[Row]:
-    """Gaps of both models in every way of pooling."""
-    return [
-        _place_row(place, model)
-        for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit))
-        for place in places(residual_frame(found.base, fit, joints))
-    ]
-
-
-def _place_row(place: Place, model: str) -> Row:
-    low, high = place.gap.interval
-    at = {key: str(place.at.get(key, "*")) for key in KEYS}
-    return {
-        "by": place.by,
-        **at,
-        "readings": place.gap.readings,
-        "model": model,
-        "gap": place.gap.gap,
-        "gap_low": low,
-        "gap_high": high,
-        "rms_residual": place.gap.rms,
-    }
+NOT_FITTED = "the linear problem, no fit"
+DEGENERATE = "a shape ran to its bound: no more what its name says"
 
 
 def gap_rows(
@@ -126,11 +103,28 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     return at | found
 
 
-MOST_FORMS_SHOWN = 5
-"""Forms of one effect on a screen that get a row; the others are far behind."""
+def where_rows(found: Found, joints: Sequence[str]) -> list[Row]:
+    """Gaps of both models in every way of pooling."""
+    return [
+        _place_row(place, model)
+        for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit))
+        for place in places(residual_frame(found.base, fit, joints))
+    ]
 
-NOT_FITTED = "the linear problem, no fit"
-DEGENERATE = "a shape ran to its bound: no more what its name says"
+
+def _place_row(place: Place, model: str) -> Row:
+    low, high = place.gap.interval
+    at = {key: str(place.at.get(key, "*")) for key in KEYS}
+    return {
+        "by": place.by,
+        **at,
+        "readings": place.gap.readings,
+        "model": model,
+        "gap": place.gap.gap,
+        "gap_low": low,
+        "gap_high": high,
+        "rms_residual": place.gap.rms,
+    }
 
 
 def candidate_rows(found: Found, joints: Sequence[str]) -> list[Row]:
@@ -160,6 +154,19 @@ def _screened(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     return rows
 
 
+def _form_row(stage: str, form: Form, joints: Sequence[str]) -> Row:
+    return {
+        "stage": stage,
+        "effect": form.name,
+        "kind": form.variant.create().kind,
+        "variant": json.dumps(dict(form.variant.options)),
+        "spread": form.spread,
+        "scope": scope_words(form, joints),
+        "absorbed": None,
+        "detectable_gap": None,
+    }
+
+
 def _of_screen(tried: Tried) -> Row:
     effect = tried.form.variant.create()
     shapes = {
@@ -187,6 +194,10 @@ def _estimate(effect: Effect, tried: Tried) -> tuple[float | None, str]:
     away = float(tried.estimate[0]) * p.prior_scale
     value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
     return border(p.unit, value)
+
+
+def _share(drop: float, excess: float) -> float | None:
+    return float(drop / excess) if excess > 1.0 else None
 
 
 def _refitted(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
@@ -230,28 +241,39 @@ def _of_refit(one: Refit, excess: float) -> Row:
     return row
 
 
-def _share(drop: float, excess: float) -> float | None:
-    return float(drop / excess) if excess > 1.0 else None
+def design_rows(told: ToldApart) -> list[Row]:
+    """Rows of the table candidates: what the tests could tell of each effect."""
+    return [
+        {
+            "stage": "design",
+            "effect": one.effect,
+            "kind": one.best.form.variant.create().kind,
+            "variant": json.dumps(dict(one.best.form.variant.options)),
+            "spread": one.best.form.spread,
+            "scope": "*",
+            "shape": "{}",
+            "parameters": len(one.best.mean),
+            "estimate": None,
+            "unit": "",
+            "log_evidence": None,
+            "delta_chi2": None,
+            "gap_share": None,
+            "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
+            "detectable_gap": one.detectable.gap if one.detectable else None,
+            "threshold": None,
+            "status": Status.CONVERGED if one.testable else NOT_TESTABLE,
+            "message": one.why,
+        }
+        for one in told.judgements
+    ]
 
 
-def _form_row(stage: str, form: Form, joints: Sequence[str]) -> Row:
-    return {
-        "stage": stage,
-        "effect": form.name,
-        "kind": form.variant.create().kind,
-        "variant": json.dumps(dict(form.variant.options)),
-        "spread": form.spread,
-        "scope": scope_words(form, joints),
-        "absorbed": None,
-        "detectable_gap": None,
-    }
-
-
-def scope_words(form: Form, joints: Sequence[str]) -> str:
-    """Where a form acts, in words; ``*`` for everywhere."""
-    words = [joints[form.joint]] if form.joint is not None else []
-    words += [form.specimen] if form.specimen is not None else []
-    return " of ".join(words) or "*"
+def confusion_rows(told: ToldApart) -> list[Row]:
+    """One row per pair of effects."""
+    return [
+        {"effect": one.effect, "other": one.other, "share": float(np.clip(one.share, 0.0, 1.0))}
+        for one in told.confusions
+    ]
 
 
 def held_out_rows(proof: HeldOut) -> list[Row]:
@@ -291,36 +313,8 @@ def held_out_readings(
     }
 
 
-def confusion_rows(told: ToldApart) -> list[Row]:
-    """One row per pair of effects."""
-    return [
-        {"effect": one.effect, "other": one.other, "share": float(np.clip(one.share, 0.0, 1.0))}
-        for one in told.confusions
-    ]
-
-
-def design_rows(told: ToldApart) -> list[Row]:
-    """Rows of the table candidates: what the tests could tell of each effect."""
-    return [
-        {
-            "stage": "design",
-            "effect": one.effect,
-            "kind": one.best.form.variant.create().kind,
-            "variant": json.dumps(dict(one.best.form.variant.options)),
-            "spread": one.best.form.spread,
-            "scope": "*",
-            "shape": "{}",
-            "parameters": len(one.best.mean),
-            "estimate": None,
-            "unit": "",
-            "log_evidence": None,
-            "delta_chi2": None,
-            "gap_share": None,
-            "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
-            "detectable_gap": one.detectable.gap if one.detectable else None,
-            "threshold": None,
-            "status": Status.CONVERGED if one.testable else NOT_TESTABLE,
-            "message": one.why,
-        }
-        for one in told.judgements
-    ]
+def scope_words(form: Form, joints: Sequence[str]) -> str:
+    """Where a form acts, in words; ``*`` for everywhere."""
+    words = [joints[form.joint]] if form.joint is not None else []
+    words += [form.specimen] if form.specimen is not None else []
+    return " of ".join(words) or "*"

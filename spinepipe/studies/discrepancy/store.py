@@ -1,19 +1,13 @@
 """A store of the pieces of a search: each is a content-hashed task, done once and kept.
 
-A killed search finds what it had done; a repeated one only looks it up. Pieces are known by a
-digest of code and arguments, and kept as data (see `codec` and `kept`). What is missing is run as
-a task of pydra in this process, in a scratch folder of its own that nobody reads afterwards. The
-folder of the store may be deleted at any time: it only saves time.
+A killed search finds what it had done; a repeated one only looks it up. Pieces are functions of
+plain data, known by a digest of code and arguments, and kept as data (see `codec` and `kept`). What
+is missing is run as a task of pydra in this process, in a scratch folder of its own that nobody
+reads afterwards. The folder of the store may be deleted at any time: it only saves time.
 
-How the pieces of a search are run: at once, or through a store of what was done before.
-
-A piece is a function of plain data, so that a store can know it by the content of its arguments.
-
-A digest of what a value holds: the same in every process, however the value came about.
-
-Pickled bytes will not do. They hang on which equal objects are one and the same, on the order of
-sets, and on the cached properties that happen to be filled; so a value that was read back from a
-store would not be known again.
+Pickled bytes will not do for the digest of a value. They hang on which equal objects are one and
+the same, on the order of sets, and on the cached properties that happen to be filled; so a value
+that was read back from a store would not be known again.
 """
 
 import hashlib

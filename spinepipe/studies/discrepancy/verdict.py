@@ -123,7 +123,7 @@ class Noise:
 class Sizes:
     """A measure of the misfit, in fits and held out, without and with the effects."""
 
-    unit: str = UNIT
+    unit: str = field(default=UNIT, init=False)
     base: float | None = None
     with_effects: float | None = None
     held_out_base: float | None = None

@@ -115,7 +115,8 @@ def test_a_left_out_specimen_has_the_others_zone_and_its_own_stiffness() -> None
     assert result.closed is not None
     assert result.closed > 0.9
     assert result.beats_base
-    assert result.beats_surrogate
+    assert result.over_surrogate is not None
+    assert result.over_surrogate.beats
     other = held_out(found(base, True), Asked(tests=False, refit=True), at_once)
     assert other.with_effects is not None
     assert result.with_effects.rms == pytest.approx(other.with_effects.rms, abs=0.05)

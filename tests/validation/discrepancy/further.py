@@ -43,7 +43,7 @@ def held_out_told(found: Found) -> Told:
             "base_rms": said.base.rms if said.base else None,
             "rms": said.with_effects.rms if said.with_effects else None,
             "beats_base": said.beats_base,
-            "beats_surrogate": said.beats_surrogate if said.over_surrogate else None,
+            "beats_surrogate": said.over_surrogate.beats if said.over_surrogate else None,
         }
     return told
 

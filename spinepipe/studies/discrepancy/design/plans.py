@@ -1,6 +1,6 @@
-"""Plans of tests for one specimen: which loads, what is read, and which base is fitted to it.
+"""Plans of tests for one specimen, and the changes a laboratory could make to them.
 
-Changes of a test's loads and times, as a laboratory could make them.
+A plan says which loads there are, what is read, and which base is fitted to it.
 """
 
 from collections.abc import Sequence
@@ -100,9 +100,6 @@ def largest_held(case: LoadCase) -> LoadCase:
     after = [replace(step, time=(step.time or 0.0) + HELD_S[-1]) for step in timed[at + 1 :]]
     steps = [*timed[: at + 1], *held, *after]
     return replace(case, steps=tuple(replace(s, step=n) for n, s in enumerate(steps)))
-
-
-PER_SPECIMEN = "per_specimen"
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,9 @@
 
 Everything is linear in the strengths at the base fit, with normal noise: an effect of s times its
 typical strength f has moments s G f + N(0, G) on the screen, G the products of its signatures with
-base and nuisances taken out.
-
-A typical effect: its strengths at their declared defaults, and what a design sees of it.
-
-Strengths whose bounds allow both sides of off are independent with mean off, so that several of
-them neither add up nor cancel by a convention of signs.
+base and nuisances taken out. f are the declared defaults; strengths whose bounds allow both sides
+of off are independent with mean off, so that several of them neither add up nor cancel by a
+convention of signs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,6 +22,25 @@ from spinepipe.studies.discrepancy.search.screen import Group, Places
 
 NO_TRACE = 1e-6
 """A typical effect whose squared signature sums to less, in noise SD, leaves no trace at all."""
+
+ABSORBED = 0.98
+"""Effects of which the base takes up more than this share are no effects beside it."""
+
+CLEAR = 0.9
+"""A test is worth doing for an effect if the base takes up no more than this share of it there."""
+
+OFTEN = 0.9
+"""Probability with which an effect that counts as detectable is found."""
+
+LARGEST = 3.0
+"""Effects that only show beyond this many times their typical strength count as not testable."""
+
+SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN)
+"""How a typical effect may differ between places; one place only if a trial knows none of these."""
+
+DRAWS = 200
+WEAKEST, STRONGEST = 1e-6, 1e3
+"""Times the typical strength, between which the weakest is sought that is found."""
 
 
 @dataclass(frozen=True)
@@ -81,65 +97,6 @@ class Typical:
         """(k, d) strengths whose squares add up to the expected one."""
         both = np.column_stack([self.mean, np.diag(self.sd)])
         return both[:, np.any(both != 0.0, axis=0)]
-
-
-def typical(design: Design, number: int, form: Form) -> Typical:
-    """A form of effect ``number`` under a design."""
-    index, start = design.those.indices[number], design.those.starts[number]
-    middle = (0.0,) * len(form.variant.shapes)
-    places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
-    count = len(strengths)
-    signs = index.signs(form, places, count)
-    sizes = typical_strengths(form.variant)
-    away = np.array([sizes[column] for column in strengths])
-    raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
-    for specimen, columns, owners in places:
-        part, here, onto = design.of[specimen], np.ix_(columns, columns), summing(owners, count)
-        among_all = np.ix_(start + columns, start + columns)
-        raw += onto @ part.raw[number][here] @ onto.T
-        refitted += onto @ part.refitted[number][here] @ onto.T
-        left += onto @ part.left[among_all] @ onto.T
-    one_sided = signs != 0.0
-    mean, sd = np.where(one_sided, away, 0.0), np.where(one_sided, 0.0, away)
-    return Typical(form, places, mean, sd, signs, raw, refitted, left)
-
-
-def summing(owners: Indices, count: int) -> Array:
-    """(k, c) sums columns onto the strengths that own them."""
-    onto = np.zeros((count, len(owners)))
-    onto[owners, np.arange(len(owners))] = 1.0
-    return onto
-
-
-def typical_strengths(variant: Variant) -> dict[int, float]:
-    """Default of each strength, in prior SDs from off, by its column."""
-    found = {}
-    for column in variant.strengths:
-        p = variant.create().parameters[column]
-        assert p.off is not None
-        away = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
-        found[column] = float(away) / p.prior_scale
-    return found
-
-
-ABSORBED = 0.98
-"""Effects of which the base takes up more than this share are no effects beside it."""
-
-CLEAR = 0.9
-"""A test is worth doing for an effect if the base takes up no more than this share of it there."""
-
-OFTEN = 0.9
-"""Probability with which an effect that counts as detectable is found."""
-
-LARGEST = 3.0
-"""Effects that only show beyond this many times their typical strength count as not testable."""
-
-SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN)
-"""How a typical effect may differ between places; one place only if a trial knows none of these."""
-
-DRAWS = 200
-WEAKEST, STRONGEST = 1e-6, 1e3
-"""Times the typical strength, between which the weakest is sought that is found."""
 
 
 @dataclass(frozen=True)
@@ -227,15 +184,6 @@ def _best_spread(design: Design, number: int, variant: Variant) -> Typical:
     return max(ones, key=lambda one: one.squared(one.left))
 
 
-def _rank(one: Typical, least: Detectable | None) -> tuple[bool, float, float]:
-    """Smaller is better: shown, then little absorbed; a trace before none."""
-    return not _shown(one, least), one.absorbed, -one.squared(one.raw)
-
-
-def _shown(one: Typical, least: Detectable | None) -> bool:
-    return one.absorbed_by_base <= ABSORBED and least is not None and least.times <= LARGEST
-
-
 def _detectable(
     one: Typical, trials: Trials, freedom: int, needed: float, seed: int
 ) -> Detectable | None:
@@ -290,6 +238,15 @@ def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...
     return tuple(found)
 
 
+def _rank(one: Typical, least: Detectable | None) -> tuple[bool, float, float]:
+    """Smaller is better: shown, then little absorbed; a trace before none."""
+    return not _shown(one, least), one.absorbed, -one.squared(one.raw)
+
+
+def _shown(one: Typical, least: Detectable | None) -> bool:
+    return one.absorbed_by_base <= ABSORBED and least is not None and least.times <= LARGEST
+
+
 def _why(one: Typical, least: Detectable | None) -> str:
     if not one.seen:
         return "it leaves no trace in these readings"
@@ -299,3 +256,42 @@ def _why(one: Typical, least: Detectable | None) -> str:
     if least is None:
         return f"{taken}, and the rest is never evident"
     return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"
+
+
+def typical(design: Design, number: int, form: Form) -> Typical:
+    """A form of effect ``number`` under a design."""
+    index, start = design.those.indices[number], design.those.starts[number]
+    middle = (0.0,) * len(form.variant.shapes)
+    places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
+    count = len(strengths)
+    signs = index.signs(form, places, count)
+    sizes = typical_strengths(form.variant)
+    away = np.array([sizes[column] for column in strengths])
+    raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
+    for specimen, columns, owners in places:
+        part, here, onto = design.of[specimen], np.ix_(columns, columns), summing(owners, count)
+        among_all = np.ix_(start + columns, start + columns)
+        raw += onto @ part.raw[number][here] @ onto.T
+        refitted += onto @ part.refitted[number][here] @ onto.T
+        left += onto @ part.left[among_all] @ onto.T
+    one_sided = signs != 0.0
+    mean, sd = np.where(one_sided, away, 0.0), np.where(one_sided, 0.0, away)
+    return Typical(form, places, mean, sd, signs, raw, refitted, left)
+
+
+def summing(owners: Indices, count: int) -> Array:
+    """(k, c) sums columns onto the strengths that own them."""
+    onto = np.zeros((count, len(owners)))
+    onto[owners, np.arange(len(owners))] = 1.0
+    return onto
+
+
+def typical_strengths(variant: Variant) -> dict[int, float]:
+    """Default of each strength, in prior SDs from off, by its column."""
+    found = {}
+    for column in variant.strengths:
+        p = variant.create().parameters[column]
+        assert p.off is not None
+        away = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
+        found[column] = float(away) / p.prior_scale
+    return found

@@ -1,6 +1,4 @@
-"""What a cohort's tests could tell apart, before residuals are looked at: all of it together.
-
-Which effects a design of tests can tell apart, before residuals are looked at.
+"""Which effects a cohort's tests can tell apart, before residuals are looked at.
 
 Of what base and nuisances leave of a typical effect A, the share that another effect B explains:
 ``1 - min_x (|a - F x|^2 + |x|^2 / t^2) / |a|^2``, F the signatures of B, x its strengths with prior
@@ -49,6 +47,54 @@ class _Target:
     size: float
 
 
+@dataclass(frozen=True)
+class ToldApart:
+    """What the tests could tell.
+
+    Attributes
+    ----------
+    families : sets of effects that cannot be told apart.
+    """
+
+    judgements: tuple[Judgement, ...]
+    confusions: tuple[Confusion, ...]
+    families: tuple[tuple[str, ...], ...]
+    not_testable: tuple[NotTestable, ...]
+
+    @property
+    def smallest_detectable(self) -> tuple[SmallestDetectable, ...]:
+        """Of all effects that the tests can show."""
+        return tuple(
+            SmallestDetectable(one.effect, one.detectable.gap)
+            for one in self.judgements
+            if one.testable and one.detectable is not None
+        )
+
+
+def told_apart(
+    grounds: Grounds,
+    trials: Sequence[Trials],
+    needed: float,
+    declared: Array | None,
+    seed: int,
+    run: Run,
+) -> ToldApart:
+    """What the tests could tell at the base fit, which ``grounds`` stand on.
+
+    Parameters
+    ----------
+    needed : log evidence that an effect must have: the screen's threshold and margin.
+    declared : (6,) m and rad, SD of a single reading, for coordinates that were not read; or None.
+    """
+    joints = next(iter(grounds.fit.models.values())).n_joints
+    of = {name: run(seen_in, grounds, name, trials) for name in grounds.readings}
+    design = Design(candidates(trials, joints, grounds.tests), of)
+    found = judgements(trials, of, joints, grounds.tests, needed, seed)
+    pairs = confusions(design, found)
+    missing = run(not_testable, bench(grounds, declared), trials, found, needed, seed)
+    return ToldApart(found, pairs, families(pairs), missing)
+
+
 def confusions(design: Design, judged: Sequence[Judgement]) -> tuple[Confusion, ...]:
     """All ordered pairs of different effects that the tests can show.
 
@@ -69,21 +115,6 @@ def confusions(design: Design, judged: Sequence[Judgement]) -> tuple[Confusion, 
             strict=True,
         )
     )
-
-
-def families(found: Sequence[Confusion]) -> tuple[tuple[str, ...], ...]:
-    """Sets of effects that explain each other, alphabetical; effects alone are not listed."""
-    names = sorted({one.effect for one in found})
-    share = np.zeros((len(names), len(names)))
-    for one in found:
-        share[names.index(one.effect), names.index(one.other)] = one.share
-    mutual = np.minimum(share, share.T) > ALIKE
-    _, labels = connected_components(mutual, directed=False)
-    sets = [
-        tuple(name for name, label in zip(names, labels, strict=True) if label == number)
-        for number in sorted(set(labels.tolist()))
-    ]
-    return tuple(one for one in sets if len(one) > 1)
 
 
 def _target(design: Design, number: int, one: Typical) -> _Target:
@@ -139,49 +170,16 @@ def _products(
     return gram, moments
 
 
-@dataclass(frozen=True)
-class ToldApart:
-    """What the tests could tell.
-
-    Attributes
-    ----------
-    families : sets of effects that cannot be told apart.
-    """
-
-    judgements: tuple[Judgement, ...]
-    confusions: tuple[Confusion, ...]
-    families: tuple[tuple[str, ...], ...]
-    not_testable: tuple[NotTestable, ...]
-
-    @property
-    def smallest_detectable(self) -> tuple[SmallestDetectable, ...]:
-        """Of all effects that the tests can show."""
-        return tuple(
-            SmallestDetectable(one.effect, one.detectable.gap)
-            for one in self.judgements
-            if one.testable and one.detectable is not None
-        )
-
-
-def told_apart(
-    grounds: Grounds,
-    trials: Sequence[Trials],
-    needed: float,
-    declared: Array | None,
-    seed: int,
-    run: Run,
-) -> ToldApart:
-    """What the tests could tell at the base fit, which ``grounds`` stand on.
-
-    Parameters
-    ----------
-    needed : log evidence that an effect must have: the screen's threshold and margin.
-    declared : (6,) m and rad, SD of a single reading, for coordinates that were not read; or None.
-    """
-    joints = next(iter(grounds.fit.models.values())).n_joints
-    of = {name: run(seen_in, grounds, name, trials) for name in grounds.readings}
-    design = Design(candidates(trials, joints, grounds.tests), of)
-    found = judgements(trials, of, joints, grounds.tests, needed, seed)
-    pairs = confusions(design, found)
-    missing = run(not_testable, bench(grounds, declared), trials, found, needed, seed)
-    return ToldApart(found, pairs, families(pairs), missing)
+def families(found: Sequence[Confusion]) -> tuple[tuple[str, ...], ...]:
+    """Sets of effects that explain each other, alphabetical; effects alone are not listed."""
+    names = sorted({one.effect for one in found})
+    share = np.zeros((len(names), len(names)))
+    for one in found:
+        share[names.index(one.effect), names.index(one.other)] = one.share
+    mutual = np.minimum(share, share.T) > ALIKE
+    _, labels = connected_components(mutual, directed=False)
+    sets = [
+        tuple(name for name, label in zip(names, labels, strict=True) if label == number)
+        for number in sorted(set(labels.tolist()))
+    ]
+    return tuple(one for one in sets if len(one) > 1)

@@ -18,6 +18,7 @@ from spinepipe.studies.discrepancy.mistakes.suspected import (
     joint_moments,
     of_specimens,
 )
+from spinepipe.studies.discrepancy.search.noise import MAD_PER_SD
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, ROTATIONS
@@ -33,8 +34,6 @@ USUAL_QUANTILE = 0.4
 
 HARDLY = 0.1
 """Share of a joint's squared moment in a test up to which a rotation counts as hardly loaded."""
-
-MAD_PER_SD = 0.67449
 
 
 @dataclass(frozen=True)

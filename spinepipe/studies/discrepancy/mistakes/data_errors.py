@@ -3,12 +3,11 @@
 Signs and units come from how joints answer their loads, without any model; scatter from repeats;
 exchanged specimens from fits of the base. What cannot be told is not reported: see each part.
 
-Two specimens whose motion changed places: each fits the other's readings far better.
-
-With pure moments on joints of like orientation this cannot be told: stiffness, free for each
-specimen, then changes places too, and all fits as well as before. What tells are axes, masses and
-load points of their own. So a pair is named only if exchanging it lets both fit about as well as
-the other specimens do, and neither did before.
+Exchanged are two specimens of which each fits the other's readings far better. With pure moments
+on joints of like orientation this cannot be told: stiffness, free for each specimen, then changes
+places too, and all fits as well as before. What tells are axes, masses and load points of their
+own. So a pair is named only if exchanging it lets both fit about as well as the other specimens
+do, and neither did before.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,6 +42,9 @@ LEAST_SHARE = 0.6
 LEAST_GAIN = 60.0
 """Drop of chi2 that is strong evidence whatever else."""
 
+CLEAR = 5.0
+"""SDs of one reading that a joint's motion must exceed to tell a sign or a unit."""
+
 
 @dataclass(frozen=True)
 class _Exchange:
@@ -50,6 +52,45 @@ class _Exchange:
     before: float
     after: float
     share: float
+
+
+def suspected_errors(
+    grounds: Grounds, measured: Sequence[SpecimenReadings], run: Run
+) -> tuple[SuspectedError, ...]:
+    """All suspected mistakes, where the base has a fit.
+
+    Parameters
+    ----------
+    measured : the readings before outliers were left out; loose markers look like outliers.
+    """
+    joints = next(iter(grounds.fit.models.values())).joints
+    found = [*before_a_fit(measured, joints, grounds.noise.sd, zeroed=grounds.noise.zeroed)]
+    if not _is_repeated(measured):
+        scatter = beside_the_curve(measured, grounds.fit.predicted)
+        found += bad_markers(scatter, list(grounds.readings), joints, in_every=True)
+    if not found:
+        found += swapped(grounds, run)
+    return tuple(found)
+
+
+def _is_repeated(measured: Sequence[SpecimenReadings]) -> bool:
+    return any(bool((test.count >= 2).any()) for one in measured for test in one.tests)
+
+
+def before_a_fit(
+    measured: Sequence[SpecimenReadings], joints: Sequence[str], sd: Array, *, zeroed: bool
+) -> tuple[SuspectedError, ...]:
+    """What can be told without a model: signs, units, and scatter between cycles.
+
+    Also when the base has no fit, which a wrong unit may well be the reason for. ``sd`` (6,) m and
+    rad, NaN where nothing was read.
+    """
+    by_name: Mapping[str, SpecimenReadings] = {one.specimen: one for one in measured}
+    found = answers(by_name, zeroed, np.nan_to_num(sd), CLEAR)
+    errors = [*wrong_units(found), *wrong_signs(found, joints, list(by_name), sd)]
+    if _is_repeated(measured):
+        errors += bad_markers(between_cycles(measured), list(by_name), joints, in_every=False)
+    return tuple(errors)
 
 
 def swapped(grounds: Grounds, run: Run) -> list[SuspectedError]:
@@ -97,25 +138,6 @@ def _exchange(
     return _Exchange(pair, before, fit.chi2, share)
 
 
-def _one_step(supposed: Hypothesis, setting: Setting, name: str) -> float:
-    """The chi2 of a specimen that one linear step from the start reaches; a cheap first look."""
-    member, one = supposed.members[name], setting.readings[name]
-    simulated = Simulated(member.model, one.cases, setting.zeroed, member.free)
-    try:
-        predicted = simulated.at(np.zeros(len(member.free)))
-    except NoEquilibrium:
-        return np.inf
-    errors = [
-        np.nan_to_num(seen - test.mean)
-        for seen, test in zip(predicted.readings, one.tests, strict=True)
-    ]
-    white = setting.whitenings[name]
-    residual, jacobian = white(errors), white(predicted.by_x)
-    step, _ = lstsq(jacobian, residual)
-    left = residual - jacobian @ step
-    return float(left @ left)
-
-
 def _exchanged(a: SpecimenReadings, b: SpecimenReadings) -> dict[str, SpecimenReadings] | None:
     """Each with its own frames and loads and the other's readings; None if tests do not match."""
     shapes = [[(t.case.test, t.cycles.shape) for t in one.tests] for one in (a, b)]
@@ -150,44 +172,20 @@ def _question(
     return supposed, setting
 
 
-CLEAR = 5.0
-"""SDs of one reading that a joint's motion must exceed to tell a sign or a unit."""
-
-
-def suspected_errors(
-    grounds: Grounds, measured: Sequence[SpecimenReadings], run: Run
-) -> tuple[SuspectedError, ...]:
-    """All suspected mistakes, where the base has a fit.
-
-    Parameters
-    ----------
-    measured : the readings before outliers were left out; loose markers look like outliers.
-    """
-    joints = next(iter(grounds.fit.models.values())).joints
-    found = [*before_a_fit(measured, joints, grounds.noise.sd, zeroed=grounds.noise.zeroed)]
-    if not _is_repeated(measured):
-        scatter = beside_the_curve(measured, grounds.fit.predicted)
-        found += bad_markers(scatter, list(grounds.readings), joints, in_every=True)
-    if not found:
-        found += swapped(grounds, run)
-    return tuple(found)
-
-
-def before_a_fit(
-    measured: Sequence[SpecimenReadings], joints: Sequence[str], sd: Array, *, zeroed: bool
-) -> tuple[SuspectedError, ...]:
-    """What can be told without a model: signs, units, and scatter between cycles.
-
-    Also when the base has no fit, which a wrong unit may well be the reason for. ``sd`` (6,) m and
-    rad, NaN where nothing was read.
-    """
-    by_name: Mapping[str, SpecimenReadings] = {one.specimen: one for one in measured}
-    found = answers(by_name, zeroed, np.nan_to_num(sd), CLEAR)
-    errors = [*wrong_units(found), *wrong_signs(found, joints, list(by_name), sd)]
-    if _is_repeated(measured):
-        errors += bad_markers(between_cycles(measured), list(by_name), joints, in_every=False)
-    return tuple(errors)
-
-
-def _is_repeated(measured: Sequence[SpecimenReadings]) -> bool:
-    return any(bool((test.count >= 2).any()) for one in measured for test in one.tests)
+def _one_step(supposed: Hypothesis, setting: Setting, name: str) -> float:
+    """The chi2 of a specimen that one linear step from the start reaches; a cheap first look."""
+    member, one = supposed.members[name], setting.readings[name]
+    simulated = Simulated(member.model, one.cases, setting.zeroed, member.free)
+    try:
+        predicted = simulated.at(np.zeros(len(member.free)))
+    except NoEquilibrium:
+        return np.inf
+    errors = [
+        np.nan_to_num(seen - test.mean)
+        for seen, test in zip(predicted.readings, one.tests, strict=True)
+    ]
+    white = setting.whitenings[name]
+    residual, jacobian = white(errors), white(predicted.by_x)
+    step, _ = lstsq(jacobian, residual)
+    left = residual - jacobian @ step
+    return float(left @ left)

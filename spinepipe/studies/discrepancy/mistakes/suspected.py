@@ -1,6 +1,4 @@
-"""What may be wrong in the files and not in the model: a mistake that a person should look for.
-
-How joints answer the loads that drive them: radians per newton metre, by plain least squares.
+"""How joints answer the loads that drive them: radians per newton metre, by plain least squares.
 
 No model is fitted and no stiffness supposed, so that a mistake in the files cannot drag anything
 along. The load is what a chain carries in its neutral pose; it needs the joint frames alone.

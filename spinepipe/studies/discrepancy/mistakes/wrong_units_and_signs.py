@@ -1,15 +1,13 @@
-"""Joints that move against the load that drives them: a sign is wrong, in motion or in loads.
+"""Wrong signs and units: joints that answer their load the other way, or as no spine does.
 
-A spring yields to its load. Where a joint answers as much as the others do, but the other way, its
-readings have the wrong sign; where most joints of a test do so, the sign of the load (or of the
-coordinate) has. Told of rotations that a test drives; not of translations, nor of rotations that
-only follow others.
+Signs. A spring yields to its load. Where a joint answers as much as the others do, but the other
+way, its readings have the wrong sign; where most joints of a test do so, the sign of the load (or
+of the coordinate) has. Told of rotations that a test drives; not of translations, nor of rotations
+that only follow others.
 
-Stiffness that no spine has: the unit of the loads or of the motion is another than stated.
-
-Published stiffness of a joint spans a factor of 60 in a rotation (Gould 2024a, Table 1). A single
-rotation counts as impossible a decade beyond; several together sooner, as a wrong unit moves all.
-Units that leave the stiffness in that range (lbf in for N m: a factor of 8.85) cannot be told.
+Units. Published stiffness of a joint spans a factor of 60 in a rotation (Gould 2024a, Table 1). A
+single rotation counts as impossible a decade beyond; several together sooner, as a wrong unit moves
+all. Units that leave the stiffness in that range (lbf in for N m: a factor of 8.85) cannot be told.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,6 +30,23 @@ AGAINST = -0.9
 
 LIKE = 5.0
 """Factor within which the size of an answer must be that of the other joints."""
+
+DECADES = 1.0
+"""Beyond the published range, for one rotation."""
+
+APART = 30.0
+"""Factor between one specimen or test and the others that no anatomy and no preload makes."""
+
+MIX_UPS = {
+    1000.0: "loads in N mm taken for N m",
+    180.0 / np.pi: "motion in rad taken for deg",
+    np.pi / 180.0: "motion in deg taken for rad",
+    1e-3: "loads in kN m taken for N m",
+}
+"""Factor on the stiffness that each mistake makes."""
+
+NEAR = 5.0
+"""Factor within which a mistake counts as the one."""
 
 
 def wrong_signs(
@@ -89,6 +104,15 @@ def _tests(
     return errors
 
 
+def _same(chosen: Sequence[Answer]) -> dict[tuple[str, ...], list[str]]:
+    """Sets of tests, and the specimens that have them."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for name in dict.fromkeys(a.specimen for a in chosen):
+        tests = dict.fromkeys(a.test for a in chosen if a.specimen == name)
+        found.setdefault(tuple(tests), []).append(name)
+    return found
+
+
 def _joints(
     single: Sequence[Answer],
     found: Sequence[Answer],
@@ -127,40 +151,6 @@ def _words_of_sign(chosen: Sequence[Answer], found: Sequence[Answer], sd: Array)
     )
 
 
-def _same(chosen: Sequence[Answer]) -> dict[tuple[str, ...], list[str]]:
-    """Sets of tests, and the specimens that have them."""
-    found: dict[tuple[str, ...], list[str]] = {}
-    for name in dict.fromkeys(a.specimen for a in chosen):
-        tests = dict.fromkeys(a.test for a in chosen if a.specimen == name)
-        found.setdefault(tuple(tests), []).append(name)
-    return found
-
-
-DECADES = 1.0
-"""Beyond the published range, for one rotation."""
-
-APART = 30.0
-"""Factor between one specimen or test and the others that no anatomy and no preload makes."""
-
-MIX_UPS = {
-    1000.0: "loads in N mm taken for N m",
-    180.0 / np.pi: "motion in rad taken for deg",
-    np.pi / 180.0: "motion in deg taken for rad",
-    1e-3: "loads in kN m taken for N m",
-}
-"""Factor on the stiffness that each mistake makes."""
-
-NEAR = 5.0
-"""Factor within which a mistake counts as the one."""
-
-
-def published_range(coordinate: str) -> tuple[float, float]:
-    """Smallest and largest published stiffness of a rotation, N m/rad (Gould 2024a, Table 1)."""
-    column = STIFFNESS_COLUMNS[3 + ROTATIONS.index(coordinate)]
-    box = published("gould_2024a")["start_stiffness_box"]
-    return float(box["low"][column]), float(box["high"][column])
-
-
 def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
     """Suspected units: of single specimens and tests, else of the whole cohort."""
     single = _of_specimens(found) or _of_tests(found)
@@ -175,39 +165,11 @@ def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
     return [SuspectedError(ALL, _mix_up(factor), evidence)]
 
 
-def _stiffness(found: Sequence[Answer]) -> dict[str, float]:
-    """N m/rad by rotation: of most joints."""
-    names = dict.fromkeys(a.coordinate for a in found)
-    return {n: 1.0 / typical([a.slope for a in found if a.coordinate == n]) for n in names}
-
-
-def _is_impossible(stiffness: Mapping[str, float]) -> bool:
-    """Beyond the published range by a decade in one rotation, or all the same way by less."""
-    if not stiffness:
-        return False
-    ranges = [published_range(name) for name in stiffness]
-    above = [np.log10(k / high) for k, (_, high) in zip(stiffness.values(), ranges, strict=True)]
-    below = [np.log10(low / k) for k, (low, _) in zip(stiffness.values(), ranges, strict=True)]
-    if max(max(above), max(below)) > DECADES:
-        return True
-    least = DECADES / np.sqrt(len(stiffness))
-    return any(min(side) > 0.0 and float(np.mean(side)) > least for side in (above, below))
-
-
 def _of_specimens(found: Sequence[Answer]) -> list[SuspectedError]:
     errors = []
     for name in dict.fromkeys(a.specimen for a in found):
         own = [a for a in found if a.specimen == name]
         errors += _apart(name, own, [a for a in found if a.specimen != name], everywhere=True)
-    return errors
-
-
-def _of_tests(found: Sequence[Answer]) -> list[SuspectedError]:
-    errors = []
-    for specimen, test in dict.fromkeys((a.specimen, a.test) for a in found):
-        own = [a for a in found if (a.specimen, a.test) == (specimen, test)]
-        others = [a for a in found if (a.specimen, a.test) != (specimen, test)]
-        errors += _apart(f"{specimen}, test {test}", own, others, everywhere=False)
     return errors
 
 
@@ -229,6 +191,12 @@ def _apart(
     return [SuspectedError(where, _mix_up(factor), evidence)]
 
 
+def _stiffness(found: Sequence[Answer]) -> dict[str, float]:
+    """N m/rad by rotation: of most joints."""
+    names = dict.fromkeys(a.coordinate for a in found)
+    return {n: 1.0 / typical([a.slope for a in found if a.coordinate == n]) for n in names}
+
+
 def _middle(coordinate: str) -> float:
     low, high = published_range(coordinate)
     return float(np.sqrt(low * high))
@@ -248,3 +216,32 @@ def _mix_up(factor: float) -> str:
     if abs(np.log(factor / nearest)) < np.log(NEAR):
         return f"unit: {MIX_UPS[nearest]} (a factor of {nearest:.3g})"
     return "unit of loads or motion"
+
+
+def _of_tests(found: Sequence[Answer]) -> list[SuspectedError]:
+    errors = []
+    for specimen, test in dict.fromkeys((a.specimen, a.test) for a in found):
+        own = [a for a in found if (a.specimen, a.test) == (specimen, test)]
+        others = [a for a in found if (a.specimen, a.test) != (specimen, test)]
+        errors += _apart(f"{specimen}, test {test}", own, others, everywhere=False)
+    return errors
+
+
+def _is_impossible(stiffness: Mapping[str, float]) -> bool:
+    """Beyond the published range by a decade in one rotation, or all the same way by less."""
+    if not stiffness:
+        return False
+    ranges = [published_range(name) for name in stiffness]
+    above = [np.log10(k / high) for k, (_, high) in zip(stiffness.values(), ranges, strict=True)]
+    below = [np.log10(low / k) for k, (low, _) in zip(stiffness.values(), ranges, strict=True)]
+    if max(max(above), max(below)) > DECADES:
+        return True
+    least = DECADES / np.sqrt(len(stiffness))
+    return any(min(side) > 0.0 and float(np.mean(side)) > least for side in (above, below))
+
+
+def published_range(coordinate: str) -> tuple[float, float]:
+    """Smallest and largest published stiffness of a rotation, N m/rad (Gould 2024a, Table 1)."""
+    column = STIFFNESS_COLUMNS[3 + ROTATIONS.index(coordinate)]
+    box = published("gould_2024a")["start_stiffness_box"]
+    return float(box["low"][column]), float(box["high"][column])

@@ -1,11 +1,9 @@
 """Folds in the linear model of a fit: what the training says of unknowns and nuisances.
 
-All readings enter as normal equations, made once for each test and choice of load steps; a fold
-sums those of its training.
-
-A fit as a linear model: readings to first order in its unknowns and in the nuisances.
-
-A surrogate without physics: the base, and a ridge on the generic basis.
+A fit is a linear model around where it stands, readings to first order in its unknowns and in the
+nuisances. All readings enter as normal equations, made once for each test and choice of load steps;
+a fold sums those of its training. The surrogate without physics is the base and a ridge on the
+generic basis.
 """
 
 from collections.abc import Mapping

@@ -1,12 +1,9 @@
 """What base, model with effects and surrogate predict of a part of a fold.
 
-Folds fitted anew: the full simulator, from where the full fit ended, on the training alone.
-
-How large the nuisances of this cohort are, of what their priors allow.
-
-A search holds them as large as their priors say, so that they never pose as physics. A prediction
-of motion not seen wants them as large as they are: their size is the most likely one of a few,
-given what the final model leaves (empirical Bayes).
+Where asked for, folds are fitted anew by the full simulator, from where the full fit ended, on the
+training alone. A search holds nuisances as large as their priors say, so that they never pose as
+physics. A prediction of motion not seen wants them as large as they are in this cohort: the most
+likely of a few sizes, given what the final model leaves (empirical Bayes).
 """
 
 from collections.abc import Sequence
@@ -32,128 +29,12 @@ from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
 from spinepipe.studies.discrepancy.store import Run
 
-
-class NoFold(RuntimeError):
-    """A fold's fit has no start; the message says why."""
-
-
-def refitted(grounds: Grounds, linear: LinearModel, part: Part, run: Run) -> Placed:
-    """The scored specimens as fits to the training have them.
-
-    Parameters
-    ----------
-    linear : the grounds' fit to first order; its nuisances are used.
-
-    Raises
-    ------
-    NoFold
-        When a fit has no start.
-    """
-    hypothesis = grounds.fit.hypothesis
-    count = len(hypothesis.unknowns)
-    free, x = np.arange(count), np.zeros(count)
-    if part.apart is None:
-        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x, run)
-    else:
-        numbers = {
-            name: np.array(one.numbers, dtype=np.int64) for name, one in hypothesis.members.items()
-        }
-        own = own_unknowns(numbers, part.apart)
-        others = [name for name in hypothesis.members if name != part.apart]
-        # own values stay at the full fit: no training tells them yet, priors would switch them off
-        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x, run)
-        _, fit = _fitted(grounds, linear, part, [part.apart], own, x, run)
-    nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
-    return Placed({name: fit.predicted[name] for name in part.scored}, nuisances)
-
-
-def _fitted(
-    grounds: Grounds,
-    linear: LinearModel,
-    part: Part,
-    specimens: Sequence[str],
-    free: Indices,
-    x: Array,
-    run: Run,
-) -> tuple[Array, JointFit]:
-    """Moves from the full fit after a fit of the free unknowns, others as in x; and that fit."""
-    start = _again(grounds.fit, linear, specimens, free, x)
-    readings, whitenings = {}, {}
-    for name in specimens:
-        one, steps = grounds.readings[name], part.training[name]
-        tests = tuple(only(test, there) for test, there in zip(one.tests, steps, strict=True))
-        readings[name] = replace(one, tests=tests)
-        plain = whitening(tests, grounds.noise)
-        whitenings[name] = with_nuisances(plain, linear.members[name].nuisances)
-    fit = run(joint_fit, start, Setting(readings, whitenings, grounds.noise.zeroed))
-    if not fit.usable:
-        raise NoFold(fit.status)
-    ended = x.copy()
-    ended[free] += fit.x
-    return ended, fit
-
-
-def _again(
-    fit: JointFit, linear: LinearModel, specimens: Sequence[str], free: Indices, x: Array
-) -> Hypothesis:
-    """The fit's hypothesis of some specimens, started where it ended, moved by x."""
-    order = {int(number): place for place, number in enumerate(free)}
-    members = {}
-    for name in specimens:
-        one = fit.hypothesis.members[name]
-        kept = [k for k, number in enumerate(one.numbers) if number in order]
-        members[name] = Member(
-            moved(fit.models[name], one.free, x[list(one.numbers)]),
-            tuple(one.free[k] for k in kept),
-            tuple(order[one.numbers[k]] for k in kept),
-        )
-    unknowns = tuple(
-        replace(
-            fit.hypothesis.unknowns[number],
-            low=float(linear.low[number] - x[number]),
-            high=float(linear.high[number] - x[number]),
-            mean=float(linear.mean[number] - x[number]),
-        )
-        for number in free
-    )
-    return Hypothesis(members, unknowns, fit.hypothesis.supposed)
-
-
-def _nuisances(
-    grounds: Grounds, linear: LinearModel, part: Part, specimen: str, fit: JointFit
-) -> tuple[Array, ...]:
-    """What the nuisances add per test (T, J, 6), at their most likely values in the training."""
-    moves = linear.members[specimen].nuisances
-    pairs = zip(grounds.readings[specimen].tests, part.training[specimen], strict=True)
-    tests = [only(test, there) for test, there in pairs]
-    plain = whitening(tests, grounds.noise)
-    left = [
-        np.nan_to_num(test.mean - seen)
-        for test, seen in zip(tests, fit.predicted[specimen], strict=True)
-    ]
-    columns, residual = plain.noise_only(moves), plain.noise_only(left)
-    inner = np.eye(columns.shape[1]) + columns.T @ columns
-    z = np.linalg.solve(inner, columns.T @ residual)
-    return tuple(moved_by @ z for moved_by in moves)
-
-
 SIZES = np.array([0.03, 0.1, 0.2, 0.35, 0.6, 1.0])
 """Of one prior SD."""
 
 
-def nuisance_size(grounds: Grounds) -> float:
-    """Most likely size of the nuisances beside the grounds' fit, in prior SDs."""
-    likelihood = np.zeros(len(SIZES))
-    for name, one in grounds.readings.items():
-        full, plain = grounds.setting.whitenings[name], grounds.plain[name]
-        predicted = grounds.fit.predicted[name]
-        errors = [
-            np.nan_to_num(seen - test.mean) for seen, test in zip(predicted, one.tests, strict=True)
-        ]
-        along = full.directions.T @ plain.noise_only(errors)
-        variance = 1.0 + np.outer(SIZES, full.sizes) ** 2
-        likelihood -= 0.5 * np.sum(np.log(variance) + along**2 / variance, axis=1)
-    return float(SIZES[np.argmax(likelihood)])
+class NoFold(RuntimeError):
+    """A fold's fit has no start; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -262,3 +143,118 @@ class FoldModels:
             )
             for name, tests in part.scored.items()
         }
+
+
+def refitted(grounds: Grounds, linear: LinearModel, part: Part, run: Run) -> Placed:
+    """The scored specimens as fits to the training have them.
+
+    Parameters
+    ----------
+    linear : the grounds' fit to first order; its nuisances are used.
+
+    Raises
+    ------
+    NoFold
+        When a fit has no start.
+    """
+    hypothesis = grounds.fit.hypothesis
+    count = len(hypothesis.unknowns)
+    free, x = np.arange(count), np.zeros(count)
+    if part.apart is None:
+        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x, run)
+    else:
+        numbers = {
+            name: np.array(one.numbers, dtype=np.int64) for name, one in hypothesis.members.items()
+        }
+        own = own_unknowns(numbers, part.apart)
+        others = [name for name in hypothesis.members if name != part.apart]
+        # own values stay at the full fit: no training tells them yet, priors would switch them off
+        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x, run)
+        _, fit = _fitted(grounds, linear, part, [part.apart], own, x, run)
+    nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
+    return Placed({name: fit.predicted[name] for name in part.scored}, nuisances)
+
+
+def _fitted(
+    grounds: Grounds,
+    linear: LinearModel,
+    part: Part,
+    specimens: Sequence[str],
+    free: Indices,
+    x: Array,
+    run: Run,
+) -> tuple[Array, JointFit]:
+    """Moves from the full fit after a fit of the free unknowns, others as in x; and that fit."""
+    start = _again(grounds.fit, linear, specimens, free, x)
+    readings, whitenings = {}, {}
+    for name in specimens:
+        one, steps = grounds.readings[name], part.training[name]
+        tests = tuple(only(test, there) for test, there in zip(one.tests, steps, strict=True))
+        readings[name] = replace(one, tests=tests)
+        plain = whitening(tests, grounds.noise)
+        whitenings[name] = with_nuisances(plain, linear.members[name].nuisances)
+    fit = run(joint_fit, start, Setting(readings, whitenings, grounds.noise.zeroed))
+    if not fit.usable:
+        raise NoFold(fit.status)
+    ended = x.copy()
+    ended[free] += fit.x
+    return ended, fit
+
+
+def _again(
+    fit: JointFit, linear: LinearModel, specimens: Sequence[str], free: Indices, x: Array
+) -> Hypothesis:
+    """The fit's hypothesis of some specimens, started where it ended, moved by x."""
+    order = {int(number): place for place, number in enumerate(free)}
+    members = {}
+    for name in specimens:
+        one = fit.hypothesis.members[name]
+        kept = [k for k, number in enumerate(one.numbers) if number in order]
+        members[name] = Member(
+            moved(fit.models[name], one.free, x[list(one.numbers)]),
+            tuple(one.free[k] for k in kept),
+            tuple(order[one.numbers[k]] for k in kept),
+        )
+    unknowns = tuple(
+        replace(
+            fit.hypothesis.unknowns[number],
+            low=float(linear.low[number] - x[number]),
+            high=float(linear.high[number] - x[number]),
+            mean=float(linear.mean[number] - x[number]),
+        )
+        for number in free
+    )
+    return Hypothesis(members, unknowns, fit.hypothesis.supposed)
+
+
+def _nuisances(
+    grounds: Grounds, linear: LinearModel, part: Part, specimen: str, fit: JointFit
+) -> tuple[Array, ...]:
+    """What the nuisances add per test (T, J, 6), at their most likely values in the training."""
+    moves = linear.members[specimen].nuisances
+    pairs = zip(grounds.readings[specimen].tests, part.training[specimen], strict=True)
+    tests = [only(test, there) for test, there in pairs]
+    plain = whitening(tests, grounds.noise)
+    left = [
+        np.nan_to_num(test.mean - seen)
+        for test, seen in zip(tests, fit.predicted[specimen], strict=True)
+    ]
+    columns, residual = plain.noise_only(moves), plain.noise_only(left)
+    inner = np.eye(columns.shape[1]) + columns.T @ columns
+    z = np.linalg.solve(inner, columns.T @ residual)
+    return tuple(moved_by @ z for moved_by in moves)
+
+
+def nuisance_size(grounds: Grounds) -> float:
+    """Most likely size of the nuisances beside the grounds' fit, in prior SDs."""
+    likelihood = np.zeros(len(SIZES))
+    for name, one in grounds.readings.items():
+        full, plain = grounds.setting.whitenings[name], grounds.plain[name]
+        predicted = grounds.fit.predicted[name]
+        errors = [
+            np.nan_to_num(seen - test.mean) for seen, test in zip(predicted, one.tests, strict=True)
+        ]
+        along = full.directions.T @ plain.noise_only(errors)
+        variance = 1.0 + np.outer(SIZES, full.sizes) ** 2
+        likelihood -= 0.5 * np.sum(np.log(variance) + along**2 / variance, axis=1)
+    return float(SIZES[np.argmax(likelihood)])

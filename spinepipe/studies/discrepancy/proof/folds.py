@@ -1,9 +1,7 @@
-"""Folds: which load steps of which tests train, and which are predicted.
+"""Folds: which load steps of which tests train and which are predicted, and the readings of those.
 
 A test is left out in all specimens at once. A left-out specimen has stiffness of its own, so every
 second load step of its tests is given away to fit that, and the others are predicted; then swapped.
-
-Readings of chosen load steps alone, and their whitening.
 """
 
 from collections.abc import Mapping, Sequence

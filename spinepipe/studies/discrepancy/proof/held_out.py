@@ -1,12 +1,8 @@
-"""Held-out confirmation: base, model with effects and surrogate on readings no fit has seen.
+"""Held-out proof: base, model with effects and surrogate on readings that no fit has seen.
 
-By default folds are fitted in the linear models around the full fits, which costs next to nothing.
-
-Scores of a fold: what predictions miss of readings that were left out, in noise SD.
-
-Motion of each reading as predicted by a fit that did not see it.
-
-Held-out confirmation as data: folds, margins, and what they say together.
+A fold is scored by what predictions miss of the readings left out, in noise SD; margins between
+models are summed over folds. By default folds are fitted in the linear models around the full fits,
+which costs next to nothing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,36 +29,13 @@ from spinepipe.studies.discrepancy.search.inquiry import Found
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.store import Run
 
+SAME = 1e-6
+"""Share of chi2 by which predictions that hang on nothing that was scored may differ."""
 
-def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
-    """The gap over the scored readings of all parts, noise whitened within each test."""
-    white = [
-        _missed(chosen, name, test, there, placed)
-        for scored, placed in parts
-        for name, tests in scored.items()
-        for test, there in enumerate(tests)
-        if there.any()
-    ]
-    residual = np.concatenate([np.zeros(0), *white])
-    return Gap(float(residual @ residual), float(len(residual)), len(residual))
+SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 
-
-def _missed(chosen: Chosen, specimen: str, test: int, there: Flags, placed: Placed) -> Array:
-    """(N,) residuals with SD one and independent where only noise is left."""
-    predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
-    errors = chosen.mean(specimen, test) - predicted
-    return chosen.whitening(specimen, test, there).noise_only([errors])
-
-
-def pooled(gaps: Sequence[Gap]) -> Gap | None:
-    """All together; None of none."""
-    if not gaps:
-        return None
-    return Gap(
-        sum(gap.chi2 for gap in gaps),
-        sum(gap.dof for gap in gaps),
-        sum(gap.readings for gap in gaps),
-    )
+FEWEST_FOLDS = 3
+"""Folds from which a margin has a standard error."""
 
 
 @dataclass(frozen=True)
@@ -77,38 +50,6 @@ class HeldOutMotion:
     fold: tuple[NDArray[np.int64], ...]
     base: tuple[Array, ...]
     with_effects: tuple[Array, ...]
-
-
-def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
-    """Empty sheets, to be filled by `fill`."""
-    return {name: _empty(one) for name, one in readings.items()}
-
-
-def _empty(one: SpecimenReadings) -> HeldOutMotion:
-    shapes = [test.count.shape for test in one.tests]
-    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
-    return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
-
-
-def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -> None:
-    """Enter a part's scored readings, where no earlier fold has."""
-    for name, tests in found.scored.items():
-        sheet = sheets[name]
-        columns = (
-            (sheet.base, found.base.motion[name]),
-            (sheet.with_effects, found.with_effects.motion[name]),
-        )
-        for test, there in enumerate(tests):
-            new = there & (sheet.fold[test] < 0)
-            sheet.fold[test][new] = number
-            for column, values in columns:
-                column[test][new] = values[test][new]
-
-
-SAME = 1e-6
-"""Share of chi2 by which predictions that hang on nothing that was scored may differ."""
-
-SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 
 
 @dataclass(frozen=True)
@@ -195,25 +136,6 @@ class HeldOut:
     def beats_base(self) -> bool:
         """Whether the effects predict better than the base alone."""
         return self.over_base is not None and self.over_base.beats
-
-    @property
-    def beats_surrogate(self) -> bool:
-        """Whether the effects predict better than a surrogate without physics."""
-        return self.over_surrogate is not None and self.over_surrogate.beats
-
-
-def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
-    """(chi2 of base - chi2 of new) / (chi2 of base - expected), at most 1.
-
-    None where noise, or nuisances that the training left open, may be all that the base misses.
-    """
-    if base is None or new is None or base.interval[0] <= 0.0 or base.chi2 <= expected:
-        return None
-    return min((base.chi2 - new.chi2) / (base.chi2 - expected), 1.0)
-
-
-FEWEST_FOLDS = 3
-"""Folds from which a margin has a standard error."""
 
 
 @dataclass(frozen=True)
@@ -316,3 +238,70 @@ def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
     enough = len(drops) >= FEWEST_FOLDS
     se = float(np.sqrt(len(drops)) * np.std(drops, ddof=1)) if enough else None
     return Margin(float(drops.sum()), se)
+
+
+def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
+    """The gap over the scored readings of all parts, noise whitened within each test."""
+    white = [
+        _missed(chosen, name, test, there, placed)
+        for scored, placed in parts
+        for name, tests in scored.items()
+        for test, there in enumerate(tests)
+        if there.any()
+    ]
+    residual = np.concatenate([np.zeros(0), *white])
+    return Gap(float(residual @ residual), float(len(residual)), len(residual))
+
+
+def _missed(chosen: Chosen, specimen: str, test: int, there: Flags, placed: Placed) -> Array:
+    """(N,) residuals with SD one and independent where only noise is left."""
+    predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
+    errors = chosen.mean(specimen, test) - predicted
+    return chosen.whitening(specimen, test, there).noise_only([errors])
+
+
+def pooled(gaps: Sequence[Gap]) -> Gap | None:
+    """All together; None of none."""
+    if not gaps:
+        return None
+    return Gap(
+        sum(gap.chi2 for gap in gaps),
+        sum(gap.dof for gap in gaps),
+        sum(gap.readings for gap in gaps),
+    )
+
+
+def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
+    """Empty sheets, to be filled by `fill`."""
+    return {name: _empty(one) for name, one in readings.items()}
+
+
+def _empty(one: SpecimenReadings) -> HeldOutMotion:
+    shapes = [test.count.shape for test in one.tests]
+    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
+    return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
+
+
+def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -> None:
+    """Enter a part's scored readings, where no earlier fold has."""
+    for name, tests in found.scored.items():
+        sheet = sheets[name]
+        columns = (
+            (sheet.base, found.base.motion[name]),
+            (sheet.with_effects, found.with_effects.motion[name]),
+        )
+        for test, there in enumerate(tests):
+            new = there & (sheet.fold[test] < 0)
+            sheet.fold[test][new] = number
+            for column, values in columns:
+                column[test][new] = values[test][new]
+
+
+def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
+    """(chi2 of base - chi2 of new) / (chi2 of base - expected), at most 1.
+
+    None where noise, or nuisances that the training left open, may be all that the base misses.
+    """
+    if base is None or new is None or base.interval[0] <= 0.0 or base.chi2 <= expected:
+        return None
+    return min((base.chi2 - new.chi2) / (base.chi2 - expected), 1.0)

@@ -1,7 +1,4 @@
-"""How large a discrepancy is, in noise SD: gap and rms residual, of all readings or of some.
-
-Where the discrepancy is: gaps by specimen, joint, coordinate, test and load step.
-"""
+"""How large a discrepancy is, in noise SD, over all readings or pooled by place."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +12,19 @@ from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.units import COORDINATES
+
+KEYS = ("specimen", "test", "step", "joint", "coordinate")
+
+POOLED = {
+    "all": (),
+    "specimen": ("specimen",),
+    "joint": ("joint",),
+    "coordinate": ("coordinate",),
+    "test": ("test",),
+    "step": ("step",),
+    "joint x coordinate x test": ("joint", "coordinate", "test"),
+}
+"""Name of each way to pool and what it tells apart."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +93,21 @@ class LeftOver:
     freedom: tuple[Array, ...]
 
 
+@dataclass(frozen=True)
+class Place:
+    """A place and the gap there; ``at`` holds what is told apart, the rest is together."""
+
+    by: str
+    at: Mapping[str, object]
+    gap: Gap
+
+
+def whole_gap(grounds: Grounds, fit: JointFit) -> Gap:
+    """The gap over all readings."""
+    left = left_over(grounds, fit).values()
+    return gap_of([one.residual for one in left], [one.freedom for one in left])
+
+
 def left_over(grounds: Grounds, fit: JointFit) -> dict[str, LeftOver]:
     """What a fit leaves of every reading, nuisances at their most likely values."""
     unknowns = len(fit.x)
@@ -100,20 +125,6 @@ def left_over(grounds: Grounds, fit: JointFit) -> dict[str, LeftOver]:
     return found
 
 
-def whole_gap(grounds: Grounds, fit: JointFit) -> Gap:
-    """The gap over all readings."""
-    left = left_over(grounds, fit).values()
-    return gap_of([one.residual for one in left], [one.freedom for one in left])
-
-
-def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]) -> Gap:
-    """The gap over given readings; NaN counts nothing."""
-    r = np.concatenate([test.ravel() for one in residuals for test in one])
-    f = np.concatenate([test.ravel() for one in freedoms for test in one])
-    there = np.isfinite(r)
-    return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
-
-
 def _spread(values: Array, used: tuple[NDArray[np.bool_], ...]) -> tuple[Array, ...]:
     """(N,) values back to (T, J, 6) per test."""
     found, at = [], 0
@@ -126,27 +137,12 @@ def _spread(values: Array, used: tuple[NDArray[np.bool_], ...]) -> tuple[Array, 
     return tuple(found)
 
 
-KEYS = ("specimen", "test", "step", "joint", "coordinate")
-
-POOLED = {
-    "all": (),
-    "specimen": ("specimen",),
-    "joint": ("joint",),
-    "coordinate": ("coordinate",),
-    "test": ("test",),
-    "step": ("step",),
-    "joint x coordinate x test": ("joint", "coordinate", "test"),
-}
-"""Name of each way to pool and what it tells apart."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """A place and the gap there; ``at`` holds what is told apart, the rest is together."""
-
-    by: str
-    at: Mapping[str, object]
-    gap: Gap
+def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]) -> Gap:
+    """The gap over given readings; NaN counts nothing."""
+    r = np.concatenate([test.ravel() for one in residuals for test in one])
+    f = np.concatenate([test.ravel() for one in freedoms for test in one])
+    there = np.isfinite(r)
+    return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
 
 
 def residual_frame(grounds: Grounds, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:

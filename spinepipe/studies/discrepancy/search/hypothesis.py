@@ -1,10 +1,8 @@
 """A hypothesis: the base and the effects that are said to be there, as models and unknowns.
 
-Unknowns are shared between specimens or of one; each moves rows of an effect's values.
-
-The base a study starts from: linear joints, shared by the levels or free, or a model file.
-
-Forms of an effect that a search tries: which variant, and how its values may differ where.
+The base has linear joints, shared by the levels or free, or comes from a model file. An effect has
+a form: which variant, and how its values may differ where. Unknowns are shared between specimens or
+of one; each moves rows of an effect's values.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +22,7 @@ from spinepipe.statics import FreeParameter, declared, free_parameters
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
-BUSHING = "linear_bushing"
+BUSHING, PER_SPECIMEN = "linear_bushing", "per_specimen"
 DAMPING = np.array([2000.0] * 3 + [10.0] * 3)
 """N s/m and N m s/rad; poses at rest do not hang on it, only the verdict that they are stable."""
 

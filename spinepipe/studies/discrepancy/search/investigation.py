@@ -11,7 +11,12 @@ from spinepipe.model.file import ModelFile
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters, trials
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    PER_SPECIMEN,
+    base_model,
+    base_parameters,
+    trials,
+)
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
@@ -26,8 +31,6 @@ from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
-
-PER_SPECIMEN = "per_specimen"
 
 GUESSED_SD = np.array([1e-3] * 3 + [np.deg2rad(1.0)] * 3)
 """For the first fit of a cohort that declares no SD and whose cycles differ in their loads."""

@@ -73,10 +73,6 @@ class JointFit:
             blocks.append(block)
         return np.concatenate(blocks)
 
-    def whole_residual(self) -> Array:
-        """(N,) of all specimens, in their order."""
-        return np.concatenate(list(self.residuals.values()))
-
 
 class _Points:
     """Evaluates a hypothesis; the last point is kept."""

@@ -1,7 +1,4 @@
-"""Fitted models as a model file: effects with their scope, values per specimen and joint.
-
-Values of fitted effects with their 95 % intervals, in the units of tables and reports.
-"""
+"""Fitted models as model files, and fitted values with their 95 % intervals in units of tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +11,30 @@ from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values
 from spinepipe.studies.discrepancy.search.hypothesis import Form
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-EVERY = ("*",)
+NORMAL_95 = 1.959964
+
+BORDER = {
+    "rad": ("deg", DEG_PER_RAD),
+    "m": ("mm", MM_PER_M),
+    "m/rad": ("mm/deg", MM_PER_M / DEG_PER_RAD),
+}
+"""Unit inside to unit and factor outside; all other units stay."""
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """One fitted number. ``place``: specimen, joint or test it is of; empty for all."""
+
+    name: str
+    place: tuple[str, ...]
+    value: float
+    low: float
+    high: float
+    unit: str
+    at_bound: bool
 
 
 def model_file(
@@ -46,24 +64,6 @@ def model_file(
         for specimen in acting:
             after[specimen] += copies
     return ModelFile(model=name, cohort=cohort, effects=tuple(entries))
-
-
-def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
-    """One copy of the effect, or one per test that it tells apart."""
-    if form.spread is not Spread.BY_TEST:
-        return 1
-    name, model = next(iter(models.items()))
-    behind = model.effects[after[name] :]
-    tests: list[tuple[str, ...]] = []
-    for scoped in behind:
-        if scoped.effect != behind[0].effect or scoped.tests in tests or scoped.tests == EVERY:
-            break
-        tests.append(scoped.tests)
-    return len(tests)
-
-
-def _specimens(form: Form) -> tuple[str, ...]:
-    return EVERY if form.specimen is None else (form.specimen,)
 
 
 def _of_scoped(
@@ -115,40 +115,22 @@ def _row(specimen: str, joint: str, names: Sequence[str], values: Sequence[float
     return Values(specimen=specimen, joint=joint, **numbers)
 
 
-NORMAL_95 = 1.959964
-
-BORDER = {
-    "rad": ("deg", DEG_PER_RAD),
-    "m": ("mm", MM_PER_M),
-    "m/rad": ("mm/deg", MM_PER_M / DEG_PER_RAD),
-}
-"""Unit inside to unit and factor outside; all other units stay."""
-
-
-@dataclass(frozen=True)
-class FittedValue:
-    """One fitted number. ``place``: specimen, joint or test it is of; empty for all."""
-
-    name: str
-    place: tuple[str, ...]
-    value: float
-    low: float
-    high: float
-    unit: str
-    at_bound: bool
+def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
+    """One copy of the effect, or one per test that it tells apart."""
+    if form.spread is not Spread.BY_TEST:
+        return 1
+    name, model = next(iter(models.items()))
+    behind = model.effects[after[name] :]
+    tests: list[tuple[str, ...]] = []
+    for scoped in behind:
+        if scoped.effect != behind[0].effect or scoped.tests in tests or scoped.tests == EVERY:
+            break
+        tests.append(scoped.tests)
+    return len(tests)
 
 
-def border(unit: str, value: float) -> tuple[float, str]:
-    """A value in the unit of tables, and that unit."""
-    name, factor = BORDER.get(unit, (unit, 1.0))
-    return value * factor, name
-
-
-def standard_errors(fit: JointFit) -> Array:
-    """(m,) of all unknowns, priors counted in."""
-    jacobian = fit.whole_jacobian()
-    precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
-    return np.sqrt(np.diagonal(np.linalg.inv(precision)))
+def _specimens(form: Form) -> tuple[str, ...]:
+    return EVERY if form.specimen is None else (form.specimen,)
 
 
 def fitted_values(fit: JointFit, number: int) -> tuple[FittedValue, ...]:
@@ -172,3 +154,16 @@ def fitted_values(fit: JointFit, number: int) -> tuple[FittedValue, ...]:
                 )
             )
     return tuple(found)
+
+
+def border(unit: str, value: float) -> tuple[float, str]:
+    """A value in the unit of tables, and that unit."""
+    name, factor = BORDER.get(unit, (unit, 1.0))
+    return value * factor, name
+
+
+def standard_errors(fit: JointFit) -> Array:
+    """(m,) of all unknowns, priors counted in."""
+    jacobian = fit.whole_jacobian()
+    precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
+    return np.sqrt(np.diagonal(np.linalg.inv(precision)))

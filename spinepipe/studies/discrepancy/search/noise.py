@@ -2,11 +2,9 @@
 
 A reading's error has one SD for all readings of a coordinate and the correlation rho^|t - u|
 between load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
-
-Noise from cycles whose loads were meant to be equal and are not quite.
-
-The base's prediction takes the difference of the loads out; what it misses is common to the cycles
-of a test, so that differences of their residuals are noise.
+Where the loads of cycles were meant to be equal and are not quite, the base's prediction takes the
+difference out; what it misses is common to the cycles of a test, so that differences of their
+residuals are noise.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,6 +37,8 @@ FEWEST = 30
 DECLARED_DOUBT = 1.2
 """Without repeats readings count as this much noisier than declared: a doubt kept on purpose."""
 
+Predicted = Mapping[str, Sequence[Array]]
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -69,62 +69,6 @@ class Noise:
         return left @ serial @ left.T
 
 
-def without_outliers(
-    specimens: Sequence[SpecimenReadings],
-) -> tuple[tuple[SpecimenReadings, ...], int]:
-    """The readings without those far from what the other cycles say, and how many were dropped."""
-    single = _typical(_deviations(test) for one in specimens for test in one.tests)
-    whole = _typical(_mean_deviations(test) for one in specimens for test in one.tests)
-    dropped, kept = 0, []
-    for specimen in specimens:
-        tests = []
-        for test in specimen.tests:
-            shifted = np.abs(_mean_deviations(test)) > FAR_CYCLE * whole
-            far = (np.abs(_deviations(test)) > FAR * single) | shifted[:, None]
-            far &= np.isfinite(test.cycles)
-            far |= _undecided(far, test)
-            dropped += int(far.sum())
-            tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
-        kept.append(replace(specimen, tests=tuple(tests)))
-    return tuple(kept), dropped
-
-
-def _undecided(far: NDArray[np.bool_], test: Repeats) -> NDArray[np.bool_]:
-    """(C, T, J, 6) readings of which too few cycles agree to say which one is wrong."""
-    there = np.isfinite(test.cycles)
-    few = (there & ~far).sum(axis=0) < FEWEST_AGREEING
-    result: NDArray[np.bool_] = there & few & far.any(axis=0)
-    return result
-
-
-def _deviations(test: Repeats) -> Array:
-    """(C, T, J, 6) deviations from the median of the cycles, NaN with fewer than three."""
-    enough = test.count >= 3
-    cycles = np.where(enough, test.cycles, 0.0)
-    return np.where(enough, cycles - np.nanmedian(cycles, axis=0), np.nan)
-
-
-def _mean_deviations(test: Repeats) -> Array:
-    """(C, J, 6) mean over the steps of the deviations, less the median of the cycles."""
-    deviations = _deviations(test)
-    count = np.isfinite(deviations).sum(axis=1)
-    mean = np.nansum(deviations, axis=1) / np.maximum(count, 1)
-    result: Array = np.where(count > 0, mean - np.median(mean, axis=0), np.nan)
-    return result
-
-
-def _typical(deviations: Iterable[Array]) -> Array:
-    """(6,) robust SD of deviations (..., 6) from the median of the cycles."""
-    stacked = np.concatenate([np.zeros((0, 6)), *(one.reshape(-1, 6) for one in deviations)])
-    sizes = np.full(6, np.inf)
-    for coordinate in range(6):
-        values = stacked[np.isfinite(stacked[:, coordinate]), coordinate]
-        values = values[values != 0.0]  # the median itself
-        if len(values) >= FEWEST:
-            sizes[coordinate] = np.median(np.abs(values)) / MAD_PER_SD
-    return np.where(sizes > 0.0, sizes, np.inf)
-
-
 def estimated_noise(
     specimens: Sequence[SpecimenReadings], declared: Array | None, zeroed: bool, outliers: int
 ) -> Noise | None:
@@ -142,10 +86,6 @@ def estimated_noise(
         return None
     sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
     return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed)
-
-
-def _is_read(specimens: Sequence[SpecimenReadings], coordinate: int) -> bool:
-    return any(test.count[..., coordinate].any() for one in specimens for test in one.tests)
 
 
 def _contrasts(specimens: Sequence[SpecimenReadings]) -> list[list[Array]]:
@@ -167,6 +107,10 @@ def _contrasts_of(test: Repeats) -> list[tuple[Array, int]]:
         if len(whole) >= 2:
             found.append((helmert(len(whole)) @ whole, int(coordinate)))
     return found
+
+
+def _is_read(specimens: Sequence[SpecimenReadings], coordinate: int) -> bool:
+    return any(test.count[..., coordinate].any() for one in specimens for test in one.tests)
 
 
 def _most_likely(contrasts: Sequence[Sequence[Array]], zeroed: bool) -> tuple[Array, float]:
@@ -203,9 +147,6 @@ def _profile(groups: dict[int, Array], rho: float, zeroed: bool) -> tuple[float,
     return -0.5 * (count * np.log(variance) + logdet), float(np.sqrt(variance))
 
 
-Predicted = Mapping[str, Sequence[Array]]
-
-
 def noise_of_residuals(
     readings: Mapping[str, SpecimenReadings], predicted: Predicted, noise: Noise
 ) -> tuple[dict[str, SpecimenReadings], Noise]:
@@ -225,15 +166,6 @@ def noise_of_residuals(
     return clean, found
 
 
-def _histories(one: SpecimenReadings) -> list[list[int]]:
-    """Numbers of the load histories that are cycles of one test: same name, same steps."""
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for number, test in enumerate(one.tests):
-        steps = tuple(step.step for step in test.case.steps)
-        groups.setdefault((test.case.test, steps), []).append(number)
-    return list(groups.values())
-
-
 def _residuals(one: SpecimenReadings, predicted: Sequence[Array]) -> SpecimenReadings:
     """Residuals in the place of readings, cycles of a test together."""
     tests = []
@@ -241,6 +173,15 @@ def _residuals(one: SpecimenReadings, predicted: Sequence[Array]) -> SpecimenRea
         cycles = np.concatenate([one.tests[n].cycles - predicted[n] for n in numbers])
         tests.append(Repeats(one.tests[numbers[0]].case, cycles))
     return replace(one, tests=tuple(tests))
+
+
+def _histories(one: SpecimenReadings) -> list[list[int]]:
+    """Numbers of the load histories that are cycles of one test: same name, same steps."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for number, test in enumerate(one.tests):
+        steps = tuple(step.step for step in test.case.steps)
+        groups.setdefault((test.case.test, steps), []).append(number)
+    return list(groups.values())
 
 
 def _without(one: SpecimenReadings, kept: SpecimenReadings) -> SpecimenReadings:
@@ -254,3 +195,59 @@ def _without(one: SpecimenReadings, kept: SpecimenReadings) -> SpecimenReadings:
             at += len(cycles)
             tests[n] = replace(tests[n], cycles=np.where(there, cycles, np.nan))
     return replace(one, tests=tuple(tests))
+
+
+def without_outliers(
+    specimens: Sequence[SpecimenReadings],
+) -> tuple[tuple[SpecimenReadings, ...], int]:
+    """The readings without those far from what the other cycles say, and how many were dropped."""
+    single = _typical(_deviations(test) for one in specimens for test in one.tests)
+    whole = _typical(_mean_deviations(test) for one in specimens for test in one.tests)
+    dropped, kept = 0, []
+    for specimen in specimens:
+        tests = []
+        for test in specimen.tests:
+            shifted = np.abs(_mean_deviations(test)) > FAR_CYCLE * whole
+            far = (np.abs(_deviations(test)) > FAR * single) | shifted[:, None]
+            far &= np.isfinite(test.cycles)
+            far |= _undecided(far, test)
+            dropped += int(far.sum())
+            tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
+        kept.append(replace(specimen, tests=tuple(tests)))
+    return tuple(kept), dropped
+
+
+def _typical(deviations: Iterable[Array]) -> Array:
+    """(6,) robust SD of deviations (..., 6) from the median of the cycles."""
+    stacked = np.concatenate([np.zeros((0, 6)), *(one.reshape(-1, 6) for one in deviations)])
+    sizes = np.full(6, np.inf)
+    for coordinate in range(6):
+        values = stacked[np.isfinite(stacked[:, coordinate]), coordinate]
+        values = values[values != 0.0]  # the median itself
+        if len(values) >= FEWEST:
+            sizes[coordinate] = np.median(np.abs(values)) / MAD_PER_SD
+    return np.where(sizes > 0.0, sizes, np.inf)
+
+
+def _deviations(test: Repeats) -> Array:
+    """(C, T, J, 6) deviations from the median of the cycles, NaN with fewer than three."""
+    enough = test.count >= 3
+    cycles = np.where(enough, test.cycles, 0.0)
+    return np.where(enough, cycles - np.nanmedian(cycles, axis=0), np.nan)
+
+
+def _mean_deviations(test: Repeats) -> Array:
+    """(C, J, 6) mean over the steps of the deviations, less the median of the cycles."""
+    deviations = _deviations(test)
+    count = np.isfinite(deviations).sum(axis=1)
+    mean = np.nansum(deviations, axis=1) / np.maximum(count, 1)
+    result: Array = np.where(count > 0, mean - np.median(mean, axis=0), np.nan)
+    return result
+
+
+def _undecided(far: NDArray[np.bool_], test: Repeats) -> NDArray[np.bool_]:
+    """(C, T, J, 6) readings of which too few cycles agree to say which one is wrong."""
+    there = np.isfinite(test.cycles)
+    few = (there & ~far).sum(axis=0) < FEWEST_AGREEING
+    result: NDArray[np.bool_] = there & few & far.any(axis=0)
+    return result

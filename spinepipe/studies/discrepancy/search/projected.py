@@ -1,12 +1,10 @@
 """The linearised problem of a cohort: signatures with base, nuisances and named effects taken out.
 
-What specimens have of their own is projected out of each specimen; what they share (strengths and
-shapes of named effects) couples them and is taken out of the sums.
-
-Signatures: what each effect, switched on a little, would do to the readings of a specimen.
-
-The model carries every variant switched off; the simulator's exact sensitivities to the strengths
-are the signatures, per joint and parameter. One column is one strength at one place.
+A signature is what an effect, switched on a little, would do to the readings of a specimen: the
+model carries every variant switched off, and the simulator's exact sensitivities to the strengths
+are the signatures, one column for one strength at one place. What specimens have of their own is
+projected out of each specimen; what they share (strengths and shapes of named effects) couples them
+and is taken out of the sums.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,6 +27,8 @@ SEEN = 1e-8
 UNSEEN = 1e-6
 """A signature with less of its square left than this is nothing but what was taken out."""
 
+EVERY_TEST = "*"
+
 
 @dataclass(frozen=True)
 class Taken:
@@ -49,6 +49,71 @@ class Taken:
         """(N, m) columns without the specimen's own directions."""
         result: Array = columns - self.own @ (self.own.T @ columns)
         return result
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of a specimen's signatures; M columns, the data and D draws of the null.
+
+    Attributes
+    ----------
+    gram : (M, M) F'F. moments : (M, 1 + D) F'r of the data and of the draws.
+    raw : (M,) squared norms in noise SDs before anything was taken out.
+    shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) A'A.
+    moments_shared : (a, 1 + D) A'r.
+    """
+
+    gram: Array
+    moments: Array
+    raw: Array
+    shared: Array
+    gram_shared: Array
+    moments_shared: Array
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Products of all specimens; what they share, summed."""
+
+    of: Mapping[str, Products]
+    gram_shared: Array
+    moments_shared: Array
+
+    def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
+        """Products (k, k), (k, 1 + D) of k strengths less what shared unknowns take of them.
+
+        ``coupled`` (k, a): products of the strengths with the shared unknowns.
+        """
+        if not coupled.shape[1]:
+            return gram, moments
+        gain = coupled @ pinvh(self.gram_shared, rcond=1e-10)
+        return gram - gain @ coupled.T, moments - gain @ self.moments_shared
+
+
+@dataclass(frozen=True)
+class Column:
+    """One strength of a variant at one place.
+
+    Attributes
+    ----------
+    sds : prior SDs of the shapes from their defaults. strength : column of the effect's values.
+    joint : index, or None for an effect on the whole chain. test : name, or ``*``.
+    scale : prior SD of the strength, of its logarithm where it is logarithmic.
+    """
+
+    variant: Variant
+    sds: tuple[float, ...]
+    strength: int
+    joint: int | None
+    test: str
+    scale: float
+
+
+def linearised(of: Mapping[str, Products]) -> Linearised:
+    """The problem of a cohort from those of its specimens."""
+    parts = list(of.values())
+    gram = np.sum([part.gram_shared for part in parts], axis=0)
+    return Linearised(of, gram, np.sum([part.moments_shared for part in parts], axis=0))
 
 
 def taken_out(fit: JointFit) -> dict[str, Taken]:
@@ -86,26 +151,6 @@ def _basis(columns: Array) -> Array:
     return seen
 
 
-@dataclass(frozen=True)
-class Products:
-    """Products of a specimen's signatures; M columns, the data and D draws of the null.
-
-    Attributes
-    ----------
-    gram : (M, M) F'F. moments : (M, 1 + D) F'r of the data and of the draws.
-    raw : (M,) squared norms in noise SDs before anything was taken out.
-    shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) A'A.
-    moments_shared : (a, 1 + D) A'r.
-    """
-
-    gram: Array
-    moments: Array
-    raw: Array
-    shared: Array
-    gram_shared: Array
-    moments_shared: Array
-
-
 def drawn(taken: Taken, draws: int, rng: np.random.Generator) -> Array:
     """(N, 1 + D) the data's residual, and residuals as the null would have them."""
     return np.column_stack([taken.residual, rng.standard_normal((len(taken.residual), draws))])
@@ -120,54 +165,6 @@ def products(taken: Taken, white: Array, raw: Array, errors: Array) -> Products:
     shared = np.where(gone[:, None], 0.0, left.T @ taken.shared)
     own = taken.shared.T
     return Products(gram, moments, raw, shared, own @ taken.shared, own @ errors)
-
-
-@dataclass(frozen=True)
-class Linearised:
-    """Products of all specimens; what they share, summed."""
-
-    of: Mapping[str, Products]
-    gram_shared: Array
-    moments_shared: Array
-
-    def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
-        """Products (k, k), (k, 1 + D) of k strengths less what shared unknowns take of them.
-
-        ``coupled`` (k, a): products of the strengths with the shared unknowns.
-        """
-        if not coupled.shape[1]:
-            return gram, moments
-        gain = coupled @ pinvh(self.gram_shared, rcond=1e-10)
-        return gram - gain @ coupled.T, moments - gain @ self.moments_shared
-
-
-def linearised(of: Mapping[str, Products]) -> Linearised:
-    """The problem of a cohort from those of its specimens."""
-    parts = list(of.values())
-    gram = np.sum([part.gram_shared for part in parts], axis=0)
-    return Linearised(of, gram, np.sum([part.moments_shared for part in parts], axis=0))
-
-
-EVERY_TEST = "*"
-
-
-@dataclass(frozen=True)
-class Column:
-    """One strength of a variant at one place.
-
-    Attributes
-    ----------
-    sds : prior SDs of the shapes from their defaults. strength : column of the effect's values.
-    joint : index, or None for an effect on the whole chain. test : name, or ``*``.
-    scale : prior SD of the strength, of its logarithm where it is logarithmic.
-    """
-
-    variant: Variant
-    sds: tuple[float, ...]
-    strength: int
-    joint: int | None
-    test: str
-    scale: float
 
 
 def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column]:

@@ -1,7 +1,4 @@
-"""Nonlinear refits of the forms that lead the screen, with their evidence by Laplace's method.
-
-Evidence for an effect of a nonlinear fit, by Laplace's method.
-"""
+"""Nonlinear refits of the forms that lead the screen, with their evidence by Laplace's method."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,48 +20,6 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, Tried
 from spinepipe.studies.discrepancy.store import Run
-
-
-def laplace(fit: JointFit, number: int, gain: float) -> float:
-    """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
-
-    The likelihood is taken for normal around the fit; strengths are N(off, t^2), averaged over the
-    sizes t of the screen, shapes as their priors.
-    """
-    unknowns = fit.hypothesis.unknowns
-    own = np.array([u.supposed == number for u in unknowns])
-    curvature = curvature_of(fit, own)
-    chosen = [u for u in unknowns if u.supposed == number]
-    away = fit.x[own] - np.array([u.mean for u in chosen])
-    is_strength = np.array([u.is_strength for u in chosen])
-    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
-    parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
-    sides = np.array([parameters[u.column].side for u in chosen])
-    found = []
-    for size in SIZES:
-        sd = np.where(is_strength, size, 1.0) * declared
-        spread = np.eye(len(sd)) + curvature * sd**2
-        _, logdet = np.linalg.slogdet(spread)
-        fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
-        posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
-        mean = posterior @ (curvature @ away)
-        inside = sides * mean / np.sqrt(np.diagonal(posterior))
-        half = np.where(sides != 0.0, np.log(2.0) + log_ndtr(inside), 0.0)
-        found.append(-0.5 * (logdet + fit_to_prior) + float(half.sum()))
-    return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
-
-
-def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
-    """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
-    jacobian = fit.whole_jacobian()
-    priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
-    others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
-    mine = np.vstack([jacobian[:, own], np.zeros((int((~own).sum()), int(own.sum())))])
-    basis, _ = np.linalg.qr(others)
-    left = mine - basis @ (basis.T @ mine)
-    result: Array = left.T @ left
-    return result
-
 
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
@@ -140,12 +95,58 @@ def _simpler(
                 yield replace(fitted, form=form)
 
 
+def laplace(fit: JointFit, number: int, gain: float) -> float:
+    """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
+
+    The likelihood is taken for normal around the fit; strengths are N(off, t^2), averaged over the
+    sizes t of the screen, shapes as their priors.
+    """
+    unknowns = fit.hypothesis.unknowns
+    own = np.array([u.supposed == number for u in unknowns])
+    curvature = curvature_of(fit, own)
+    chosen = [u for u in unknowns if u.supposed == number]
+    away = fit.x[own] - np.array([u.mean for u in chosen])
+    is_strength = np.array([u.is_strength for u in chosen])
+    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
+    parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
+    sides = np.array([parameters[u.column].side for u in chosen])
+    found = []
+    for size in SIZES:
+        sd = np.where(is_strength, size, 1.0) * declared
+        spread = np.eye(len(sd)) + curvature * sd**2
+        _, logdet = np.linalg.slogdet(spread)
+        fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
+        posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
+        mean = posterior @ (curvature @ away)
+        inside = sides * mean / np.sqrt(np.diagonal(posterior))
+        half = np.where(sides != 0.0, np.log(2.0) + log_ndtr(inside), 0.0)
+        found.append(-0.5 * (logdet + fit_to_prior) + float(half.sum()))
+    return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
+
+
+def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
+    """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
+    jacobian = fit.whole_jacobian()
+    priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
+    others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
+    mine = np.vstack([jacobian[:, own], np.zeros((int((~own).sum()), int(own.sum())))])
+    basis, _ = np.linalg.qr(others)
+    left = mine - basis @ (basis.T @ mine)
+    result: Array = left.T @ left
+    return result
+
+
 def leading(screen: Screen) -> Iterator[Tried]:
     """Forms worth a refit."""
     least = _least(screen.effects[0].log_evidence)
     for place, one in enumerate(screen.effects[:MOST_EFFECTS]):
         if one.log_evidence > least:
             yield from _forms(one, MOST_FORMS[place])
+
+
+def _least(best: float) -> float:
+    """Evidence on the screen from which a refit may still win."""
+    return max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
 
 
 def _forms(one: Screened, most: int) -> list[Tried]:
@@ -165,11 +166,6 @@ def _forms(one: Screened, most: int) -> list[Tried]:
         if same and tried not in chosen and tried.log_evidence > least:
             chosen.append(tried)
     return chosen
-
-
-def _least(best: float) -> float:
-    """Evidence on the screen from which a refit may still win."""
-    return max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
 
 
 def started(tried: Tried) -> Supposed:
@@ -211,6 +207,15 @@ def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
     return Refit(one.form, fit, log_evidence, gain)
 
 
+def _degenerate(fit: JointFit, number: int) -> bool:
+    """Whether a shape has run to its bound: the effect is then no more what its name says.
+
+    A neutral zone as wide as the motion is a softer joint, a stop without a gap an asymmetry.
+    """
+    shapes = [u.supposed == number and not u.is_strength for u in fit.hypothesis.unknowns]
+    return bool(fit.at_bound[shapes].any())
+
+
 def weaker(one: Supposed, share: float) -> Supposed:
     """The same, started at a share of the way from off."""
     parameters, start = one.form.variant.create().parameters, one.start.copy()
@@ -220,15 +225,6 @@ def weaker(one: Supposed, share: float) -> Supposed:
         away = start[column] / p.off if p.logarithmic else start[column] - p.off
         start[column] = p.off * away**share if p.logarithmic else p.off + share * away
     return replace(one, start=start)
-
-
-def _degenerate(fit: JointFit, number: int) -> bool:
-    """Whether a shape has run to its bound: the effect is then no more what its name says.
-
-    A neutral zone as wide as the motion is a softer joint, a stop without a gap an asymmetry.
-    """
-    shapes = [u.supposed == number and not u.is_strength for u in fit.hypothesis.unknowns]
-    return bool(fit.at_bound[shapes].any())
 
 
 def standing(fit: JointFit) -> tuple[Supposed, ...]:

@@ -1,16 +1,12 @@
 """The screen: evidence of every effect in the linearised problem, and what the null would show.
 
-An effect's evidence is averaged over its variants, shapes and ways to differ, each with an equal
-share, so that no effect is favoured by its place or by its number of variants.
-
-Evidence for a group of strengths in a linearised problem, against none of them.
-
 Readings are whitened, base and nuisances projected out: residual r, signatures F in prior SDs of
-the strengths. With strengths ~ N(0, t^2) the evidence (log of the ratio of marginal likelihoods) is
-1/2 sum [ t^2 b^2 / (1 + t^2 l) - log(1 + t^2 l) ] over the eigenvalues l of F'F, b the components
-of F'r; t is averaged over a few sizes. Strengths of one sign have half a normal as prior.
-
-The strengths of a form as a group in the linearised problem: which columns each one sums.
+the strengths. A form says which columns each of its strengths sums. With strengths ~ N(0, t^2) the
+evidence (log of the ratio of marginal likelihoods) is 1/2 sum [ t^2 b^2 / (1 + t^2 l) -
+log(1 + t^2 l) ] over the eigenvalues l of F'F, b the components of F'r; t is averaged over a few
+sizes. Strengths of one sign have half a normal as prior. An effect's evidence is averaged over its
+variants, shapes and ways to differ, each with an equal share, so that no effect is favoured by its
+place or by its number of variants.
 """
 
 from collections.abc import Sequence
@@ -28,6 +24,12 @@ from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Column, L
 
 SIZES = np.array([0.1, 0.3, 1.0, 3.0])
 """Sizes of strengths, in declared prior SDs, that are held equally likely."""
+
+Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
+"""(specimen, columns (c,), strength (c,) that each column belongs to)."""
+
+LEAST_THRESHOLD = 5.0
+"""Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,6 @@ class Group:
         inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)
         found: Array = self.vectors @ (inverse * (self.vectors.T @ moments))
         return np.where(self.signs * found < 0.0, 0.0, found)
-
-
-Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
-"""(specimen, columns (c,), strength (c,) that each column belongs to)."""
 
 
 @dataclass(frozen=True)
@@ -152,36 +150,6 @@ class Index:
         return signs
 
 
-def summed(
-    index: Index,
-    problem: Linearised,
-    form: Form,
-    sds: tuple[float, ...],
-    specimens: Sequence[str],
-    tests: Sequence[str],
-) -> Summed:
-    """A form's strengths at one shape."""
-    places, strengths = index.places(form, sds, specimens, tests)
-    count = len(strengths)
-    draws = problem.moments_shared.shape[1]
-    gram, moments = np.zeros((count, count)), np.zeros((count, draws))
-    coupled = np.zeros((count, len(problem.gram_shared)))
-    for specimen, columns, owners in places:
-        onto = np.zeros((count, len(columns)))
-        onto[owners, np.arange(len(columns))] = 1.0
-        part = problem.of[specimen]
-        gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
-        moments += onto @ part.moments[columns]
-        coupled += onto @ part.shared[columns]
-    gram, moments = problem.without_shared(gram, moments, coupled)
-    signs = index.signs(form, places, count)
-    return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))
-
-
-LEAST_THRESHOLD = 5.0
-"""Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
-
-
 @dataclass(frozen=True)
 class Tried:
     """One form of an effect on the screen, at its best shape.
@@ -223,6 +191,17 @@ class Screen:
     draws: int
 
 
+def screen(
+    effects: Sequence[Screened], false_alarm: float, threshold: float | None = None
+) -> Screen:
+    """Effects ranked; the threshold is that of the largest evidence of each draw of the null."""
+    largest = np.max(np.stack([one.null for one in effects]), axis=0)
+    if threshold is None:
+        threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
+    ranked = sorted(effects, key=lambda one: (-one.log_evidence, one.effect))
+    return Screen(tuple(ranked), threshold, len(largest))
+
+
 def screened(
     trials: Trials,
     index: Index,
@@ -252,15 +231,30 @@ def _tried(one: Summed, log_evidence: float) -> Tried:
     return Tried(one.form, one.sds, one.strengths, log_evidence, estimate, explained)
 
 
-def screen(
-    effects: Sequence[Screened], false_alarm: float, threshold: float | None = None
-) -> Screen:
-    """Effects ranked; the threshold is that of the largest evidence of each draw of the null."""
-    largest = np.max(np.stack([one.null for one in effects]), axis=0)
-    if threshold is None:
-        threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
-    ranked = sorted(effects, key=lambda one: (-one.log_evidence, one.effect))
-    return Screen(tuple(ranked), threshold, len(largest))
+def summed(
+    index: Index,
+    problem: Linearised,
+    form: Form,
+    sds: tuple[float, ...],
+    specimens: Sequence[str],
+    tests: Sequence[str],
+) -> Summed:
+    """A form's strengths at one shape."""
+    places, strengths = index.places(form, sds, specimens, tests)
+    count = len(strengths)
+    draws = problem.moments_shared.shape[1]
+    gram, moments = np.zeros((count, count)), np.zeros((count, draws))
+    coupled = np.zeros((count, len(problem.gram_shared)))
+    for specimen, columns, owners in places:
+        onto = np.zeros((count, len(columns)))
+        onto[owners, np.arange(len(columns))] = 1.0
+        part = problem.of[specimen]
+        gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
+        moments += onto @ part.moments[columns]
+        coupled += onto @ part.shared[columns]
+    gram, moments = problem.without_shared(gram, moments, coupled)
+    signs = index.signs(form, places, count)
+    return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))
 
 
 def exceeded(values: Array, share: float) -> float:
