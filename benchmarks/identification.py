@@ -29,13 +29,13 @@ from spinepipe.statics import Course, Program, System, settle
 from spinepipe.studies.joint_pose_sensitivity import bootstrap
 from spinepipe.studies.joint_pose_sensitivity import poses as build_models
 from spinepipe.studies.joint_pose_sensitivity import poses as sample_landmarks
+from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     sampled_poses,
     specimen_inputs,
     study_and_cohort,
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
-from spinepipe.studies.joint_pose_sensitivity.success import near_start
 from tests.reference.bridge import system
 from tests.reference.peers import chain as chains
 from tests.reference.peers import opensim_peer
