@@ -61,7 +61,8 @@ def less_step_0(motion: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64
 def without_step_0(readings: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64]:
     """(T, ...) readings, NaN in step 0 where zeroing made what stands there."""
     kept = readings.copy()
-    kept[0] = np.nan if zeroed else kept[0]
+    if zeroed:
+        kept[:1] = np.nan
     return kept
 
 

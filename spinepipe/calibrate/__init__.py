@@ -1,7 +1,8 @@
 """Calibration: stiffness from measured motion, with its uncertainty and its honest status."""
 
 from spinepipe.calibrate.fit import Fit, Optimum, fit
-from spinepipe.calibrate.pooling import CohortSpread, Pooled, PooledSpecimen, pool
+from spinepipe.calibrate.pooled_specimen import PooledSpecimen
+from spinepipe.calibrate.pooling import CohortSpread, Pooled, pool
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty
 from spinepipe.model import MeasuredCase

@@ -1,6 +1,7 @@
 """Bounded least squares with the exact Jacobian, from several starts, with honest status.
 
-Points of a problem: where it can start from, what is at a bound, whether loads lead there.
+An optimum counts only where the cost is level, or held by a bound, and where the loads lead to its
+poses from the neutral pose.
 """
 
 from collections.abc import Sequence
@@ -10,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
-from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.statics import moved
@@ -25,73 +26,18 @@ TIPPED = "no stable equilibrium up to the upper bounds: the loads tip the segmen
 
 AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
 
-OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
-
 SAME_POSE = 1e-6
 """Weighted residuals, mm and degrees, of one pose solved twice differ by less."""
 
 AT_BOUND = 1e-6
+
 ROUNDING = 1e-12
 
+SETTLED = Settled(cost=1e-11, step=1e-7, slope=1e-14, evaluations=200)
+"""When a fit at rest has arrived."""
 
-def stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
-    """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
-    problem, stiffened = evaluator.problem, 0
-    stiffness = np.array([parameter.logarithmic for parameter in problem.free])
-    step = np.where(stiffness, np.log(STIFFENING), 0.0)
-    while evaluator.at(start).residual is None:
-        if np.all(start[stiffness] >= problem.upper[stiffness]):
-            return None, stiffened
-        start = np.minimum(start + step, problem.upper)
-        stiffened += 1
-    return start, stiffened
-
-
-def on_load_path(evaluator: Evaluator, x: Array, evaluation: Evaluation) -> bool:
-    """Whether the poses at a point are those that the loads lead to from the neutral pose.
-
-    During a descent each pose is solved from its neighbour's; where segments snap, that may follow
-    another branch.
-    """
-    evaluator.forget()
-    cold = evaluator.at(x)
-    assert evaluation.residual is not None
-    if cold.residual is None:
-        return False
-    return bool(np.allclose(cold.residual, evaluation.residual, rtol=0.0, atol=SAME_POSE))
-
-
-def on_bounds(problem: Problem, x: Array) -> Array:
-    """The point with unknowns that are at a bound but for rounding put exactly there."""
-    x = np.where(x - problem.lower < ROUNDING, problem.lower, x)
-    return np.where(problem.upper - x < ROUNDING, problem.upper, x)
-
-
-def bounds_reached(problem: Problem, x: Array) -> Array:
-    """(m,) -1 at the lower, 1 at the upper bound, else 0."""
-    near = AT_BOUND * problem.scale
-    low, high = x - problem.lower < near, problem.upper - x < near
-    return high.astype(int) - low.astype(int)
-
-
-def values(problem: Problem, x: Array) -> Array:
-    """(m,) value of each unknown's first row, SI."""
-    effects = moved(problem.model, problem.free, x).effects
-    return np.array([effects[p.effect].values[p.rows[0], p.column] for p in problem.free])
-
-
-def names_at_bound(problem: Problem, at_bound: Array) -> str:
-    """Which unknowns are at which of their bounds, in words."""
-    return ", ".join(
-        f"{parameter.label} at its {'upper' if side > 0 else 'lower'} bound"
-        for parameter, side in zip(problem.free, at_bound, strict=True)
-        if side
-    )
-
-
-MOST_EVALUATIONS = 200
-LAST_STEP, LAST_SETTLING_STEP = 1e-7, 1e-3
-"""Relative step at which a fit has arrived; settling runs cost a hundred times as much."""
+LAST_SETTLING_STEP = 1e-3
+"""Relative step at which a fit of settling runs has arrived: they cost a hundred times as much."""
 
 START_SPREAD = 30.0
 """Further starts are drawn within this factor of the first, inside the bounds."""
@@ -245,16 +191,12 @@ def _least_squares(
 ) -> Optimum:
     problem = evaluator.problem
     arrived: list[Optimum] = []
-    nowhere = np.full(len(evaluator.coordinate), np.nan)
 
-    def residual(x: Array) -> Array:
-        found = evaluator.at(on_bounds(problem, x)).residual
-        return nowhere if found is None else found
-
-    def jacobian(x: Array) -> Array:
-        found = evaluator.at(on_bounds(problem, x)).jacobian
-        assert found is not None
-        return found
+    def point(x: Array) -> tuple[Array, Array] | None:
+        found = evaluator.at(on_bounds(problem, x))
+        if found.residual is None or found.jacobian is None:
+            return None
+        return found.residual, found.jacobian
 
     def stop_where_known(x: Array) -> None:
         for optimum in known:
@@ -262,31 +204,35 @@ def _least_squares(
                 arrived.append(optimum)
                 raise StopIteration
 
-    result = bounded_least_squares(
-        residual,
+    ended = descend(
+        point,
         np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9),
-        jacobian,
         (problem.lower, problem.upper),
-        x_scale=problem.scale,
-        ftol=1e-11,
-        xtol=_last_step(problem),
-        gtol=1e-14,
-        max_nfev=MOST_EVALUATIONS,
-        callback=stop_where_known,
+        problem.scale,
+        len(evaluator.coordinate),
+        _settled(problem),
+        stop_where_known,
     )
     if arrived:
         return replace(arrived[0], stiffened=stiffened)
-    x = on_bounds(problem, result.x)
+    x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), evaluator.at(x)
     level = _stationary(problem, evaluation, at_bound)
-    status, message = _verdict(problem, bool(result.success) or level, at_bound)
+    status, message = _verdict(problem, ended.arrived or level, at_bound)
     if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
     at_rest = problem.course is None
     if at_rest and status.usable and not on_load_path(evaluator, x, evaluation):
         status, message = Status.NOT_CONVERGED, OFF_THE_PATH
     return Optimum(
-        x, at_bound, 2.0 * result.cost, evaluation, status, message, result.nfev, stiffened
+        x,
+        at_bound,
+        2.0 * ended.half_cost,
+        evaluation,
+        status,
+        message,
+        ended.evaluations,
+        stiffened,
     )
 
 
@@ -300,18 +246,20 @@ def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bo
     assert jacobian is not None
     slope = 2.0 * np.abs(residual @ jacobian * problem.scale)
     bend = 2.0 * np.sum((jacobian * problem.scale) ** 2, axis=0)
-    near = slope <= CLOSE * _last_step(problem) * bend  # where nothing is left, a slope is no share
+    near = (
+        slope <= CLOSE * _settled(problem).step * bend
+    )  # where nothing is left, a slope is no share
     level = near | (slope <= LEVEL * (residual @ residual) + 1e-9)
     return bool(level[at_bound == 0].all())
 
 
-def _last_step(problem: Problem) -> float:
-    return LAST_STEP if problem.course is None else LAST_SETTLING_STEP
+def _settled(problem: Problem) -> Settled:
+    return SETTLED if problem.course is None else replace(SETTLED, step=LAST_SETTLING_STEP)
 
 
 def _verdict(problem: Problem, success: bool, at_bound: Array) -> tuple[Status, str]:
     if not success:
-        return Status.NOT_CONVERGED, f"no optimum within {MOST_EVALUATIONS} evaluations"
+        return Status.NOT_CONVERGED, _settled(problem).given_up
     if not at_bound.any():
         return Status.CONVERGED, ""
     return Status.CONVERGED_AT_BOUND, names_at_bound(problem, at_bound)
@@ -330,3 +278,58 @@ def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_], scale: 
     close = (np.abs(one.x - other.x) / scale)[identifiable] < SAME_OPTIMUM
     tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
     return bool(close.all()) and tie
+
+
+def stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
+    """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
+    problem, stiffened = evaluator.problem, 0
+    stiffness = np.array([parameter.logarithmic for parameter in problem.free])
+    step = np.where(stiffness, np.log(STIFFENING), 0.0)
+    while evaluator.at(start).residual is None:
+        if np.all(start[stiffness] >= problem.upper[stiffness]):
+            return None, stiffened
+        start = np.minimum(start + step, problem.upper)
+        stiffened += 1
+    return start, stiffened
+
+
+def on_load_path(evaluator: Evaluator, x: Array, evaluation: Evaluation) -> bool:
+    """Whether the poses at a point are those that the loads lead to from the neutral pose.
+
+    During a descent each pose is solved from its neighbour's; where segments snap, that may follow
+    another branch.
+    """
+    evaluator.forget()
+    cold = evaluator.at(x)
+    assert evaluation.residual is not None
+    if cold.residual is None:
+        return False
+    return bool(np.allclose(cold.residual, evaluation.residual, rtol=0.0, atol=SAME_POSE))
+
+
+def on_bounds(problem: Problem, x: Array) -> Array:
+    """The point with unknowns that are at a bound but for rounding put exactly there."""
+    x = np.where(x - problem.lower < ROUNDING, problem.lower, x)
+    return np.where(problem.upper - x < ROUNDING, problem.upper, x)
+
+
+def bounds_reached(problem: Problem, x: Array) -> Array:
+    """(m,) -1 at the lower, 1 at the upper bound, else 0."""
+    near = AT_BOUND * problem.scale
+    low, high = x - problem.lower < near, problem.upper - x < near
+    return high.astype(int) - low.astype(int)
+
+
+def values(problem: Problem, x: Array) -> Array:
+    """(m,) value of each unknown's first row, SI."""
+    effects = moved(problem.model, problem.free, x).effects
+    return np.array([effects[p.effect].values[p.rows[0], p.column] for p in problem.free])
+
+
+def names_at_bound(problem: Problem, at_bound: Array) -> str:
+    """Which unknowns are at which of their bounds, in words."""
+    return ", ".join(
+        f"{parameter.label} at its {'upper' if side > 0 else 'lower'} bound"
+        for parameter, side in zip(problem.free, at_bound, strict=True)
+        if side
+    )

@@ -8,10 +8,11 @@ The barrier starts at its end: bounds are far from every start, and each further
 a search of its own. trust-constr also differentiates at points that it refuses, which fmincon does
 not: fmincon needs about half the runs.
 
-One forward run as users of multibody tools make it: a general-purpose implicit integrator.
-
-It stands beside `spinepipe.statics.settle`, whose end is a smoother function of the stiffness than
-that of any of these tools; that smoothness is what a fit by difference quotients lives on.
+A forward run is made as users of multibody tools make it, by a general-purpose implicit
+integrator. It stands beside `spinepipe.statics.settle`, whose end is a smoother function of the
+stiffness than that of any of these tools; that smoothness is what a fit by difference quotients
+lives on. The cost by such runs is all that a published optimiser was given; its exact derivative
+stands beside, to check it.
 
 The integrator is LSODA (scipy's; variable order, variable step, its own difference Jacobian): of
 what scipy has, its noise is nearest to that of OpenSim's CPodes, of the same family. Relative
@@ -29,10 +30,6 @@ At a step of 1e-3 all have 1.7e-3, the curvature of the cost. So the noise is th
 with a rough Jacobian, and what follows from it is understated here. OpenSim's default integrator,
 explicit Runge-Kutta-Merson, has 1e-3 (one stiffness set), at 29 s per run. scipy's VODE, nearest
 kin of CPodes, transposes the Jacobian in release 1.17 (scipy issue 24933) and cannot be used.
-
-The cost of a calibration problem by forward runs: all that a published optimiser was given.
-
-Derivative of a problem's cost at its start: exact, and by careful differences to check it.
 """
 
 import warnings

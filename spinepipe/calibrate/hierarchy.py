@@ -6,7 +6,7 @@ linearly, with one scatter. Given mean and levels, specimens are independent, so
 matrices of one specimen's size. Lindley & Smith 1972, doi:10.1111/j.2517-6161.1972.tb00885.x;
 scatter and effective parameters: MacKay 1992, doi:10.1162/neco.1992.4.3.415.
 
-Spreads of a hierarchy by the largest marginal likelihood, kept off zero by a weak prior.
+Spreads are those of the largest marginal likelihood, kept off zero by a weak prior.
 """
 
 from collections.abc import Sequence

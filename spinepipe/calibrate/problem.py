@@ -1,8 +1,7 @@
 """A calibration problem: a model, the tests it was measured in, and what may be moved to fit.
 
-Bounds of unknowns, drawn in to what the effects declare for their parameters.
-
-Readings that were zeroed at step 0 share its error: whitening makes them independent again.
+Bounds of unknowns are drawn in to what the effects declare for their parameters. Readings that were
+zeroed at step 0 share its error: whitening makes them independent again.
 
 With one SD for every reading before zeroing, the n readings of a joint's coordinate in one cycle
 have covariance SD^2 (I + 1 1'). The inverse root of I + 1 1' is I - c 1 1' with c = (1 - 1 / sqrt(1
@@ -33,51 +32,6 @@ from spinepipe.statics import (
 )
 from spinepipe.units import BORDER_PER_SI, less_step_0
 from spinepipe.world import Chain
-
-
-def within_declared(
-    model: SpineModel, free: Sequence[FreeParameter], lower: Array, upper: Array
-) -> tuple[Array, Array]:
-    """Lower and upper bounds (m,) of the unknowns that keep every row they move as declared."""
-    lower, upper = lower.copy(), upper.copy()
-    for index, parameter in enumerate(free):
-        limits = declared(model, parameter)
-        values = model.effects[parameter.effect].values
-        for value in values[list(parameter.rows), parameter.column]:
-            low, high = limits.low - value, limits.high - value
-            if parameter.logarithmic:
-                low = np.log(limits.low / value) if limits.low > 0.0 else -np.inf
-                high = np.log(limits.high / value)
-            lower[index], upper[index] = max(lower[index], low), min(upper[index], high)
-    return lower, upper
-
-
-def whitened(errors: Array, used: NDArray[np.bool_]) -> Array:
-    """Errors of a zeroed case, or their derivatives, as combinations of equal SD, uncorrelated.
-
-    Parameters
-    ----------
-    errors : (T, J, 6) or (T, J, 6, m); what is not used may be NaN.
-    used : (T, J, 6) which readings enter the cost; the zeros of step 0 are none.
-
-    Returns
-    -------
-    Of the same shape; each used element has the SD of one reading before it was zeroed.
-    """
-    there = used.reshape(*used.shape, *[1] * (errors.ndim - used.ndim))
-    errors = np.where(there, errors, 0.0)
-    n = np.maximum(there.sum(axis=0), 1)
-    shared: Array = (1.0 - 1.0 / np.sqrt(1.0 + n)) / n * errors.sum(axis=0)
-    result: Array = errors - shared
-    return result
-
-
-def shared_sums(rows: Array, sharing: NDArray[np.int64]) -> Array:
-    """(G, k) sums of rows (N, k) that share an error; those of number -1 are left out."""
-    _, group = np.unique(sharing, return_inverse=True)
-    sums = np.zeros((group.max(initial=-1) + 1, rows.shape[1]))
-    np.add.at(sums, group, rows)
-    return sums[1:] if (sharing < 0).any() else sums
 
 
 @dataclass(frozen=True)
@@ -254,3 +208,48 @@ def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:
     """(T, J, 6) which readings enter the cost; the zeros that zeroing makes of step 0 are none."""
     used: NDArray[np.bool_] = np.isfinite(measured.readings) & (weights > 0.0)
     return used
+
+
+def within_declared(
+    model: SpineModel, free: Sequence[FreeParameter], lower: Array, upper: Array
+) -> tuple[Array, Array]:
+    """Lower and upper bounds (m,) of the unknowns that keep every row they move as declared."""
+    lower, upper = lower.copy(), upper.copy()
+    for index, parameter in enumerate(free):
+        limits = declared(model, parameter)
+        values = model.effects[parameter.effect].values
+        for value in values[list(parameter.rows), parameter.column]:
+            low, high = limits.low - value, limits.high - value
+            if parameter.logarithmic:
+                low = np.log(limits.low / value) if limits.low > 0.0 else -np.inf
+                high = np.log(limits.high / value)
+            lower[index], upper[index] = max(lower[index], low), min(upper[index], high)
+    return lower, upper
+
+
+def whitened(errors: Array, used: NDArray[np.bool_]) -> Array:
+    """Errors of a zeroed case, or their derivatives, as combinations of equal SD, uncorrelated.
+
+    Parameters
+    ----------
+    errors : (T, J, 6) or (T, J, 6, m); what is not used may be NaN.
+    used : (T, J, 6) which readings enter the cost; the zeros of step 0 are none.
+
+    Returns
+    -------
+    Of the same shape; each used element has the SD of one reading before it was zeroed.
+    """
+    there = used.reshape(*used.shape, *[1] * (errors.ndim - used.ndim))
+    errors = np.where(there, errors, 0.0)
+    n = np.maximum(there.sum(axis=0), 1)
+    shared: Array = (1.0 - 1.0 / np.sqrt(1.0 + n)) / n * errors.sum(axis=0)
+    result: Array = errors - shared
+    return result
+
+
+def shared_sums(rows: Array, sharing: NDArray[np.int64]) -> Array:
+    """(G, k) sums of rows (N, k) that share an error; those of number -1 are left out."""
+    _, group = np.unique(sharing, return_inverse=True)
+    sums = np.zeros((group.max(initial=-1) + 1, rows.shape[1]))
+    np.add.at(sums, group, rows)
+    return sums[1:] if (sharing < 0).any() else sums

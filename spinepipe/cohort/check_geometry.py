@@ -1,46 +1,28 @@
-"""Has every joint of every specimen a pose?
+"""Can the geometry of a cohort be that of spines?
 
-Are neighbours as far apart as in a spine? Metres taken for millimetres show here.
-
-Can the bodies exist, and are all there that gravity needs?
+Has every joint of every specimen a pose? Are neighbours as far apart as in a spine (metres taken
+for millimetres show here)? Can the bodies exist, and are all there that gravity needs?
 """
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.cohort.draft import Draft
+from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose
 from spinepipe.problems import Problem
+from spinepipe.units import MM_PER_M
 
 SMALLEST_MM = 0.1
+
 LARGEST_MM = 1000.0
 
-
-def spacing_problem(
-    place: tuple[str, int | None, str | None], distance_mm: float, what: str
-) -> Iterator[Problem]:
-    """The problem of two neighbouring points, if their distance says the unit is wrong.
-
-    Parameters
-    ----------
-    place : file, line and column to report.
-    distance_mm : NaN, from a cell that is bad and reported there, is no problem here.
-    what : which points.
-    """
-    if distance_mm < SMALLEST_MM or distance_mm > LARGEST_MM:
-        found = f"{what} {distance_mm:.3g} mm apart"
-        allowed = f"{SMALLEST_MM:g} mm to {LARGEST_MM:g} mm"
-        yield Problem(*place, found, allowed, "give millimetres, and look for a misplaced point")
-
-
-Array = NDArray[np.float64]
 Place = tuple[str, int | None, str | None]
 
-MM_PER_M = 1000.0
 XYZ = ("x_mm", "y_mm", "z_mm")
+
 UPPER_FACE, LOWER_FACE = "inferior_endplate_centre", "superior_endplate_centre"
 
 
@@ -167,9 +149,7 @@ def check_bodies(draft: Draft) -> Iterator[Problem]:
     yield from _spacing(draft)
 
 
-def _inertia_problems(
-    file: str, line: int, mass: float, six: NDArray[np.float64]
-) -> Iterator[Problem]:
+def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator[Problem]:
     empty = np.isnan(six)
     if empty.all():
         return
@@ -225,3 +205,18 @@ def _spacing(draft: Draft) -> Iterator[Problem]:
                 what = f"the centres of mass of {lower} and {upper}"
                 place = (draft.file("bodies"), line, "com_x_mm")
                 yield from spacing_problem(place, distance, what)
+
+
+def spacing_problem(place: Place, distance_mm: float, what: str) -> Iterator[Problem]:
+    """The problem of two neighbouring points, if their distance says the unit is wrong.
+
+    Parameters
+    ----------
+    place : file, line and column to report.
+    distance_mm : NaN, from a cell that is bad and reported there, is no problem here.
+    what : which points.
+    """
+    if distance_mm < SMALLEST_MM or distance_mm > LARGEST_MM:
+        found = f"{what} {distance_mm:.3g} mm apart"
+        allowed = f"{SMALLEST_MM:g} mm to {LARGEST_MM:g} mm"
+        yield Problem(*place, found, allowed, "give millimetres, and look for a misplaced point")

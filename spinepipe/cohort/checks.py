@@ -1,14 +1,8 @@
-"""Are the loads unambiguous, and do they act on something that can move?
+"""Do the files of a cohort fit each other: names, keys, steps, loads and motion?
 
-Is the cohort's name its folder's, and are the vertebrae a chain?
-
-Does each row of a table speak of something no other row speaks of?
-
-Was every measured motion caused by a load that is given?
-
-Do the tables speak of specimens, vertebrae and joints that exist?
-
-Do the steps of every test count 0, 1, 2 without a gap?
+The vertebrae are a chain, tables speak of what exists and of each thing once, steps count 0, 1, 2
+without a gap, loads are unambiguous and act on something that can move, and every measured motion
+was caused by a load that is given.
 """
 
 import re
@@ -21,10 +15,8 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import AppliedLoad, Draft
 from spinepipe.cohort.text import Document
+from spinepipe.model import MOST_JOINTS
 from spinepipe.problems import Problem, did_you_mean, one_of
-
-MOST_JOINTS = 20
-"""The physics engine is wrong without notice above 120 coordinates, six to a joint."""
 
 REGIONS = "SLTC"
 """Sacral, lumbar, thoracic, cervical: caudal to cranial."""

@@ -1,7 +1,4 @@
-"""A cohort while it is being checked: whatever could be read of it.
-
-Loads row by row for one specimen and one cycle each, wildcards written out.
-"""
+"""A cohort while it is being checked: what could be read of it, wildcards of loads written out."""
 
 from collections import defaultdict
 from collections.abc import Iterator

@@ -18,8 +18,9 @@ from spinepipe.cohort.checks import (
 )
 from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.cohort.csv_table import read_table
 from spinepipe.cohort.draft import Draft, applied_loads
-from spinepipe.cohort.text import Document, read_table, read_yaml, validate
+from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.problems import InputError, Problem
 
 __all__ = ["read"]

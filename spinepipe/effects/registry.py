@@ -1,6 +1,6 @@
-"""The registry of effects: name in a model file to class. One file per effect enters itself.
+"""The registry of effects: name in a model file to class, and how a search may try it.
 
-How a search for missing effects may try an effect; an effect that says nothing is not tried.
+One file per effect enters itself. An effect that says nothing of how it may be tried is not tried.
 """
 
 from collections.abc import Callable, Mapping

@@ -149,10 +149,6 @@ class SpineModel:
         """The same geometry and bodies with other effects."""
         return replace(self, effects=effects)
 
-    def with_frames(self, frames: tuple[Pose, ...]) -> "SpineModel":
-        """The same bodies and effects with other joint frames."""
-        return replace(self, frames=frames)
-
 
 def _problem(model: SpineModel) -> str | None:
     """The first reason to refuse a model, or None."""

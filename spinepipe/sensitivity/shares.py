@@ -1,8 +1,7 @@
-"""How much of the variation over a grid is due to its rows, its columns, and both together.
+"""How much of the variation is due to rows, columns and both of a grid, or to specimens and draws.
 
-Confidence intervals of shares by leaving out one row, and one column, of a grid at a time.
-
-How much of the variation is due to specimens, to draws within them, and to shared treatments.
+Intervals come from leaving out one row, and one column, of a grid at a time. Nested draws within
+specimens may share treatments.
 """
 
 from dataclasses import dataclass

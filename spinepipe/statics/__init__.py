@@ -1,9 +1,8 @@
 """Statics: equilibria of a spine model, their stability and sensitivities, and settling in time."""
 
 from spinepipe.statics.equilibrium import Equilibrium
-from spinepipe.statics.load_sensitivity import LoadSensitivity, by_load
+from spinepipe.statics.given_sensitivity import LoadSensitivity, by_joint_pose, by_load
 from spinepipe.statics.path import SolvedStep, carried_over, follow
-from spinepipe.statics.pose_sensitivity import by_joint_pose
 from spinepipe.statics.sensitivity import (
     FreeParameter,
     by_parameters,

@@ -1,17 +1,15 @@
-"""Equilibrium by Newton with the exact tangent, continued along the load when it must be.
+"""Equilibrium by Newton with the exact tangent, continued along the load; is it stable?
 
-One LU factorisation of a tangent, reused for the step, the determinant and the sensitivities.
+The LU factors of a tangent serve the step, the determinant and the sensitivities.
 
-Newton held back by a line search: the way to an equilibrium across corners in a path law.
+Across corners in a path law Newton is held back by a line search. Friction meets a joint that turns
+on and one that turns back with different slopes, and full steps may jump to and fro between them.
+The load is still continuous and grows along every direction, so the work along a step has a least
+value; steps that stop near it arrive.
 
-Friction meets a joint that turns on and one that turns back with different slopes, and full
-Newton steps may jump to and fro between them. The load is still continuous and grows along every
-direction, so the work along a step has a least value; steps that stop near it arrive.
-
-Is an equilibrium stable? Decided by the linearised damped motion M x'' + C x' + K x = 0.
-
-K is not symmetric under a constant moment, so its symmetric part alone decides nothing. Cheap
-sufficient tests come first; the 2n eigenvalues are computed only when these leave a doubt.
+Stability is decided by the linearised damped motion M x'' + C x' + K x = 0. K is not symmetric
+under a constant moment, so its symmetric part alone decides nothing. Cheap sufficient tests come
+first; the 2n eigenvalues are computed only when these leave a doubt.
 """
 
 from dataclasses import dataclass
@@ -46,60 +44,10 @@ class Factored:
         return solution
 
 
-def factor(tangent: Array) -> Factored:
-    """Factor a tangent.
-
-    Raises
-    ------
-    SingularTangent
-        When it is singular or not finite.
-    """
-    if not np.isfinite(tangent).all():
-        raise SingularTangent("the tangent is not finite")
-    lu, pivots, info = dgetrf(tangent)
-    if info != 0:
-        raise SingularTangent("the tangent is singular")
-    swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
-    negative = np.count_nonzero(np.diagonal(lu) < 0.0)
-    return Factored(lu, pivots, -1 if (swaps + negative) % 2 else 1)
-
-
 MOST_STEPS = 60
+
 NEAR = np.array([1e-9] * 3 + [1e-7] * 3)
 """m and rad: a step this small ends on the pose's side of every corner that matters."""
-
-
-def approach(system: System, start: Array, loading: Loading, states: States) -> Array | None:
-    """Pose (n,) next to the equilibrium under a loading, or None when the way there is lost."""
-    q = start
-    for _ in range(MOST_STEPS):
-        balance = system.balance(q, loading, states)
-        try:
-            step = factor(balance.tangent).solve(-balance.residual)
-        except SingularTangent:
-            return None
-        if not balance.residual @ step < 0.0:
-            return None
-        step = step * _share(system, q, step, loading, states, float(balance.residual @ step))
-        q = q + step
-        if (np.abs(step).reshape(-1, 6) < NEAR).all():
-            return q
-    return None
-
-
-def _share(
-    system: System, q: Array, step: Array, loading: Loading, states: States, slope: float
-) -> float:
-    """Share of a step at which the work along it is near its least, or the whole step."""
-
-    def work(share: float) -> float:
-        return float(system.residual(q + share * step, loading, states) @ step)
-
-    if not work(1.0) > -0.5 * slope:
-        return 1.0
-    share: float = brentq(work, 0.0, 1.0, xtol=1e-9, rtol=0.1)
-    return share
-
 
 ROUNDING = 1e-9
 """Growth slower than this share of the stiffness (damping is one) is rounding error."""
@@ -113,63 +61,8 @@ class Stability:
     symmetric_part_positive: bool
 
 
-def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
-    """Stability of the equilibrium at q (n,) with tangent K (n, n), its determinant's sign.
-
-    An odd number of growing modes shows as a negative determinant. With K = S + A (symmetric and
-    skew parts) and in coordinates where the damping is the identity, the motion decays for sure
-    when S is positive and |A|^2 |M| < min eig S: each mode x of the pencil
-    then obeys m l^2 + l + (s + i a) = 0 with a^2 m < s, whose roots have negative real parts.
-    """
-    damping = chain.model.damping.ravel()
-    scale = 1.0 / np.sqrt(damping)
-    scaled = tangent * scale[:, None] * scale
-    skew = 0.5 * (scaled - scaled.T)
-    symmetric = scaled - skew
-    smallest = _smallest_eigenvalue_bound(symmetric)
-    positive = smallest > 0.0
-    if sign < 0:
-        return Stability(stable=False, symmetric_part_positive=positive)
-    if np.array_equal(tangent, tangent.T):  # then inertia and damping decide nothing
-        return Stability(stable=positive, symmetric_part_positive=positive)
-    twist = 0.5 * float(np.sum(skew * skew))  # |A|^2: a skew matrix's singular values are pairs
-    mass = chain.mass_matrix(q) * scale[:, None] * scale
-    if positive and twist * np.linalg.norm(mass) < smallest:
-        return Stability(stable=True, symmetric_part_positive=True)
-    return Stability(_decays(mass, scaled), positive)
-
-
-def _smallest_eigenvalue_bound(symmetric: Array) -> float:
-    """A lower bound > 0 of the smallest eigenvalue when positive definite, else 0."""
-    lower, info = dpotrf(symmetric, lower=True)
-    if info != 0:
-        return 0.0
-    inverse, _ = dpotri(lower, lower=True)
-    inverse = inverse + inverse.T  # dpotri fills the lower half, dpotrf cleared the upper one
-    inverse[np.diag_indices_from(inverse)] *= 0.5
-    by_square = float(np.linalg.norm(inverse))
-    by_row = float(np.abs(inverse).sum(axis=0).max())
-    return 1.0 / min(by_square, by_row)
-
-
-def _decays(mass: Array, stiffness: Array) -> bool:
-    """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0.
-
-    A growing mode l (m l + 1) = -k has |m l + 1| > 1, hence |l| < |K|: rates beyond are those of
-    directions without inertia, infinite but for rounding, which may give them either sign.
-    """
-    n = len(stiffness)
-    if not mass.any():
-        return float(eigvals(stiffness).real.min()) > 0.0
-    identity, nothing = np.eye(n), np.zeros((n, n))
-    a = np.block([[nothing, identity], [-stiffness, -identity]])
-    b = np.block([[identity, nothing], [nothing, mass]])
-    rates, size = eigvals(a, b), float(np.linalg.norm(stiffness))
-    slow = rates[np.abs(rates) < size]
-    return float(slow.real.max(initial=-np.inf)) < ROUNDING * size
-
-
 MOST_ITERATIONS = 12
+
 SMALLEST_FRACTION = 1.0 / 1024.0
 """Continuation gives up when a load increment this small does not contract."""
 
@@ -295,3 +188,109 @@ def _beyond_motion(q: Array) -> bool:
 
 def _stability(system: System, found: _Newton) -> Stability:
     return stability(system.chain, found.q, found.tangent, found.factored.sign)
+
+
+def approach(system: System, start: Array, loading: Loading, states: States) -> Array | None:
+    """Pose (n,) next to the equilibrium under a loading, or None when the way there is lost."""
+    q = start
+    for _ in range(MOST_STEPS):
+        balance = system.balance(q, loading, states)
+        try:
+            step = factor(balance.tangent).solve(-balance.residual)
+        except SingularTangent:
+            return None
+        if not balance.residual @ step < 0.0:
+            return None
+        step = step * _share(system, q, step, loading, states, float(balance.residual @ step))
+        q = q + step
+        if (np.abs(step).reshape(-1, 6) < NEAR).all():
+            return q
+    return None
+
+
+def _share(
+    system: System, q: Array, step: Array, loading: Loading, states: States, slope: float
+) -> float:
+    """Share of a step at which the work along it is near its least, or the whole step."""
+
+    def work(share: float) -> float:
+        return float(system.residual(q + share * step, loading, states) @ step)
+
+    if not work(1.0) > -0.5 * slope:
+        return 1.0
+    share: float = brentq(work, 0.0, 1.0, xtol=1e-9, rtol=0.1)
+    return share
+
+
+def factor(tangent: Array) -> Factored:
+    """Factor a tangent.
+
+    Raises
+    ------
+    SingularTangent
+        When it is singular or not finite.
+    """
+    if not np.isfinite(tangent).all():
+        raise SingularTangent("the tangent is not finite")
+    lu, pivots, info = dgetrf(tangent)
+    if info != 0:
+        raise SingularTangent("the tangent is singular")
+    swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+    negative = np.count_nonzero(np.diagonal(lu) < 0.0)
+    return Factored(lu, pivots, -1 if (swaps + negative) % 2 else 1)
+
+
+def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
+    """Stability of the equilibrium at q (n,) with tangent K (n, n), its determinant's sign.
+
+    An odd number of growing modes shows as a negative determinant. With K = S + A (symmetric and
+    skew parts) and in coordinates where the damping is the identity, the motion decays for sure
+    when S is positive and |A|^2 |M| < min eig S: each mode x of the pencil
+    then obeys m l^2 + l + (s + i a) = 0 with a^2 m < s, whose roots have negative real parts.
+    """
+    damping = chain.model.damping.ravel()
+    scale = 1.0 / np.sqrt(damping)
+    scaled = tangent * scale[:, None] * scale
+    skew = 0.5 * (scaled - scaled.T)
+    symmetric = scaled - skew
+    smallest = _smallest_eigenvalue_bound(symmetric)
+    positive = smallest > 0.0
+    if sign < 0:
+        return Stability(stable=False, symmetric_part_positive=positive)
+    if np.array_equal(tangent, tangent.T):  # then inertia and damping decide nothing
+        return Stability(stable=positive, symmetric_part_positive=positive)
+    twist = 0.5 * float(np.sum(skew * skew))  # |A|^2: a skew matrix's singular values are pairs
+    mass = chain.mass_matrix(q) * scale[:, None] * scale
+    if positive and twist * np.linalg.norm(mass) < smallest:
+        return Stability(stable=True, symmetric_part_positive=True)
+    return Stability(_decays(mass, scaled), positive)
+
+
+def _smallest_eigenvalue_bound(symmetric: Array) -> float:
+    """A lower bound > 0 of the smallest eigenvalue when positive definite, else 0."""
+    lower, info = dpotrf(symmetric, lower=True)
+    if info != 0:
+        return 0.0
+    inverse, _ = dpotri(lower, lower=True)
+    inverse = inverse + inverse.T  # dpotri fills the lower half, dpotrf cleared the upper one
+    inverse[np.diag_indices_from(inverse)] *= 0.5
+    by_square = float(np.linalg.norm(inverse))
+    by_row = float(np.abs(inverse).sum(axis=0).max())
+    return 1.0 / min(by_square, by_row)
+
+
+def _decays(mass: Array, stiffness: Array) -> bool:
+    """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0.
+
+    A growing mode l (m l + 1) = -k has |m l + 1| > 1, hence |l| < |K|: rates beyond are those of
+    directions without inertia, infinite but for rounding, which may give them either sign.
+    """
+    n = len(stiffness)
+    if not mass.any():
+        return float(eigvals(stiffness).real.min()) > 0.0
+    identity, nothing = np.eye(n), np.zeros((n, n))
+    a = np.block([[nothing, identity], [-stiffness, -identity]])
+    b = np.block([[identity, nothing], [nothing, mass]])
+    rates, size = eigvals(a, b), float(np.linalg.norm(stiffness))
+    slow = rates[np.abs(rates) < size]
+    return float(slow.real.max(initial=-np.inf)) < ROUNDING * size

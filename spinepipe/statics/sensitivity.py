@@ -1,8 +1,8 @@
 """Exact sensitivities of solved steps: dq/dx = -K^-1 dr/dx, path states carried along.
 
-Every derivative is taken at the solved pose with the tangent's LU factors that Newton left.
-
-Free parameters: which numbers of a model's effects a fit moves, and which of them together.
+The unknowns x are free parameters: which numbers of a model's effects a fit moves, and which of
+them together. Every derivative is taken at the solved pose with the tangent's LU factors that
+Newton left.
 """
 
 from collections.abc import Sequence

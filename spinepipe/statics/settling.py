@@ -3,19 +3,15 @@
     M(q) q'' + bias(q, q') + C q' + holding(q) - applied(q, t) = 0
 
 on PyBullet's mass matrix and bias loads, integrated implicitly: springs of this stiffness need
-microsecond steps otherwise. Its end is compared with the equilibrium under the final load.
+microsecond steps otherwise. The end is compared with the equilibrium under the final load.
 
-How loads come on in time.
+The method is ROS34PW2, four-stage, third-order, L-stable and linearly implicit, for approximate
+Jacobians (Rang and Angermann 2005, BIT 45:761-787, doi 10.1007/s10543-005-0035-y). A W-method keeps
+its order when the Jacobian is only approximate, so the mass matrix may be taken as constant within
+a step although it follows the pose.
 
-ROS34PW2: four-stage, third-order, L-stable linearly implicit method for approximate Jacobians.
-
-Coefficients: Rang and Angermann 2005, BIT 45:761-787, doi 10.1007/s10543-005-0035-y. A W-method
-keeps its order when the Jacobian is only approximate, so the mass matrix may be taken as constant
-within a step although it follows the pose.
-
-Derivatives of where a settling run ends: differences over the same steps in time.
-
-With its steps held the end is smooth: on L1-L4 a difference is within 1e-6 of the derivative.
+Derivatives of the end are differences over the same steps in time. With its steps held the end is
+smooth: on L1-L4 a difference is within 1e-6 of the derivative.
 """
 
 from collections.abc import Sequence

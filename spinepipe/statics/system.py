@@ -1,6 +1,7 @@
 """A model under one test, ready to be solved: residual and exact tangent at any pose.
 
-What acts on the chain at one moment: the listed wrenches, and how much of the weight.
+What acts on the chain at one moment is a `Loading`: the listed wrenches, and how much of the
+weight.
 """
 
 from copy import copy

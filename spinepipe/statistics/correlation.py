@@ -1,9 +1,7 @@
-"""Rank correlation of two sets of values.
+"""Rank correlation of two sets of values, exact among few untied pairs.
 
-Exact distribution of Spearman's rho among few untied pairs; scipy has the t approximation.
-
-The approximation is wrong where it matters in a large family of tests of ten pairs: at rho = 1 it
-gives p = 0, while one ordering in 10! has p = 5.5e-7 and can be no rarer.
+scipy has the t approximation. It is wrong where it matters in a large family of tests of ten pairs:
+at rho = 1 it gives p = 0, while one ordering in 10! has p = 5.5e-7 and can be no rarer.
 """
 
 from functools import cache

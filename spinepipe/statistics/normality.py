@@ -1,6 +1,7 @@
-"""Are the values a sample of a normal distribution? Two tests of the paper, and the right one.
+"""Are the values normally distributed, and do more parameters fit better than chance would?
 
-Whether more parameters fit better than chance would: the extra sum of squares F test.
+Of the first there are two tests of the paper, and the right one; the second is the extra sum of
+squares F test.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,6 @@
-"""What a statistical test hands back: its numbers, or the reason why there are none.
+"""What a test of values hands back: its numbers, or the reason why there are none.
 
-Correction of p values for the number of tests in a family.
-
-Mean of independent values with Student's interval.
+Also p values corrected for the number of tests in a family, and means with Student's interval.
 """
 
 from collections.abc import Sequence

@@ -1,12 +1,7 @@
-"""Kruskal-Wallis test of independent groups, with a p that also holds for few values.
+"""Rank tests of groups and pairs, with p values that also hold for few values and with ties.
 
-Rank tests of grouped values.
-
-Exact distribution of Wilcoxon's signed rank sum, also with ties.
-
-scipy's exact one holds without ties only, and its permutations take a second for 14 differences.
-
-Wilcoxon's signed rank test of paired values.
+Wilcoxon's signed rank sum has its exact distribution here: scipy's exact one holds without ties
+only, and its permutations take a second for 14 differences.
 """
 
 from collections.abc import Sequence

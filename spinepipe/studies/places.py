@@ -1,7 +1,4 @@
-"""Places in a study file, and what all kinds of studies check of the tests it names.
-
-Which readings of a cohort a study has before it: what was measured, and what again.
-"""
+"""What all kinds of studies ask of a study file and its cohort: places, names, readings."""
 
 from collections.abc import Iterable, Iterator, Sequence
 

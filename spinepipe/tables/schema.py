@@ -1,7 +1,4 @@
-"""What a result table is: columns with type, unit, range and meaning. The docs come from here.
-
-Columns that several tables share.
-"""
+"""What a result table is: columns with type, unit, range and meaning. The docs come from here."""
 
 from dataclasses import dataclass
 

@@ -32,9 +32,10 @@ block: 4
 calibration:
   weights:
     {{anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}}
-start_bootstrap: {{sets: 3, loadings: [equilibrium, quasi_static, dynamic]}}
+start_bootstrap: {{sets: 2, loadings: [equilibrium, quasi_static, dynamic]}}
 damping_bootstrap: {{sets: 2, loadings: [equilibrium]}}
-methods: {{poses: 1}}
+settle_time_s: 0.05
+methods: {{poses: 1, sane_step: 0.01, accuracy: 0.1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 """
 _HANGS_S = 3600
@@ -205,7 +206,7 @@ class Shared:
     def _built(self, name: str, build: Callable[[Path], Project]) -> Project:
         folder, listing = self.folder / name, self.folder / f"{name}.json"
         if not listing.exists():
-            shutil.rmtree(folder, ignore_errors=True)  # of a build that failed
+            assert not folder.exists(), f"the shared project {name} could not be built, see above"
             listing.write_text(json.dumps(build(folder).files()))
         return Project(folder)
 

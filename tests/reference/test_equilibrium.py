@@ -262,6 +262,6 @@ def test_numbers_that_are_not_finite_are_refused() -> None:
     model = bridge.spine_model(chains.l1_l4_chain())
     lost = Pose(np.eye(3), np.array([0.0, np.nan, 0.0]))
     with pytest.raises(RefusedModel, match="frame of joint J1"):
-        model.with_frames((model.frames[0], lost, model.frames[2]))
+        replace(model, frames=(model.frames[0], lost, model.frames[2]))
     with pytest.raises(RefusedModel, match="body V0"):
         Body("V0", np.inf, np.zeros(3), np.eye(3))

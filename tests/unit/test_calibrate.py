@@ -147,7 +147,7 @@ def axial_twist(model: SpineModel) -> LoadCase:
 def upright_joint() -> SpineModel:
     model = spine(1, gravity=False)
     frame = replace(model.frames[0], rotation=np.eye(3), origin=np.zeros(3))
-    return model.with_frames((frame,))
+    return replace(model, frames=(frame,))
 
 
 def test_an_unknown_without_trace_in_the_data_is_not_identifiable() -> None:
@@ -173,7 +173,7 @@ def test_the_covariance_of_an_unknown_without_trace_is_infinite() -> None:
 def test_two_unknowns_of_which_only_the_sum_shows_are_not_identifiable() -> None:
     """A gain of the reading and a stiffness do the same to small motion of a linear joint."""
     model = spine(1, gravity=False, effects=(scoped(MarkerError(), (0,)),))
-    model = model.with_frames((replace(model.frames[0], rotation=np.eye(3)),))
+    model = replace(model, frames=(replace(model.frames[0], rotation=np.eye(3)),))
     free = (
         *free_parameters(model, 0, ROTATIONS[:1], "per_specimen"),
         *free_parameters(model, 1, ["gain"], "per_specimen"),

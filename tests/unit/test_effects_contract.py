@@ -200,7 +200,7 @@ def test_laws_about_a_displaced_centre_are_a_joint_frame_displaced_alike() -> No
     offset = np.array([0.008, -0.006, 0.0])
     model = spine(3, effects=(scoped(JointCentreOffset(), (0, 1, 2), (0.008, -0.006)),))
     frames = tuple(replace(f, origin=f.origin + f.rotation @ offset) for f in model.frames)
-    other = spine(3).with_frames(frames)
+    other = replace(spine(3), frames=frames)
     case = loaded(model)
     solved = [follow(System(Chain(m), m, case)) for m in (model, other)]
     for about, moved_frame in zip(*solved, strict=True):

@@ -390,7 +390,9 @@ def test_readings_that_lack_are_filled_in_by_the_cohort() -> None:
 def test_a_degree_of_freedom_that_nobody_reads_stays_where_it_was() -> None:
     """Only axial twist of an upright weightless joint: bending leaves no trace."""
     model = spine(1, gravity=False)
-    model = model.with_frames((replace(model.frames[0], rotation=np.eye(3), origin=np.zeros(3)),))
+    model = replace(
+        model, frames=(replace(model.frames[0], rotation=np.eye(3), origin=np.zeros(3)),)
+    )
     free = free_parameters(model, 0, ROTATIONS, "per_joint")
     turn = Wrench(0, NOWHERE, NOWHERE, np.array([0.0, 2.0, 0.0]))
     case = replace(loaded(model), steps=(LoadStep(0, (turn,)),))

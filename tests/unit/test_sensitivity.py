@@ -97,7 +97,7 @@ def displaced(model: SpineModel, joint: int, component: int, size: float) -> Spi
     else:
         turn = Rotation.from_rotvec(size * np.eye(3)[(2, 0, 1)[component - 3]]).as_matrix()
         frames[joint] = Pose(frame.rotation @ turn, frame.origin)
-    return model.with_frames(tuple(frames))
+    return replace(model, frames=tuple(frames))
 
 
 def pose_slopes(model: SpineModel, case: LoadCase, joint: int) -> Array:

@@ -1,5 +1,6 @@
 """The URDF of a model: parsed again it stands, weighs and moves like the model."""
 
+from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -82,7 +83,7 @@ def test_frames_turned_a_quarter_about_the_vertical_stand_right(angle: float) ->
     rotation = rotation_zxy(0.0, 0.0, angle) @ rotation_zxy(0.3, -0.2, 0.0)
     yaw_first = Rotation.from_euler("ZYX", [0.4, angle, 0.3]).as_matrix()
     for frame in (rotation, yaw_first):
-        model = spine(1).with_frames((Pose(frame, np.zeros(3)),))
+        model = replace(spine(1), frames=(Pose(frame, np.zeros(3)),))
         found = origin_of(chain_of(model)[0]).rotation
         np.testing.assert_allclose(found, frame, rtol=0, atol=1e-13)
 

@@ -1,9 +1,8 @@
-"""Runs that go wrong: bad input, dying workers, folders that cannot be written, a killed run."""
+"""Runs that go wrong: bad input, dying workers, folders that cannot be written."""
 
 import shutil
 from collections.abc import Callable
 
-import psutil
 import pytest
 from small_project import Project
 
@@ -98,30 +97,3 @@ def test_the_warm_pool_is_insisted_on(new_project: Callable[[int], Project]) -> 
     assert done.returncode != 0
     assert "force-use-threads" in done.stdout
     assert not project.path("results").exists()
-
-
-def test_a_killed_run_goes_on_where_it_was(
-    finished: Project, new_project: Callable[[int], Project]
-) -> None:
-    project = new_project(6)
-    workers = project.killed_after(8, "simulate")
-    assert workers
-    for pid, start in workers:
-        assert ended(pid, start)
-    cut_off = {path.name for path in project.path(".snakemake/incomplete").rglob("*")}
-    before = project.files()
-    assert project.snakemake("--unlock").returncode == 0
-    again = project.rerun() & set(before)
-    assert len(again) <= len(cut_off)
-    assert project.contents() == finished.contents()
-
-
-def ended(pid: int, start: float) -> bool:
-    """Whether that process is gone, or goes while one waits for it."""
-    try:
-        process = psutil.Process(pid)
-        if process.create_time() == start:
-            process.wait(timeout=600)
-    except psutil.NoSuchProcess:
-        return True
-    return not process.is_running() or process.create_time() != start

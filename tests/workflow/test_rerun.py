@@ -73,7 +73,7 @@ def test_a_run_makes_every_table_and_figure(finished: Project) -> None:
     assert {name.removeprefix("results/") for name in layout(finished).results()} <= files
     assert {"small/best.json", "small/model.yaml", "small/report.html"} <= files
     assert len(simulations(files)) == 6 * 3
-    assert len([name for name in files if name.startswith("small/bootstrap/")]) == 3 * 3 + 2
+    assert len([name for name in files if name.startswith("small/bootstrap/")]) == 3 * 2 + 2
     assert not list(finished.path("results").rglob("*.log"))
 
 

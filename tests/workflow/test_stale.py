@@ -5,6 +5,7 @@ import os
 import shutil
 from pathlib import Path
 
+import psutil
 import pyarrow.parquet as pq
 import pytest
 from small_project import Project, Shared, copy_project
@@ -82,6 +83,32 @@ def test_after_kill_and_change_back_tables_are_as_undisturbed(
 
 def simulation(pose: int, stiffness: str) -> str:
     return f"small/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
+
+
+def test_a_killed_run_goes_on_where_it_was(done: Project) -> None:
+    content = done.contents()
+    shutil.rmtree(done.path("results"))
+    shutil.rmtree(done.path(".snakemake"))
+    workers = done.killed_after(8, "simulate", *TABLES)
+    assert workers
+    assert all(ended(pid, start) for pid, start in workers)
+    cut_off = {path.name for path in done.path(".snakemake/incomplete").rglob("*")}
+    before = set(done.files())
+    assert done.snakemake("--unlock").returncode == 0
+    again = done.rerun(*TABLES) & before
+    assert len(again) <= len(cut_off)
+    assert done.contents() == content
+
+
+def ended(pid: int, start: float) -> bool:
+    """Whether that process is gone, or goes while one waits for it."""
+    try:
+        process = psutil.Process(pid)
+        if process.create_time() == start:
+            process.wait(timeout=600)
+    except psutil.NoSuchProcess:
+        return True
+    return not process.is_running() or process.create_time() != start
 
 
 def without_record(project: Project) -> Project:

@@ -1,9 +1,7 @@
-"""A design of a global analysis: which points of the unit cube are computed, and how they hang
-together.
+"""A design of a global analysis: which points of the unit cube are computed, and in what order.
 
-How many runs a design takes, and what is wrong with one, before anything is drawn.
-
-Draw a design. Sampling is SALib's; the same seed gives the same design.
+Its size and its faults are told before anything is drawn. Sampling is SALib's; the same seed gives
+the same design.
 """
 
 from collections.abc import Sequence

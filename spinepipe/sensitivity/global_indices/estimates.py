@@ -1,10 +1,6 @@
-"""What is asked of an analysis.
+"""What an analysis is asked and hands back: settings, estimates, and indices or why there are none.
 
-Estimates of several indices at once, as the methods hand them to `indices`.
-
-What an analysis hands back: indices with intervals, or the reason why there are none.
-
-Resamples of a bootstrap as weights, and intervals from what they give.
+Resamples of a bootstrap are weights of runs; intervals come from what they give.
 """
 
 from collections.abc import Iterator

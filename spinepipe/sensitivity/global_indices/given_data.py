@@ -1,17 +1,13 @@
 """Indices from a Latin hypercube, or what is left of it: RBD-FAST, PAWN, delta, regional.
 
-Delta: how much of the output's density a factor moves. The estimator is SALib's.
+RBD-FAST gives first-order indices from any sample. PAWN tells how far the output's distribution
+moves when a factor is held in a slice of its range, delta how much of its density; regional
+sensitivity asks whether runs with extreme outputs have other factor values than the rest. Delta's
+estimator is SALib's.
 
-Kolmogorov-Smirnov distances of weighted samples, all resamples at once.
-
-scipy's `ks_2samp` gives the same statistic (tests), one resample at a time in 0.6 ms or more; PAWN
-of 24 factors and 50 outputs with 1,000 resamples asks for 12 million of them.
-
-PAWN: how far the output's distribution moves when a factor is held in a slice of its range.
-
-First-order indices from any sample by RBD-FAST.
-
-Regional sensitivity: do runs with extreme outputs have other factor values than the rest?
+Kolmogorov-Smirnov distances are those of weighted samples, all resamples at once: scipy's
+`ks_2samp` gives the same statistic (tests), one resample at a time in 0.6 ms or more; PAWN of 24
+factors and 50 outputs with 1,000 resamples asks for 12 million of them.
 """
 
 import warnings
@@ -33,45 +29,6 @@ from spinepipe.sensitivity.global_indices.estimates import (
     normal_interval,
     resample_weights,
 )
-
-
-def delta_indices(unit: Array, output: Array, weights: Array) -> tuple[Array, Array]:
-    """(D,) delta with its bias taken out, and (R, D) the same of resamples.
-
-    Parameters
-    ----------
-    unit : (N, D) factors. output : (N,). weights : (R, N) whole, sum N.
-
-    Plischke et al. 2013, doi:10.1016/j.ejor.2012.11.047, equations 26 and 30: twice the estimate
-    less the resamples' mean. SALib's `analyze` is not called: it starts from a resample instead of
-    the sample, which leaves the bias in, and changes the process's filters of warnings. 1.6 ms for
-    256 points, 3.6 ms for 1,024, per factor and resample. Smoothing leaves large deltas low (0.26
-    for 0.31 at 1,024 points).
-    """
-    n = len(output)
-    resamples = np.array([np.repeat(np.arange(n), row.astype(int)) for row in weights])
-    mixed = np.random.default_rng(n).permuted(resamples, axis=1)  # equal values: ranks by chance
-    rows = [np.arange(n), *mixed]
-    found = np.array([[_delta_of(output[at], values[at]) for values in unit.T] for at in rows])
-    reduced = 2.0 * found[0] - found[1:]
-    return reduced.mean(axis=0), reduced
-
-
-def _delta_of(output: Array, factor: Array) -> float:
-    """Delta with its bias; 0 where the output does not vary, whose density has no width."""
-    if np.ptp(output) == 0.0:
-        return 0.0
-    grid = np.linspace(output.min(), output.max(), 100)
-    edges = np.linspace(0, len(output), _classes(len(output)) + 1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of classes whose outputs are all the same
-        return float(delta.calc_delta(output, grid, factor, edges))
-
-
-def _classes(n: int) -> int:
-    """Number of classes of a factor's values, as in SALib's `analyze`."""
-    power = 2.0 / (7.0 + np.tanh((1500.0 - n) / 500.0))
-    return min(int(np.ceil(n**power)), 48)
 
 
 class Ordered:
@@ -117,117 +74,8 @@ def _sums(weights: Array) -> Array:
     return np.pad(np.cumsum(weights, axis=1), ((0, 0), (1, 0)))
 
 
-def pawn(unit: Array, output: Array, weights: Array, slices: int) -> Array:
-    """(R, D) median over slices of the distance between the slice's outputs and all outputs.
-
-    Parameters
-    ----------
-    unit : (N, D) factors. output : (N,). weights : (R, N) of resamples.
-    slices : number of slices of equal counts; slices stay the same in all resamples.
-
-    Pianosi & Wagener 2018, doi:10.1016/j.envsoft.2018.07.019, slices as in SALib. It is never 0:
-    a factor that does nothing has the distance of a small sample (compare with a dummy).
-    """
-    outputs = Ordered(output, weights)
-    found = np.empty((len(weights), unit.shape[1]))
-    for column, values in enumerate(unit.T):
-        parts = _slices(values, slices)
-        found[:, column] = np.median([outputs.distance(part) for part in parts], axis=0)
-    return found
-
-
-def _slices(values: Array, slices: int) -> list[NDArray[np.bool_]]:
-    """(N,) bool of each slice, closed below and open above; the largest value is in none."""
-    edges = np.quantile(values, np.linspace(0.0, 1.0, slices + 1))
-    return [(values >= low) & (values < high) for low, high in pairwise(edges)]
-
-
 HARMONICS = 10
 """SALib's default. More than 2 HARMONICS points are needed."""
-
-
-def rbd_fast_s1(unit: Array, outputs: Array) -> Array:
-    """(D, K) first-order indices of outputs (N, K) by SALib, its correction of the bias included.
-
-    Parameters
-    ----------
-    unit : (N, D) factors.
-    """
-    found = np.empty((unit.shape[1], outputs.shape[1]))
-    for column, k in np.ndindex(found.shape):
-        permuted = rbd_fast.permute_outputs(unit[:, column], outputs[:, k])
-        raw = rbd_fast.compute_first_order(permuted, HARMONICS)
-        found[column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
-    return found
-
-
-def rbd_fast_resampled(unit: Array, outputs: Array, weights: Array) -> Array:
-    """(R, D, K) the same of resamples with whole weights (R, N) that sum to N.
-
-    SALib takes 0.4 ms for each resample of 1,024 points, one transform for all 0.012 ms.
-    """
-    found = np.empty((len(weights), unit.shape[1], outputs.shape[1]))
-    for column, values in enumerate(unit.T):
-        rows = _sorted_rows(values, weights)
-        for k in range(outputs.shape[1]):
-            raw = _share_of_harmonics(outputs[rows, k])
-            found[:, column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
-    return found
-
-
-def _sorted_rows(values: Array, weights: Array) -> Array:
-    """(R, N) rows of each resample, up through every other one by value and down the rest."""
-    order = np.argsort(values, kind="stable")
-    r, n = weights.shape
-    counts = weights[:, order].astype(int).ravel()
-    rows = np.repeat(np.tile(order, r), counts).reshape(r, n)
-    return np.hstack([rows[:, ::2], rows[:, 1::2][:, ::-1]])
-
-
-def _share_of_harmonics(permuted: Array) -> Array:
-    """(R,) share of the first harmonics in the variance of each row (R, N); 0 without any."""
-    n = permuted.shape[1]
-    power = np.abs(rfft(permuted - permuted.mean(axis=1, keepdims=True), axis=1)) ** 2
-    power[:, 1 : (n + 1) // 2] *= 2.0  # both sides, but for the middle one of an even number
-    whole = power[:, 1:].sum(axis=1)
-    first = power[:, 1 : HARMONICS + 1].sum(axis=1)
-    return np.divide(first, whole, out=np.zeros_like(whole), where=whole > 0.0)
-
-
-def tail_of(outputs: Array, share: float, highest: bool) -> NDArray[np.bool_]:
-    """(N, K) which runs are among the lowest or highest share of each output."""
-    if highest:
-        return outputs >= np.quantile(outputs, 1.0 - share, axis=0)
-    return outputs <= np.quantile(outputs, share, axis=0)
-
-
-def regional(unit: Array, region: NDArray[np.bool_], weights: Array) -> Array:
-    """(R, D, K) distances between factors' values in the region and outside.
-
-    Parameters
-    ----------
-    unit : (N, D) factors. region : (N, K). weights : (R, N) of resamples.
-
-    The two-sample Kolmogorov-Smirnov distance (Hornberger & Spear 1981; Saltelli et al. 2008,
-    Global Sensitivity Analysis: The Primer, doi:10.1002/9780470725184, on Monte Carlo filtering).
-    """
-    found = np.empty((len(weights), unit.shape[1], region.shape[1]))
-    for column, values in enumerate(unit.T):
-        factor = Ordered(values, weights)
-        for k in range(region.shape[1]):
-            found[:, column, k] = _from_rest(factor, region[:, k])
-    return found
-
-
-def _from_rest(factor: Ordered, region: NDArray[np.bool_]) -> Array:
-    """(R,) distance between region and rest; 0 for a resample that lies all in one of them.
-
-    With the region's share p in all, F_region - F_all = (1 - p) (F_region - F_rest).
-    """
-    outside = 1.0 - factor.share(region)
-    split = outside > 0.0
-    return np.where(split, factor.distance(region) / np.where(split, outside, 1.0), 0.0)
-
 
 LOWEST = {"S1_RBD": -np.inf}
 """Lowest value of an index where it is not 0: corrected for bias, a small S1_RBD may be below."""
@@ -297,3 +145,150 @@ def _delta(unit: Array, outputs: Array, settings: Settings) -> tuple[Array, Arra
     every = [delta_indices(unit, output, weights) for output in outputs.T]
     estimates, resampled = zip(*every, strict=True)
     return np.stack(estimates, axis=-1), np.stack(resampled, axis=-1)
+
+
+def rbd_fast_s1(unit: Array, outputs: Array) -> Array:
+    """(D, K) first-order indices of outputs (N, K) by SALib, its correction of the bias included.
+
+    Parameters
+    ----------
+    unit : (N, D) factors.
+    """
+    found = np.empty((unit.shape[1], outputs.shape[1]))
+    for column, k in np.ndindex(found.shape):
+        permuted = rbd_fast.permute_outputs(unit[:, column], outputs[:, k])
+        raw = rbd_fast.compute_first_order(permuted, HARMONICS)
+        found[column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
+    return found
+
+
+def rbd_fast_resampled(unit: Array, outputs: Array, weights: Array) -> Array:
+    """(R, D, K) the same of resamples with whole weights (R, N) that sum to N.
+
+    SALib takes 0.4 ms for each resample of 1,024 points, one transform for all 0.012 ms.
+    """
+    found = np.empty((len(weights), unit.shape[1], outputs.shape[1]))
+    for column, values in enumerate(unit.T):
+        rows = _sorted_rows(values, weights)
+        for k in range(outputs.shape[1]):
+            raw = _share_of_harmonics(outputs[rows, k])
+            found[:, column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
+    return found
+
+
+def _sorted_rows(values: Array, weights: Array) -> Array:
+    """(R, N) rows of each resample, up through every other one by value and down the rest."""
+    order = np.argsort(values, kind="stable")
+    r, n = weights.shape
+    counts = weights[:, order].astype(int).ravel()
+    rows = np.repeat(np.tile(order, r), counts).reshape(r, n)
+    return np.hstack([rows[:, ::2], rows[:, 1::2][:, ::-1]])
+
+
+def _share_of_harmonics(permuted: Array) -> Array:
+    """(R,) share of the first harmonics in the variance of each row (R, N); 0 without any."""
+    n = permuted.shape[1]
+    power = np.abs(rfft(permuted - permuted.mean(axis=1, keepdims=True), axis=1)) ** 2
+    power[:, 1 : (n + 1) // 2] *= 2.0  # both sides, but for the middle one of an even number
+    whole = power[:, 1:].sum(axis=1)
+    first = power[:, 1 : HARMONICS + 1].sum(axis=1)
+    return np.divide(first, whole, out=np.zeros_like(whole), where=whole > 0.0)
+
+
+def pawn(unit: Array, output: Array, weights: Array, slices: int) -> Array:
+    """(R, D) median over slices of the distance between the slice's outputs and all outputs.
+
+    Parameters
+    ----------
+    unit : (N, D) factors. output : (N,). weights : (R, N) of resamples.
+    slices : number of slices of equal counts; slices stay the same in all resamples.
+
+    Pianosi & Wagener 2018, doi:10.1016/j.envsoft.2018.07.019, slices as in SALib. It is never 0:
+    a factor that does nothing has the distance of a small sample (compare with a dummy).
+    """
+    outputs = Ordered(output, weights)
+    found = np.empty((len(weights), unit.shape[1]))
+    for column, values in enumerate(unit.T):
+        parts = _slices(values, slices)
+        found[:, column] = np.median([outputs.distance(part) for part in parts], axis=0)
+    return found
+
+
+def _slices(values: Array, slices: int) -> list[NDArray[np.bool_]]:
+    """(N,) bool of each slice, closed below and open above; the largest value is in none."""
+    edges = np.quantile(values, np.linspace(0.0, 1.0, slices + 1))
+    return [(values >= low) & (values < high) for low, high in pairwise(edges)]
+
+
+def delta_indices(unit: Array, output: Array, weights: Array) -> tuple[Array, Array]:
+    """(D,) delta with its bias taken out, and (R, D) the same of resamples.
+
+    Parameters
+    ----------
+    unit : (N, D) factors. output : (N,). weights : (R, N) whole, sum N.
+
+    Plischke et al. 2013, doi:10.1016/j.ejor.2012.11.047, equations 26 and 30: twice the estimate
+    less the resamples' mean. SALib's `analyze` is not called: it starts from a resample instead of
+    the sample, which leaves the bias in, and changes the process's filters of warnings. 1.6 ms for
+    256 points, 3.6 ms for 1,024, per factor and resample. Smoothing leaves large deltas low (0.26
+    for 0.31 at 1,024 points).
+    """
+    n = len(output)
+    resamples = np.array([np.repeat(np.arange(n), row.astype(int)) for row in weights])
+    mixed = np.random.default_rng(n).permuted(resamples, axis=1)  # equal values: ranks by chance
+    rows = [np.arange(n), *mixed]
+    found = np.array([[_delta_of(output[at], values[at]) for values in unit.T] for at in rows])
+    reduced = 2.0 * found[0] - found[1:]
+    return reduced.mean(axis=0), reduced
+
+
+def _delta_of(output: Array, factor: Array) -> float:
+    """Delta with its bias; 0 where the output does not vary, whose density has no width."""
+    if np.ptp(output) == 0.0:
+        return 0.0
+    grid = np.linspace(output.min(), output.max(), 100)
+    edges = np.linspace(0, len(output), _classes(len(output)) + 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of classes whose outputs are all the same
+        return float(delta.calc_delta(output, grid, factor, edges))
+
+
+def _classes(n: int) -> int:
+    """Number of classes of a factor's values, as in SALib's `analyze`."""
+    power = 2.0 / (7.0 + np.tanh((1500.0 - n) / 500.0))
+    return min(int(np.ceil(n**power)), 48)
+
+
+def tail_of(outputs: Array, share: float, highest: bool) -> NDArray[np.bool_]:
+    """(N, K) which runs are among the lowest or highest share of each output."""
+    if highest:
+        return outputs >= np.quantile(outputs, 1.0 - share, axis=0)
+    return outputs <= np.quantile(outputs, share, axis=0)
+
+
+def regional(unit: Array, region: NDArray[np.bool_], weights: Array) -> Array:
+    """(R, D, K) distances between factors' values in the region and outside.
+
+    Parameters
+    ----------
+    unit : (N, D) factors. region : (N, K). weights : (R, N) of resamples.
+
+    The two-sample Kolmogorov-Smirnov distance (Hornberger & Spear 1981; Saltelli et al. 2008,
+    Global Sensitivity Analysis: The Primer, doi:10.1002/9780470725184, on Monte Carlo filtering).
+    """
+    found = np.empty((len(weights), unit.shape[1], region.shape[1]))
+    for column, values in enumerate(unit.T):
+        factor = Ordered(values, weights)
+        for k in range(region.shape[1]):
+            found[:, column, k] = _from_rest(factor, region[:, k])
+    return found
+
+
+def _from_rest(factor: Ordered, region: NDArray[np.bool_]) -> Array:
+    """(R,) distance between region and rest; 0 for a resample that lies all in one of them.
+
+    With the region's share p in all, F_region - F_all = (1 - p) (F_region - F_rest).
+    """
+    outside = 1.0 - factor.share(region)
+    split = outside > 0.0
+    return np.where(split, factor.distance(region) / np.where(split, outside, 1.0), 0.0)

@@ -1,10 +1,7 @@
-"""All indices of a design's outputs.
+"""All indices of a design's outputs, with status, message and noise floor.
 
-The noise floor: what an index says of a factor that changes nothing.
-
-Which runs are left when some failed, block by block.
-
-From estimates to indices with status and message.
+Where runs failed, what is left is told block by block. The noise floor is what an index says of a
+factor that changes nothing.
 """
 
 from collections.abc import Sequence
@@ -33,49 +30,6 @@ from spinepipe.sensitivity.global_indices.structured import (
     morris_indices,
     sobol_indices,
 )
-
-
-def noise_floor(found: Sequence[Index]) -> dict[str, Masked]:
-    """(K,) upper interval end of the dummy, by name of index; empty without a dummy.
-
-    Of S2 it is the highest end among the dummy's pairs, of an index that may be negative (mu) the
-    end farther from 0. An index without intervals (FAST) has the dummy's estimate as its floor.
-
-    In Sobol and Morris designs the runs that a dummy changes are repetitions, so that its S1, ST,
-    mu and sigma are 0 but for the model's own scatter: these estimators have no noise floor, and a
-    factor above it is one whose interval leaves 0 out. In S2, FAST and given-data indices the
-    floor is the method's noise.
-    """
-    floors: dict[str, Masked] = {}
-    for index in found:
-        if DUMMY in (index.factor, index.other):
-            top = _farthest(index)
-            floors[index.index] = np.ma.maximum(floors.get(index.index, top), top)
-    return floors
-
-
-def above_floor(index: Index, floors: dict[str, Masked]) -> tuple[bool | None, ...]:
-    """(K,) whether the whole interval lies above the floor; None where one of both is missing."""
-    if index.index not in floors:
-        return (None,) * len(index.status)
-    return tuple((_nearest(index) > floors[index.index]).tolist())
-
-
-def _farthest(index: Index) -> Masked:
-    low, high = _ends(index)
-    return np.ma.maximum(high, -low) + 0.0 if index.index == "mu" else high
-
-
-def _nearest(index: Index) -> Masked:
-    low, high = _ends(index)
-    return np.ma.maximum(low, -high) if index.index == "mu" else low
-
-
-def _ends(index: Index) -> tuple[Masked, Masked]:
-    if np.ma.getmaskarray(index.low).all():
-        return index.estimate, index.estimate
-    return index.low, index.high
-
 
 BLOCKS = {
     Method.SOBOL: "base samples",
@@ -302,3 +256,45 @@ def _found(design: Design, values: Array, left: Kept, settings: Settings) -> Est
         Method.LATIN_HYPERCUBE: given_data_indices,
     }[design.method]
     return analyse(without_lost(design, left), values[left.rows], settings)
+
+
+def noise_floor(found: Sequence[Index]) -> dict[str, Masked]:
+    """(K,) upper interval end of the dummy, by name of index; empty without a dummy.
+
+    Of S2 it is the highest end among the dummy's pairs, of an index that may be negative (mu) the
+    end farther from 0. An index without intervals (FAST) has the dummy's estimate as its floor.
+
+    In Sobol and Morris designs the runs that a dummy changes are repetitions, so that its S1, ST,
+    mu and sigma are 0 but for the model's own scatter: these estimators have no noise floor, and a
+    factor above it is one whose interval leaves 0 out. In S2, FAST and given-data indices the
+    floor is the method's noise.
+    """
+    floors: dict[str, Masked] = {}
+    for index in found:
+        if DUMMY in (index.factor, index.other):
+            top = _farthest(index)
+            floors[index.index] = np.ma.maximum(floors.get(index.index, top), top)
+    return floors
+
+
+def above_floor(index: Index, floors: dict[str, Masked]) -> tuple[bool | None, ...]:
+    """(K,) whether the whole interval lies above the floor; None where one of both is missing."""
+    if index.index not in floors:
+        return (None,) * len(index.status)
+    return tuple((_nearest(index) > floors[index.index]).tolist())
+
+
+def _farthest(index: Index) -> Masked:
+    low, high = _ends(index)
+    return np.ma.maximum(high, -low) + 0.0 if index.index == "mu" else high
+
+
+def _nearest(index: Index) -> Masked:
+    low, high = _ends(index)
+    return np.ma.maximum(low, -high) if index.index == "mu" else low
+
+
+def _ends(index: Index) -> tuple[Masked, Masked]:
+    if np.ma.getmaskarray(index.low).all():
+        return index.estimate, index.estimate
+    return index.low, index.high

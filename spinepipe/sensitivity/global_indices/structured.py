@@ -1,12 +1,9 @@
-"""Sobol indices: estimators as SALib's, resamples as matrix products.
+"""Indices of structured designs: Sobol, FAST and Morris, by estimators as SALib's.
 
-SALib gathers every column anew for each resample and pair; sums over a resample are a product of
-weights and columns, for all indices of an output at once. With 24 factors and a dummy, 1,024 base
-samples, pairs and 1,000 resamples that is 0.03 s per output instead of 10.6 s (one core).
-
-Indices from FAST curves, by SALib.
-
-Morris indices: elementary effects, their mean, mean size and SD.
+Resamples of Sobol indices are matrix products: SALib gathers every column anew for each resample
+and pair; sums over a resample are a product of weights and columns, for all indices of an output at
+once. With 24 factors and a dummy, 1,024 base samples, pairs and 1,000 resamples that is 0.03 s per
+output instead of 10.6 s (one core).
 """
 
 from itertools import combinations

@@ -1,9 +1,8 @@
-"""Many chains at one pose each: axes, pivots and positions of points, by the same joint convention.
+"""Many chains at one pose each: axes and positions, residuals and exact tangents.
 
-A joint moves along the x, y and z axes of its frame, then turns by Z, X', Y''. What PyBullet does
-for one chain is done here for M at once; tests hold the two against each other.
-
-Residuals and exact tangents of many chains, each under its own wrenches and weight.
+By the same joint convention as for one chain: a joint moves along the x, y and z axes of its frame,
+then turns by Z, X', Y''. What PyBullet does for one chain is done here for M at once, each under
+its own wrenches and weight; tests hold the two against each other.
 """
 
 from collections.abc import Sequence

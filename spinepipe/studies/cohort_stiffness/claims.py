@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.statistics import Mean, mean_of
-from spinepipe.studies.cohort_stiffness.fit_rows import joined
+from spinepipe.tables.shared import joined
 
 Row = dict[str, Any]
 

@@ -11,7 +11,6 @@ import pandas as pd
 
 from spinepipe.statistics import wilcoxon_signed_rank
 from spinepipe.studies.cohort_stiffness.claims import FACTORS, Claim, Row, above_zero, listed, words
-from spinepipe.studies.cohort_stiffness.fit_rows import joined
 from spinepipe.studies.cohort_stiffness.representations import EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
@@ -25,6 +24,7 @@ from spinepipe.studies.cohort_stiffness.stages import (
     specimen_rms,
     without_result,
 )
+from spinepipe.tables.shared import joined
 
 QUANTITY = (
     "error with {} less that with {}: root mean square of all measured rotations, mean over "

@@ -12,10 +12,8 @@ from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    SHARED_ERROR,
     criteria,
     independent,
-    joined,
     no_fit,
     stiffness_rows,
 )
@@ -28,8 +26,10 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]

@@ -18,10 +18,6 @@ LEVEL = 0.975
 
 _BOUND = {-1: "lower", 0: "no", 1: "upper"}
 
-SHARED_ERROR = (
-    "readings zeroed at step 0 share its error, which the published cost takes no account of"
-)
-
 
 def stiffness_rows(
     joints: Sequence[str],
@@ -126,8 +122,3 @@ def no_fit(status: str, message: str) -> dict[str, Any]:
     empty = dict.fromkeys(("effective_unknowns", "cost"))
     ended = {"status": status, "message": message}
     return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}
-
-
-def joined(*notes: str) -> str:
-    """Notes as one message."""
-    return "; ".join(note for note in notes if note)

@@ -13,10 +13,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    SHARED_ERROR,
     criteria,
     independent,
-    joined,
     no_fit,
     stiffness_rows,
 )
@@ -31,8 +29,10 @@ from spinepipe.studies.cohort_stiffness.problem import (
 )
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]

@@ -22,7 +22,6 @@ from spinepipe.statistics import (
     wilcoxon_signed_rank,
 )
 from spinepipe.statistics.normality import NESTED
-from spinepipe.studies.cohort_stiffness.fit_rows import SHARED_ERROR, joined
 from spinepipe.studies.cohort_stiffness.representations import POOLED, start_of
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -35,11 +34,12 @@ from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
+    SHARED_ERROR,
     of_single_cases,
     rotations,
 )
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import STATISTICS
+from spinepipe.tables.shared import STATISTICS, joined
 from spinepipe.units import ROTATIONS
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)

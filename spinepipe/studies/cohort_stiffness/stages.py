@@ -8,6 +8,10 @@ import pandas as pd
 from spinepipe.studies.cohort_stiffness.settings import joint_label, label_of_others
 from spinepipe.units import ROTATIONS
 
+SHARED_ERROR = (
+    "readings zeroed at step 0 share its error, which the published cost takes no account of"
+)
+
 LITERATURE, FITTED = "literature", "fitted"
 LEFT_OUT_SPECIMEN, LEFT_OUT_CASE = "left_out_specimen", "left_out_case"
 

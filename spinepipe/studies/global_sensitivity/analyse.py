@@ -22,16 +22,21 @@ from spinepipe.sensitivity.global_indices import (
     noise_floor,
 )
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import design_of
+from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.tables import CALIBRATED, CONVERGENCE, INDICES, RESPONSES
+from spinepipe.studies.global_sensitivity.tables import (
+    CALIBRATED,
+    CONVERGENCE,
+    EVERY,
+    INDICES,
+    RESPONSES,
+)
 from spinepipe.tables import Table, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
 
 Rows = list[dict[str, Any]]
-EVERY = "*"
 
 SETTLED = 1e-6
 """Outputs (mm, deg, N, N m) that vary by less than a solver can tell are constant."""

@@ -14,7 +14,7 @@ from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivi
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
 
 ALWAYS = (
     *("landmarks", "poses", "calibrations", "simulations", "success", "counts", "summary"),
@@ -63,7 +63,6 @@ _MADE_BY = {
 }
 """The job that writes the files of each of them."""
 
-_MOST_FILES_PER_BLOCK = 300
 _FILES_PER_BLOCK = 100
 
 
@@ -219,7 +218,7 @@ class Layout(StudyFiles):
         if table not in ("calibrations", "simulations"):
             return _FILES_PER_BLOCK
         files = 1 if table == "calibrations" else len(self.stiffnesses)
-        return files * min(self.study.block, max(1, _MOST_FILES_PER_BLOCK // files))
+        return files * min(self.study.block, max(1, MOST_FILES_PER_BLOCK // files))
 
     def _job_file(self, table: str, specimen: str, number: int) -> str:
         return (

@@ -1,7 +1,4 @@
-"""Figure: signed error at the largest load, specimen by level, for each load case and stage.
-
-What the map of errors compares: published, fitted and predicted stiffness.
-"""
+"""Figure: signed error at the largest load, specimen by level, for each load case and stage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

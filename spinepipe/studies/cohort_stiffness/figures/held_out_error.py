@@ -1,7 +1,4 @@
-"""Figure: error of motion that was fitted and of motion that was held out, by representation.
-
-Errors of fitted and of held-out motion, one number per specimen.
-"""
+"""Figure: error of motion that was fitted and of motion that was held out, by representation."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -24,29 +21,12 @@ from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, specimen_rm
 
 KEYS = ["stage", "representation", "specimen"]
 
-
-def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
-    """Root mean square error over all readings of rotations, column ``error``, deg, by ``KEYS``.
-
-    Of held-out load cases each is predicted by the fit that left it out; all else is of fits to
-    all load cases. A specimen without an error for all that was measured of it is left out.
-    """
-    found = {
-        (stage, name): values
-        for stage in errors["stage"].unique()
-        for name, rows in of_joint_fits(errors, stage).groupby("representation", sort=False)
-        if len(values := specimen_rms(rows, errors))
-    }
-    if not found:
-        return pd.DataFrame(columns=[*KEYS, "error"])
-    return pd.concat(found, names=KEYS).rename("error").reset_index()
-
-
 PANELS = {
     "fitted": "Fitted motion",
     "left_out_case": "Left-out load case",
     "left_out_specimen": "Left-out specimen",
 }
+
 LEAST_DEG = 1e-3
 """Smaller errors, of exact fits, are drawn there."""
 
@@ -83,6 +63,23 @@ def held_out_error_figure(
         _draw(axis, found[found["stage"] == name], rows)
     _explain(figure, published, len(cohort.specimen_names))
     return figure
+
+
+def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
+    """Root mean square error over all readings of rotations, column ``error``, deg, by ``KEYS``.
+
+    Of held-out load cases each is predicted by the fit that left it out; all else is of fits to
+    all load cases. A specimen without an error for all that was measured of it is left out.
+    """
+    found = {
+        (stage, name): values
+        for stage in errors["stage"].unique()
+        for name, rows in of_joint_fits(errors, stage).groupby("representation", sort=False)
+        if len(values := specimen_rms(rows, errors))
+    }
+    if not found:
+        return pd.DataFrame(columns=[*KEYS, "error"])
+    return pd.concat(found, names=KEYS).rename("error").reset_index()
 
 
 def _published(found: pd.DataFrame) -> dict[str, float]:

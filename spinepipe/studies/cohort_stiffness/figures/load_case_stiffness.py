@@ -1,7 +1,4 @@
-"""Figure: stiffness fitted to one load case against stiffness fitted to all of them.
-
-Stiffness fitted to one load case as a multiple of that fitted to all.
-"""
+"""Figure: stiffness fitted to one load case as a multiple of that fitted to all of them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -23,38 +20,10 @@ from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, lo
 from spinepipe.units import COORDINATES
 
 _KEYS = ["specimen", "representation", "joint", "coordinate"]
-
-
-def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
-    """One row per fit to a single load case, with the ratio and its interval.
-
-    The interval is that of the fit to the single load case alone. Where joints share an unknown,
-    the first joint stands for all.
-
-    Returns
-    -------
-    Columns ``fitted_to``, those of the keys, ``ratio``, ``low``, ``high``, ``doubted``, and
-    ``loaded``: whether that load case drives the coordinate.
-    """
-    own = stiffness[stiffness["source"] == "own"]
-    first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
-    own = own[~own["representation"].isin(SHARED) | first]
-    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
-    whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
-    both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
-    divided = {
-        new: both[old].astype(float) / both["whole"].astype(float)
-        for new, old in (("ratio", "stiffness"), ("low", "low"), ("high", "high"))
-    }
-    driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
-    pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
-    loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
-    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
-
-
 _SHOWN = (SHARED[0], OF_JOINTS[0])
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
 _LEAST_REACH, _FARTHEST = 1.15, 30.0
+
 _FEW, _MOST_INTERVALS = 12, 120
 """Fits of a row that keep their order; and that have an interval each."""
 
@@ -93,6 +62,33 @@ def load_case_stiffness_figure(
     tested = [_tested(study, tables["statistics"], name) for name in shown]
     _explain(figure, found[found["representation"].isin(shown)], tested)
     return figure
+
+
+def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
+    """One row per fit to a single load case, with the ratio and its interval.
+
+    The interval is that of the fit to the single load case alone. Where joints share an unknown,
+    the first joint stands for all.
+
+    Returns
+    -------
+    Columns ``fitted_to``, those of the keys, ``ratio``, ``low``, ``high``, ``doubted``, and
+    ``loaded``: whether that load case drives the coordinate.
+    """
+    own = stiffness[stiffness["source"] == "own"]
+    first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
+    own = own[~own["representation"].isin(SHARED) | first]
+    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
+    whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
+    both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
+    divided = {
+        new: both[old].astype(float) / both["whole"].astype(float)
+        for new, old in (("ratio", "stiffness"), ("low", "low"), ("high", "high"))
+    }
+    driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
+    pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
+    loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
+    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
 
 
 def _two_lines(test: str) -> str:

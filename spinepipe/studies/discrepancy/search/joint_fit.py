@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.decomposition import bounded_least_squares
+from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
@@ -15,15 +15,11 @@ from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Predi
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
-MOST_EVALUATIONS = 40
-
-SETTLED = 1e-5
-"""Share of chi2 below which a step counts as none: a log evidence then is right to 0.01 or so."""
+SETTLED = Settled(cost=1e-5, step=1e-6, slope=1e-10, evaluations=40)
+"""Chi2 settles to a share at which a log evidence is right to 0.01 or so."""
 
 SAME = 1e-3
 """Noise SDs by which a reading may differ when it is predicted afresh from the neutral pose."""
-
-OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
 
 
 @dataclass(frozen=True)
@@ -151,32 +147,13 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
     low = np.array([u.low for u in hypothesis.unknowns])
     high = np.array([u.high for u in hypothesis.unknowns])
     start = np.clip(np.zeros(len(low)), low, high)
-    if points.compressed(start) is None:
+    begun = points.compressed(start)
+    if begun is None:
         return _nowhere(hypothesis, start, points.trouble)
-    size = len(points.compressed(start)[0])  # type: ignore[index]
-
-    def residual(x: Array) -> Array:
-        found = points.compressed(x)
-        return np.full(size, np.nan) if found is None else found[0]
-
-    def jacobian(x: Array) -> Array:
-        found = points.compressed(x)
-        assert found is not None
-        return found[1]
-
-    result = bounded_least_squares(
-        residual,
-        start,
-        jacobian,
-        (low, high),
-        x_scale=np.array([_scale(u) for u in hypothesis.unknowns]),
-        ftol=SETTLED,
-        xtol=1e-6,
-        gtol=1e-10,
-        max_nfev=MOST_EVALUATIONS,
-    )
-    status = "" if result.success else f"no optimum within {MOST_EVALUATIONS} evaluations"
-    return _ended(points, result.x, (result.x - low < 1e-6) | (high - result.x < 1e-6), status)
+    scale = np.array([_scale(u) for u in hypothesis.unknowns])
+    ended = descend(points.compressed, start, (low, high), scale, len(begun[0]), SETTLED)
+    status = "" if ended.arrived else SETTLED.given_up
+    return _ended(points, ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6), status)
 
 
 def _scale(unknown: Unknown) -> float:

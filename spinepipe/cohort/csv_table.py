@@ -1,0 +1,198 @@
+"""A CSV file as a typed table, every bad cell with the line where an editor shows it."""
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite, nan
+from pathlib import Path
+
+import pandas as pd
+
+from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.cohort.text import read_text
+from spinepipe.problems import Problem, did_you_mean, one_of
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Cells of one CSV file, not yet understood.
+
+    Attributes
+    ----------
+    file : name in messages.
+    header : column names.
+    lines : line of each row.
+    cells : rows of cells, blanks around a cell removed, as many as the header has names.
+    ragged : lines whose rows had too many or too few cells (reported; cut or filled up here).
+    """
+
+    file: str
+    header: list[str]
+    lines: list[int]
+    cells: list[list[str]]
+    ragged: frozenset[int]
+
+
+def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | None, list[Problem]]:
+    """Read and convert one CSV file.
+
+    Parameters
+    ----------
+    path : the file, which exists.
+    form : its declared columns.
+    file : its name in messages.
+
+    Returns
+    -------
+    The table, indexed by line number, with all declared columns (numbers as float64, NaN where
+    empty or bad; text as str, NaN where an optional cell is empty) and then the carried ones;
+    None when the file is no table or lacks a required column. And the problems.
+    """
+    rows, problems = read_rows(path, file)
+    if rows is None:
+        return None, problems
+    problems += _column_problems(rows, form)
+    lacking = any(column.required and column.name not in rows.header for column in form.columns)
+    if lacking or not rows.cells:
+        return None, problems
+    texts = dict(zip(rows.header, map(list, zip(*rows.cells, strict=True)), strict=True))
+    data: dict[str, pd.Series] = {}
+    for column in form.columns:
+        cells = texts.pop(column.name, [""] * len(rows.lines))
+        data[column.name] = _converted(cells, column, rows, problems)
+    if form.carries:
+        data |= {name: _text_series(cells, rows.lines) for name, cells in texts.items()}
+    return pd.DataFrame(data), problems
+
+
+def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
+    for name in rows.header:
+        if name not in form.names and not form.carries:
+            remedy = did_you_mean(name, form.names, "delete the column or correct its name")
+            yield Problem(rows.file, 1, name, "an unknown column", one_of(form.names), remedy)
+    for column in form.columns:
+        if column.required and column.name not in rows.header:
+            yield Problem(
+                rows.file, 1, column.name, "no such column", column.meaning, "add the column"
+            )
+
+
+def _converted(
+    cells: list[str], column: Column, rows: Rows, problems: list[Problem]
+) -> "pd.Series":
+    if column.required:
+        problems += [
+            Problem(rows.file, line, column.name, "an empty cell", column.meaning, "fill it")
+            for line, cell in zip(rows.lines, cells, strict=True)
+            if not cell and line not in rows.ragged
+        ]
+    if column.kind == "text":
+        return _text_series(cells, rows.lines)
+    numbers = [float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells]
+    for index, (number, cell) in enumerate(zip(numbers, cells, strict=True)):
+        if cell and (fault := _number_fault(cell, number, column)):
+            allowed, remedy = fault
+            place = (rows.file, rows.lines[index], column.name)
+            problems.append(Problem(*place, f"'{cell}'", allowed, remedy))
+            numbers[index] = nan
+    return pd.Series(numbers, index=rows.lines, dtype="float64")
+
+
+def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
+    return pd.Series([cell or None for cell in cells], index=lines, dtype="str")
+
+
+def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:
+    """What is allowed and what to do, when a number is wrong."""
+    if not isfinite(number):
+        remedy = "correct it" if column.required else "leave the cell empty if not measured"
+        remedy = "write a decimal point" if "," in cell else remedy
+        return "a finite number with a decimal point", remedy
+    if column.kind == "integer" and number != int(number):
+        return "a whole number", "correct it"
+    low_bad = number <= column.low if column.open_low else number < column.low
+    high_bad = number >= column.high if column.open_high else number > column.high
+    if low_bad or high_bad:
+        return f"{column.meaning}: {column.range_text}", "correct it; check its unit and its sign"
+    return None
+
+
+def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
+    """Rows of a comma-separated UTF-8 file, None when it is no such table.
+
+    Wholly blank lines are skipped: they carry nothing.
+    """
+    text, problems = read_text(path, file)
+    if problems:
+        return None, problems
+    try:
+        records = _records(text)
+    except csv.Error as error:
+        return None, [_not_csv(file, str(error))]
+    header = records[0][1]
+    problems = _header_problems(file, header)
+    if problems:
+        return None, problems
+    rows, problems = _squared(file, header, records[1:])
+    if not rows.lines:
+        problems.append(
+            Problem(file, 1, None, "a header and no rows", "at least one row", "fill or delete it")
+        )
+    return rows, problems
+
+
+def _records(text: str) -> list[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    records: list[tuple[int, list[str]]] = []
+    line = 1
+    for cells in reader:
+        if cells:
+            records.append((line, [cell.strip() for cell in cells]))
+        line = reader.line_num + 1  # a quoted cell may span lines
+    return records
+
+
+def _not_csv(file: str, reason: str) -> Problem:
+    allowed = "comma-separated cells, double quotes only in pairs around a cell"
+    return Problem(file, None, None, f"no CSV ({reason})", allowed, "look for a stray quote mark")
+
+
+def _header_problems(file: str, header: list[str]) -> list[Problem]:
+    separators = [mark for mark in (";", "\t") if len(header) == 1 and mark in header[0]]
+    if separators:
+        found = f"cells separated by {'semicolons' if separators[0] == ';' else 'tabs'}"
+        remedy = "save the file as CSV with commas, and decimal points in numbers"
+        return [Problem(file, 1, None, found, "cells separated by commas", remedy)]
+    repeated = sorted({name for name in header if header.count(name) > 1 and name})
+    problems = [
+        Problem(file, 1, name, "the same column name twice", "each name once", "delete one")
+        for name in repeated
+    ]
+    if "" in header:
+        allowed = "a name over every column"
+        remedy = "name the column or delete it"
+        problems.append(Problem(file, 1, None, "a column without a name", allowed, remedy))
+    return problems
+
+
+def _squared(
+    file: str, header: list[str], records: list[tuple[int, list[str]]]
+) -> tuple[Rows, list[Problem]]:
+    width = len(header)
+    problems, ragged, cells = [], set(), []
+    for line, row in records:
+        if len(row) != width:
+            problems.append(_ragged(file, line, len(row), width))
+            ragged.add(line)
+        cells.append((row + [""] * width)[:width])
+    return Rows(file, header, [line for line, _ in records], cells, frozenset(ragged)), problems
+
+
+def _ragged(file: str, line: int, found: int, width: int) -> Problem:
+    cause = "a decimal comma splits a number into two cells" if found > width else "fill the row up"
+    remedy = f"count the commas ({cause})"
+    return Problem(file, line, None, f"{found} cells", f"{width} cells, as in the header", remedy)
