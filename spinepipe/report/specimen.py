@@ -76,13 +76,16 @@ def view_of(
         z right.
     """
     shift = np.array(load_shift_mm) / MM_PER_M
-    asked = () if cohort.loads is None else tests or cohort.tests
+    asked = tests or cohort.tests
+    tested = (
+        () if cohort.loads is None else measured_specimen(cohort, specimen, asked, shift).tested
+    )
     return SpecimenView(
         specimen=specimen,
         frames=joint_frames(cohort, specimen),
         points={} if cohort.landmarks is None else landmarks(cohort, specimen),
         bodies=tuple(body for body in bodies(cohort, specimen) if body.mass > 0.0),
-        tested=measured_specimen(cohort, specimen, asked, shift).tested,
+        tested=tested,
     )
 
 
