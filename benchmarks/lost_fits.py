@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.identification import PERCENT, OpenSimCost, problems
 from spinepipe.calibrate import fit
 from spinepipe.calibrate.forward_runs import DEFAULT_STEP, fit_by_cost
-from spinepipe.studies.joint_pose_sensitivity.success import near_start
+from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 
 POSES = tuple(range(40))
 ARRIVED = 1.01

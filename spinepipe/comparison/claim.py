@@ -1,17 +1,10 @@
-"""A published number, and what a run says to it.
-
-What a published number is compared with: the range inside which ours agrees with it.
-
-The tables of one run, as the comparison looks them up.
-
-Rows of a run's table of tests.
-"""
+"""A published number, the range inside which ours agrees with it, and what a run says to it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from math import atanh, sqrt, tanh
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,113 +13,11 @@ from statsmodels.stats.proportion import proportion_confint
 
 LEVEL = 0.95
 _Z = float(norm.ppf(0.5 + LEVEL / 2.0))
+
 _QUARTILE = float(norm.ppf(0.75))
+
 IQR_PER_SD = 2.0 * _QUARTILE
 """Interquartile range of a normal distribution of SD 1: 1.349."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """A closed range, None for an open end, and what it is in words."""
-
-    low: float | None
-    high: float | None
-    what: str
-
-    def holds(self, value: float) -> bool:
-        """Whether a value lies in it, ends included."""
-        above = self.low is None or value >= self.low
-        return above and (self.high is None or value <= self.high)
-
-
-def within_width(value: float, width: float, name: str) -> Range:
-    """A median and the width of a spread around it whose ends are not printed."""
-    what = (
-        f"the paper's value less and plus its {name}: the ends are not printed, "
-        "but lie no farther from the median than this width"
-    )
-    return Range(max(value - width, 0.0), value + width, what)
-
-
-def half_width(value: float, iqr: float) -> Range:
-    """A median and the IQR of values that are normal by construction."""
-    what = "the paper's IQR, taken as centred on its median"
-    return Range(value - iqr / 2.0, value + iqr / 2.0, what)
-
-
-def factor_of_two(value: float) -> Range:
-    """Half to twice a value that is printed without any spread."""
-    what = "half to twice the paper's value, chosen here: no uncertainty of it is printed"
-    return Range(value / 2.0, value * 2.0, what)
-
-
-def at_most(bound: float) -> Range:
-    """Zero to a bound that the paper states."""
-    return Range(0.0, bound, "below the paper's bound")
-
-
-def no_larger(value: float) -> Range:
-    """Zero to twice the error of one model, printed without any spread."""
-    return Range(0.0, 2.0 * value, "up to twice the paper's value: a smaller error agrees")
-
-
-def exactly(value: float) -> Range:
-    """A count or a yes or no."""
-    return Range(value, value, "the paper's value itself")
-
-
-def wilson_percent(count: int, of: int) -> tuple[float, float]:
-    """Ends of the 95 % Wilson interval of a share, percent."""
-    low, high = proportion_confint(count, of, alpha=1.0 - LEVEL, method="wilson")
-    ends = (0.0 if count == 0 else float(low)), (1.0 if count == of else float(high))
-    return 100.0 * ends[0], 100.0 * ends[1]  # rounding would exclude a share of none or all
-
-
-def binomial(count: int, of: int) -> Range:
-    """Where the share lies, in percent, that gave this count."""
-    return Range(*wilson_percent(count, of), f"95 % Wilson interval of the paper's {count} of {of}")
-
-
-def normal_iqr(iqr: float, n: int) -> Range:
-    """Where the IQR of another sample of the normal distribution lies of which n had this IQR.
-
-    The asymptotic standard error of an IQR is SD / (2 phi(z) sqrt(n)), z the upper quartile; the
-    other sample is taken to be as large.
-    """
-    relative = 0.5 / float(norm.pdf(_QUARTILE)) / IQR_PER_SD / sqrt(n)
-    reach = _Z * sqrt(2.0) * relative * iqr
-    what = f"where 95 % of other samples' IQRs lie, after the paper's {n} normal values"
-    return Range(iqr - reach, iqr + reach, what)
-
-
-def spearman_interval(rho: float, n: int) -> Range:
-    """Where the rank correlation lies that gave rho in n pairs (Bonett and Wright 2000)."""
-    reach = _Z * sqrt((1.0 + rho**2 / 2.0) / (n - 3))
-    what = f"95 % interval of the paper's rho of {n} pairs"
-    return Range(tanh(atanh(rho) - reach), tanh(atanh(rho) + reach), what)
-
-
-def spearman_p(rho: float, n: int) -> float:
-    """Two-sided p of a rank correlation by the t approximation."""
-    return float(2.0 * t.sf(abs(rho) * sqrt((n - 2) / (1.0 - rho**2)), n - 2))
-
-
-def kendall_p(tau: float, n: int) -> float:
-    """Two-sided p of a Kendall correlation without ties by the normal approximation."""
-    return float(2.0 * norm.sf(abs(tau) * sqrt(9.0 * n * (n - 1) / (2.0 * (2.0 * n + 5.0)))))
-
-
-def spearman_threshold(p: float, n: int) -> float:
-    """The smallest absolute rank correlation of n pairs that has a p below this."""
-    critical = float(t.ppf(1.0 - p / 2.0, n - 2))
-    return critical / sqrt(n - 2 + critical**2)
-
-
-def insignificant(p: float, n: int) -> Range:
-    """Rank correlations that n pairs cannot tell from none."""
-    threshold = spearman_threshold(p, n)
-    what = f"not significant in the paper: smaller than the threshold of p = {p:g} at n = {n}"
-    return Range(-threshold, threshold, what)
 
 
 class NotComputed(Exception):
@@ -135,13 +26,16 @@ class NotComputed(Exception):
 
 @dataclass(frozen=True)
 class Run:
-    """Tables by name, and the rule of the study by which a fit has failed, where it has one.
+    """What a run found.
 
-    Of a paper of one specimen these are the rows of that specimen.
+    Attributes
+    ----------
+    tables : by name; of a paper of one specimen the rows of that specimen.
+    asked : settings of the study that claims look at, by name.
     """
 
     tables: Mapping[str, pd.DataFrame]
-    failed_when: Literal["all", "any"] = "all"
+    asked: Mapping[str, Any] = field(default_factory=dict)
 
     def rows(self, table: str, **where: Any) -> pd.DataFrame:
         """Rows whose columns have the given values, at least one.
@@ -173,6 +67,20 @@ class Run:
             told = str(row.get("message") or "nothing is in this dataset")
             raise NotComputed(f"{column} is empty in {table}: {told}")
         return float(row[column])
+
+
+@dataclass(frozen=True)
+class Range:
+    """A closed range, None for an open end, and what it is in words."""
+
+    low: float | None
+    high: float | None
+    what: str
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies in it, ends included."""
+        above = self.low is None or value >= self.low
+        return above and (self.high is None or value <= self.high)
 
 
 class Verdict(StrEnum):
@@ -225,6 +133,11 @@ class Claim:
     note: str = ""
     contradicted: str = ""
     evidence: Verdict = Verdict.INSIDE
+
+
+def judged(claims: tuple[Claim, ...], run: Run) -> list[Mapping[str, Any]]:
+    """All rows of the table, in the order of the claims."""
+    return [judge(claim, run) for claim in claims]
 
 
 def judge(claim: Claim, run: Run) -> dict[str, Any]:
@@ -283,14 +196,6 @@ def _factor(claim: Claim, ours: Ours | None) -> str:
     return f"ours is {ours.value / paper:.2g} times the paper's"
 
 
-Rows = list[Mapping[str, Any]]
-
-
-def judged(claims: tuple[Claim, ...], run: Run) -> Rows:
-    """All rows of the table, in the order of the claims."""
-    return [judge(claim, run) for claim in claims]
-
-
 def tested(run: Run, test: str, **where: Any) -> pd.DataFrame:
     """Tests that have a result and whose name begins like this, in any case; at least one."""
     rows = run.rows("statistics", **where)
@@ -300,3 +205,93 @@ def tested(run: Run, test: str, **where: Any) -> pd.DataFrame:
         messages = [str(text) for text in rows["message"].unique() if text]
         raise NotComputed("; ".join(["no such test has a result", *messages[:1]]))
     return done
+
+
+def exactly(value: float) -> Range:
+    """A count or a yes or no."""
+    return Range(value, value, "the paper's value itself")
+
+
+def at_most(bound: float) -> Range:
+    """Zero to a bound that the paper states."""
+    return Range(0.0, bound, "below the paper's bound")
+
+
+def no_larger(value: float) -> Range:
+    """Zero to twice the error of one model, printed without any spread."""
+    return Range(0.0, 2.0 * value, "up to twice the paper's value: a smaller error agrees")
+
+
+def factor_of_two(value: float) -> Range:
+    """Half to twice a value that is printed without any spread."""
+    what = "half to twice the paper's value, chosen here: no uncertainty of it is printed"
+    return Range(value / 2.0, value * 2.0, what)
+
+
+def within_width(value: float, width: float, name: str) -> Range:
+    """A median and the width of a spread around it whose ends are not printed."""
+    what = (
+        f"the paper's value less and plus its {name}: the ends are not printed, "
+        "but lie no farther from the median than this width"
+    )
+    return Range(max(value - width, 0.0), value + width, what)
+
+
+def half_width(value: float, iqr: float) -> Range:
+    """A median and the IQR of values that are normal by construction."""
+    what = "the paper's IQR, taken as centred on its median"
+    return Range(value - iqr / 2.0, value + iqr / 2.0, what)
+
+
+def binomial(count: int, of: int) -> Range:
+    """Where the share lies, in percent, that gave this count."""
+    return Range(*wilson_percent(count, of), f"95 % Wilson interval of the paper's {count} of {of}")
+
+
+def wilson_percent(count: int, of: int) -> tuple[float, float]:
+    """Ends of the 95 % Wilson interval of a share, percent."""
+    low, high = proportion_confint(count, of, alpha=1.0 - LEVEL, method="wilson")
+    ends = (0.0 if count == 0 else float(low)), (1.0 if count == of else float(high))
+    return 100.0 * ends[0], 100.0 * ends[1]  # rounding would exclude a share of none or all
+
+
+def normal_iqr(iqr: float, n: int) -> Range:
+    """Where the IQR of another sample of the normal distribution lies of which n had this IQR.
+
+    The asymptotic standard error of an IQR is SD / (2 phi(z) sqrt(n)), z the upper quartile; the
+    other sample is taken to be as large.
+    """
+    relative = 0.5 / float(norm.pdf(_QUARTILE)) / IQR_PER_SD / sqrt(n)
+    reach = _Z * sqrt(2.0) * relative * iqr
+    what = f"where 95 % of other samples' IQRs lie, after the paper's {n} normal values"
+    return Range(iqr - reach, iqr + reach, what)
+
+
+def spearman_interval(rho: float, n: int) -> Range:
+    """Where the rank correlation lies that gave rho in n pairs (Bonett and Wright 2000)."""
+    reach = _Z * sqrt((1.0 + rho**2 / 2.0) / (n - 3))
+    what = f"95 % interval of the paper's rho of {n} pairs"
+    return Range(tanh(atanh(rho) - reach), tanh(atanh(rho) + reach), what)
+
+
+def insignificant(p: float, n: int) -> Range:
+    """Rank correlations that n pairs cannot tell from none."""
+    threshold = spearman_threshold(p, n)
+    what = f"not significant in the paper: smaller than the threshold of p = {p:g} at n = {n}"
+    return Range(-threshold, threshold, what)
+
+
+def spearman_threshold(p: float, n: int) -> float:
+    """The smallest absolute rank correlation of n pairs that has a p below this."""
+    critical = float(t.ppf(1.0 - p / 2.0, n - 2))
+    return critical / sqrt(n - 2 + critical**2)
+
+
+def spearman_p(rho: float, n: int) -> float:
+    """Two-sided p of a rank correlation by the t approximation."""
+    return float(2.0 * t.sf(abs(rho) * sqrt((n - 2) / (1.0 - rho**2)), n - 2))
+
+
+def kendall_p(tau: float, n: int) -> float:
+    """Two-sided p of a Kendall correlation without ties by the normal approximation."""
+    return float(2.0 * norm.sf(abs(tau) * sqrt(9.0 * n * (n - 1) / (2.0 * (2.0 * n + 5.0)))))

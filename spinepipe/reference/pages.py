@@ -30,23 +30,241 @@ from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_kind
 from spinepipe.tables.schema import Column, Table
 
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table; a bar inside a cell is escaped."""
-    lines = [_line(head), _line(["---"] * len(head))]
-    return "\n".join([*lines, *(_line(row) for row in rows)])
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def code(text: str) -> str:
-    """Text as it is typed."""
-    return f"`{text}`"
-
-
 _HEAD = ("parameter", "unit", "bounds", "off", "default", "prior SD", "meaning")
+
+Schema = Mapping[str, Any]
+_WORDS: dict[str, str] = {
+    "string": "text",
+    "number": "number",
+    "integer": "integer",
+    "boolean": "true or false",
+    "object": "mapping",
+    "null": "null",
+}
+
+_LIMITS = (
+    ("minimum", "at least {}"),
+    ("exclusiveMinimum", "above {}"),
+    ("maximum", "at most {}"),
+    ("exclusiveMaximum", "below {}"),
+    ("minItems", "at least {} of them"),
+)
+
+DOCS = "docs"
+END = "<!-- end of generated -->"
+_PART = re.compile(rf"<!-- generated: (.+?) -->\n.*?{re.escape(END)}", re.DOTALL)
+
+
+def outdated(root: Path) -> list[Path]:
+    """Pages whose generated parts differ from what the code says."""
+    texts = ((path, path.read_text(encoding="utf-8")) for path in pages(root))
+    return [path for path, text in texts if refreshed(text, path.name) != text]
+
+
+def pages(root: Path) -> list[Path]:
+    """All pages of the documentation."""
+    return sorted((root / DOCS).rglob("*.md"))
+
+
+def refreshed(text: str, page: str) -> str:
+    """A page with all its generated parts as they should be.
+
+    Raises
+    ------
+    InputError
+        For a marker that names nothing known, or one without an end.
+    """
+    if text.count("<!-- generated: ") != len(_PART.findall(text)):
+        problem = Problem(page, None, None, "a marker without an end", END, "add it")
+        raise InputError([problem])
+    return _PART.sub(lambda found: _part(found[1], page), text)
+
+
+def names_in(text: str) -> list[str]:
+    """Names of the generated parts of a page."""
+    return [found[1] for found in _PART.finditer(text)]
+
+
+def _part(name: str, page: str) -> str:
+    known = generators()
+    if name not in known:
+        remedy = did_you_mean(name, known, "correct the marker")
+        raise InputError([Problem(page, None, None, f"'{name}'", one_of(known), remedy)])
+    return f"<!-- generated: {name} -->\n\n{known[name]()}\n\n{END}"
+
+
+@cache
+def generators() -> dict[str, Callable[[], str]]:
+    """Every part that can be generated, by the name that pages use."""
+    parts: dict[str, Callable[[], str]] = {"effects": effects}
+    kinds = every_kind()
+    parts |= {
+        f"table {shape.name}": partial(result_table, shape)
+        for kind in kinds.values()
+        for shape in kind.tables
+    }
+    parts |= {
+        f"cohort {name}": partial(cohort_table, form)
+        for name, form in cohort_columns.TABLES.items()
+    }
+    parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
+    parts["keys config.yaml"] = partial(key_table, Selection)
+    parts["keys model"] = partial(key_table, ModelFile)
+    parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
+    return parts
+
+
+def result_table(shape: Table) -> str:
+    """Columns of a result table."""
+    rows = [
+        (code(c.name), c.kind, c.unit, _range(c), c.meaning, c.null or "never empty")
+        for c in shape.columns
+    ]
+    key = ", ".join(code(name) for name in shape.key)
+    head = ("column", "type", "unit", "range", "meaning", "an empty cell means")
+    return f"{shape.about}\n\nUnique by {key}.\n\n{table(head, rows)}"
+
+
+def _range(column: Column) -> str:
+    if column.allowed:
+        return ", ".join(code(str(value)) for value in column.allowed)
+    ends = [
+        words.format(f"{end:g}")
+        for words, end in (("at least {}", column.low), ("at most {}", column.high))
+        if end is not None
+    ]
+    return " and ".join(ends)
+
+
+def cohort_table(form: cohort_columns.TableForm) -> str:
+    """Columns of a CSV file of a cohort."""
+    rows = [
+        (
+            f"**{code(c.name)}**" if c.required else code(c.name),
+            c.kind,
+            c.range_text,
+            c.meaning,
+            "not allowed" if c.required else "allowed",
+        )
+        for c in form.columns
+    ]
+    keys = ", ".join(code(name) for name in form.keys)
+    more = " Further columns are carried through as text." if form.carries else ""
+    head = ("column", "type", "range", "meaning", "an empty cell")
+    return f"One row per {form.row}; unique by {keys}.{more}\n\n{table(head, rows)}"
+
+
+def key_table(model: type[BaseModel]) -> str:
+    """One line per key, nested ones dotted: key, type, default, range, meaning."""
+    schema = model.model_json_schema()
+    rows = list(_rows(schema, schema, ""))
+    return table(("key", "type", "default", "allowed", "meaning"), rows)
+
+
+def _rows(whole: Schema, part: Schema, prefix: str) -> Iterator[tuple[str, ...]]:
+    """Rows of a mapping's keys; a nested mapping is told key by key."""
+    required = part.get("required", ())
+    for name, given in part.get("properties", {}).items():
+        field = _resolved(whole, given)
+        key = f"{prefix}{name}"
+        inner = _resolved(whole, field.get("items", {}))
+        if "properties" in field:
+            yield (
+                code(key),
+                "mapping",
+                _default(given, name in required),
+                "the keys below",
+                field["told"],
+            )
+            yield from _rows(whole, field, f"{key}.")
+        elif "properties" in inner:
+            yield (
+                code(key),
+                "list of mappings",
+                _default(given, name in required),
+                "the keys below, for each",
+                field["told"],
+            )
+            yield from _rows(whole, inner, f"{key}[].")
+        elif "discriminator" in inner:
+            forms = inner["discriminator"]
+            one_of = f"the keys of one form, by `{forms['propertyName']}`"
+            yield (
+                code(key),
+                "list of mappings",
+                _default(given, name in required),
+                one_of,
+                field["told"],
+            )
+            for form, reference in forms["mapping"].items():
+                yield from _rows(whole, _resolved(whole, {"$ref": reference}), f"{key}[{form}].")
+        else:
+            default = _default(given, name in required)
+            yield code(key), _type(whole, field), default, _allowed(whole, field), field["told"]
+
+
+def _resolved(whole: Schema, given: Schema) -> dict[str, Any]:
+    """A schema with its reference followed; ``told`` is what is said where it is used."""
+    told = given.get("description", "")
+    reference = given.get("$ref")
+    for choice in given.get("anyOf", ()):
+        reference = reference or choice.get("$ref")
+    if reference is None:
+        return {**given, "told": told}
+    definition = whole["$defs"][reference.rsplit("/", 1)[1]]
+    return {**definition, "told": told}
+
+
+def _choices(field: Schema) -> list[Schema]:
+    return list(field.get("anyOf", [field]))
+
+
+def _type(whole: Schema, field: Schema) -> str:
+    words = []
+    for choice in _choices(field):
+        kind: str = choice.get("type", "string" if "const" in choice or "enum" in choice else "any")
+        if kind == "array":
+            inner = _type(whole, _resolved(whole, choice.get("items", {})))
+            words.append(f"list of {inner}")
+        else:
+            words.append(_WORDS.get(kind, kind))
+    return " or ".join(words)
+
+
+def _default(given: Schema, required: bool) -> str:
+    if required:
+        return "**required**"
+    if "default" not in given:
+        return ""
+    return code(_value(given["default"]))
+
+
+def _value(value: object) -> str:
+    """A value as YAML writes it."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_value(item)}" for key, item in value.items()) + "}"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _allowed(whole: Schema, field: Schema) -> str:
+    parts = []
+    for choice in _choices(field):
+        if "const" in choice:
+            parts.append(code(_value(choice["const"])))
+        if "enum" in choice:
+            parts.append(", ".join(code(_value(value)) for value in choice["enum"]))
+        if "pattern" in choice:
+            parts.append(code(choice["pattern"]))
+        parts += [words.format(_value(choice[key])) for key, words in _LIMITS if key in choice]
+        if choice.get("type") == "array":
+            parts.append(_allowed(whole, _resolved(whole, choice.get("items", {}))))
+    return "; ".join(part for part in parts if part)
 
 
 def effects() -> str:
@@ -161,238 +379,16 @@ def _search(trial: Trial | None) -> str:
     return f"In a search its values may be: {spreads}. What shows it: {trial.told_by}."
 
 
-Schema = Mapping[str, Any]
-_WORDS: dict[str, str] = {
-    "string": "text",
-    "number": "number",
-    "integer": "integer",
-    "boolean": "true or false",
-    "object": "mapping",
-    "null": "null",
-}
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; a bar inside a cell is escaped."""
+    lines = [_line(head), _line(["---"] * len(head))]
+    return "\n".join([*lines, *(_line(row) for row in rows)])
 
 
-def key_table(model: type[BaseModel]) -> str:
-    """One line per key, nested ones dotted: key, type, default, range, meaning."""
-    schema = model.model_json_schema()
-    rows = list(_rows(schema, schema, ""))
-    return table(("key", "type", "default", "allowed", "meaning"), rows)
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _rows(whole: Schema, part: Schema, prefix: str) -> Iterator[tuple[str, ...]]:
-    """Rows of a mapping's keys; a nested mapping is told key by key."""
-    required = part.get("required", ())
-    for name, given in part.get("properties", {}).items():
-        field = _resolved(whole, given)
-        key = f"{prefix}{name}"
-        inner = _resolved(whole, field.get("items", {}))
-        if "properties" in field:
-            yield (
-                code(key),
-                "mapping",
-                _default(given, name in required),
-                "the keys below",
-                field["told"],
-            )
-            yield from _rows(whole, field, f"{key}.")
-        elif "properties" in inner:
-            yield (
-                code(key),
-                "list of mappings",
-                _default(given, name in required),
-                "the keys below, for each",
-                field["told"],
-            )
-            yield from _rows(whole, inner, f"{key}[].")
-        elif "discriminator" in inner:
-            forms = inner["discriminator"]
-            one_of = f"the keys of one form, by `{forms['propertyName']}`"
-            yield (
-                code(key),
-                "list of mappings",
-                _default(given, name in required),
-                one_of,
-                field["told"],
-            )
-            for form, reference in forms["mapping"].items():
-                yield from _rows(whole, _resolved(whole, {"$ref": reference}), f"{key}[{form}].")
-        else:
-            default = _default(given, name in required)
-            yield code(key), _type(whole, field), default, _allowed(whole, field), field["told"]
-
-
-def _resolved(whole: Schema, given: Schema) -> dict[str, Any]:
-    """A schema with its reference followed; ``told`` is what is said where it is used."""
-    told = given.get("description", "")
-    reference = given.get("$ref")
-    for choice in given.get("anyOf", ()):
-        reference = reference or choice.get("$ref")
-    if reference is None:
-        return {**given, "told": told}
-    definition = whole["$defs"][reference.rsplit("/", 1)[1]]
-    return {**definition, "told": told}
-
-
-def _choices(field: Schema) -> list[Schema]:
-    return list(field.get("anyOf", [field]))
-
-
-def _type(whole: Schema, field: Schema) -> str:
-    words = []
-    for choice in _choices(field):
-        kind: str = choice.get("type", "string" if "const" in choice or "enum" in choice else "any")
-        if kind == "array":
-            inner = _type(whole, _resolved(whole, choice.get("items", {})))
-            words.append(f"list of {inner}")
-        else:
-            words.append(_WORDS.get(kind, kind))
-    return " or ".join(words)
-
-
-def _default(given: Schema, required: bool) -> str:
-    if required:
-        return "**required**"
-    if "default" not in given:
-        return ""
-    return code(_value(given["default"]))
-
-
-def _value(value: object) -> str:
-    """A value as YAML writes it."""
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_value(item)}" for key, item in value.items()) + "}"
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
-
-
-_LIMITS = (
-    ("minimum", "at least {}"),
-    ("exclusiveMinimum", "above {}"),
-    ("maximum", "at most {}"),
-    ("exclusiveMaximum", "below {}"),
-    ("minItems", "at least {} of them"),
-)
-
-
-def _allowed(whole: Schema, field: Schema) -> str:
-    parts = []
-    for choice in _choices(field):
-        if "const" in choice:
-            parts.append(code(_value(choice["const"])))
-        if "enum" in choice:
-            parts.append(", ".join(code(_value(value)) for value in choice["enum"]))
-        if "pattern" in choice:
-            parts.append(code(choice["pattern"]))
-        parts += [words.format(_value(choice[key])) for key, words in _LIMITS if key in choice]
-        if choice.get("type") == "array":
-            parts.append(_allowed(whole, _resolved(whole, choice.get("items", {}))))
-    return "; ".join(part for part in parts if part)
-
-
-DOCS = "docs"
-END = "<!-- end of generated -->"
-_PART = re.compile(rf"<!-- generated: (.+?) -->\n.*?{re.escape(END)}", re.DOTALL)
-
-
-@cache
-def generators() -> dict[str, Callable[[], str]]:
-    """Every part that can be generated, by the name that pages use."""
-    parts: dict[str, Callable[[], str]] = {"effects": effects}
-    kinds = every_kind()
-    parts |= {
-        f"table {shape.name}": partial(result_table, shape)
-        for kind in kinds.values()
-        for shape in kind.tables
-    }
-    parts |= {
-        f"cohort {name}": partial(cohort_table, form)
-        for name, form in cohort_columns.TABLES.items()
-    }
-    parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
-    parts["keys config.yaml"] = partial(key_table, Selection)
-    parts["keys model"] = partial(key_table, ModelFile)
-    parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
-    return parts
-
-
-def result_table(shape: Table) -> str:
-    """Columns of a result table."""
-    rows = [
-        (code(c.name), c.kind, c.unit, _range(c), c.meaning, c.null or "never empty")
-        for c in shape.columns
-    ]
-    key = ", ".join(code(name) for name in shape.key)
-    head = ("column", "type", "unit", "range", "meaning", "an empty cell means")
-    return f"{shape.about}\n\nUnique by {key}.\n\n{table(head, rows)}"
-
-
-def _range(column: Column) -> str:
-    if column.allowed:
-        return ", ".join(code(str(value)) for value in column.allowed)
-    ends = [
-        words.format(f"{end:g}")
-        for words, end in (("at least {}", column.low), ("at most {}", column.high))
-        if end is not None
-    ]
-    return " and ".join(ends)
-
-
-def cohort_table(form: cohort_columns.TableForm) -> str:
-    """Columns of a CSV file of a cohort."""
-    rows = [
-        (
-            f"**{code(c.name)}**" if c.required else code(c.name),
-            c.kind,
-            c.range_text,
-            c.meaning,
-            "not allowed" if c.required else "allowed",
-        )
-        for c in form.columns
-    ]
-    keys = ", ".join(code(name) for name in form.keys)
-    more = " Further columns are carried through as text." if form.carries else ""
-    head = ("column", "type", "range", "meaning", "an empty cell")
-    return f"One row per {form.row}; unique by {keys}.{more}\n\n{table(head, rows)}"
-
-
-def refreshed(text: str, page: str) -> str:
-    """A page with all its generated parts as they should be.
-
-    Raises
-    ------
-    InputError
-        For a marker that names nothing known, or one without an end.
-    """
-    if text.count("<!-- generated: ") != len(_PART.findall(text)):
-        problem = Problem(page, None, None, "a marker without an end", END, "add it")
-        raise InputError([problem])
-    return _PART.sub(lambda found: _part(found[1], page), text)
-
-
-def _part(name: str, page: str) -> str:
-    known = generators()
-    if name not in known:
-        remedy = did_you_mean(name, known, "correct the marker")
-        raise InputError([Problem(page, None, None, f"'{name}'", one_of(known), remedy)])
-    return f"<!-- generated: {name} -->\n\n{known[name]()}\n\n{END}"
-
-
-def pages(root: Path) -> list[Path]:
-    """All pages of the documentation."""
-    return sorted((root / DOCS).rglob("*.md"))
-
-
-def outdated(root: Path) -> list[Path]:
-    """Pages whose generated parts differ from what the code says."""
-    texts = ((path, path.read_text(encoding="utf-8")) for path in pages(root))
-    return [path for path, text in texts if refreshed(text, path.name) != text]
-
-
-def names_in(text: str) -> list[str]:
-    """Names of the generated parts of a page."""
-    return [found[1] for found in _PART.finditer(text)]
+def code(text: str) -> str:
+    """Text as it is typed."""
+    return f"`{text}`"

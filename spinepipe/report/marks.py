@@ -122,8 +122,7 @@ def draw_strip(
 
 def spread_out(n: int) -> Array:
     """(n,) between -0.5 and 0.5, evenly mixed and always alike: where dots of a row stand in it."""
-    places: Array = np.arange(n, dtype=np.float64) * _GOLDEN % 1.0 - 0.5
-    return places
+    return np.asarray(np.arange(n) * _GOLDEN % 1.0 - 0.5, dtype=np.float64)
 
 
 def draw_interval(

@@ -24,6 +24,21 @@ from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, blank
 from spinepipe.report.words import count
 from spinepipe.units import MM_PER_M
 
+AXIS_COLORS = {"anterior": VERMILLION, "superior": GREEN, "right": BLUE}
+"""Colours of the x, y and z axes of joint frames."""
+
+_LINES = (
+    ("inferior_endplate_centre", "superior_endplate_centre"),
+    ("left_pedicle_base", "right_pedicle_base"),
+)
+
+_ARROW_SHARE = 0.16
+_TRIAD_SHARE = 0.3
+_LABEL_X, _LABEL_Y = 0.04, 0.085
+"""Where a load is described, beside its arrow, as shares of the height."""
+
+_HEIGHT_MM, _WIDTH_MM = 150.0, 140.0
+
 
 @dataclass(frozen=True)
 class SpecimenView:
@@ -61,29 +76,17 @@ def view_of(
         z right.
     """
     shift = np.array(load_shift_mm) / MM_PER_M
-    asked = () if cohort.loads is None else tests or cohort.tests
+    asked = tests or cohort.tests
+    tested = (
+        () if cohort.loads is None else measured_specimen(cohort, specimen, asked, shift).tested
+    )
     return SpecimenView(
         specimen=specimen,
         frames=joint_frames(cohort, specimen),
         points={} if cohort.landmarks is None else landmarks(cohort, specimen),
         bodies=tuple(body for body in bodies(cohort, specimen) if body.mass > 0.0),
-        tested=measured_specimen(cohort, specimen, asked, shift).tested,
+        tested=tested,
     )
-
-
-AXIS_COLORS = {"anterior": VERMILLION, "superior": GREEN, "right": BLUE}
-"""Colours of the x, y and z axes of joint frames."""
-
-_LINES = (
-    ("inferior_endplate_centre", "superior_endplate_centre"),
-    ("left_pedicle_base", "right_pedicle_base"),
-)
-_ARROW_SHARE = 0.16
-_TRIAD_SHARE = 0.3
-_LABEL_X, _LABEL_Y = 0.04, 0.085
-"""Where a load is described, beside its arrow, as shares of the height."""
-
-_HEIGHT_MM, _WIDTH_MM = 150.0, 140.0
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,7 @@ class _Side:
 
 
 SAGITTAL = _Side("Sagittal, from the right", 0, "x, anterior (mm)", 2, 1)
+
 FRONTAL = _Side("Frontal, from behind", 2, "z, right (mm)", 0, -1)
 
 
@@ -226,10 +230,6 @@ def _loads(axis: Axes, side: _Side, view: SpecimenView, size: float) -> None:
         axis.update_datalim([np.add(corner, (0.3 * size, 0.05 * size))])
 
 
-def _spot(point: Array) -> tuple[float, float]:
-    return float(point[0]), float(point[1])
-
-
 def largest_load(case: LoadCase) -> tuple[Wrench, ...]:
     """Loads of the step of a test with the largest forces, or moments where there is no force."""
 
@@ -239,6 +239,10 @@ def largest_load(case: LoadCase) -> tuple[Wrench, ...]:
         return round(force, 9), moment
 
     return max((step.wrenches for step in case.steps), key=total)
+
+
+def _spot(point: Array) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _arc(axis: Axes, at: Array, moment: float, radius: float) -> None:

@@ -23,50 +23,33 @@ from spinepipe.tables import Tables
 from spinepipe.tables.schema import Column
 
 _VERSION = "version_"
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Where the tables come from.
-
-    Attributes
-    ----------
-    facts : name and value of what all tables agree on; where they do not, every value.
-    digests : table, digest of the code that made it and digest of its settings.
-    settings : all settings of the study as YAML.
-    """
-
-    facts: tuple[tuple[str, str], ...]
-    digests: tuple[tuple[str, str, str], ...]
-    settings: str
-
-
-def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
-    """What the metadata of all tables say, in alphabetical order."""
-    settings = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-    digests = tuple(
-        (name, found.get("code_digest", ""), found.get("config_digest", ""))
-        for name, found in sorted(metadata.items())
-    )
-    return Origin(tuple(_facts(metadata)), digests, settings)
-
-
 _OF_A_TABLE = ("code_digest", "config_digest", "specimens_digest", KEY)
 """What differs from table to table."""
 
+MOST_ROWS = 400
+"""More rows than this are left to the file of the table."""
 
-def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
-    names = sorted({name for found in metadata.values() for name in found})
-    plain = [name for name in names if not name.startswith(_VERSION)]
-    versions = [name for name in names if name.startswith(_VERSION)]
-    facts = []
-    for name in [*plain, *versions]:
-        if name in _OF_A_TABLE or name == "pandas":
-            continue
-        values = sorted({found[name] for found in metadata.values() if name in found})
-        label = name.removeprefix(_VERSION) if name in versions else name.replace("_", " ")
-        facts.append((label, ", ".join(values)))
-    return facts
+_NUMERIC = ("number", "integer")
+
+_SAME = ("specimen", "status")
+
+_UNITS: Mapping[str, str] = {
+    "see unit": "",
+    "mm or deg, see unit": "",
+    "N/m or N m/rad, see unit": "",
+    "mm2, deg2": "",
+}
+
+_MOST_NAMES, _MOST_SHOWN = 12, 6
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The answer in one sentence, how sure it is, and what casts doubt on it."""
+
+    words: str
+    how_sure: str
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -104,30 +87,6 @@ class Results:
         return self.tables.get(name, pd.DataFrame())
 
 
-def judged(rows: pd.DataFrame) -> str:
-    """The same of any table of published quantities with verdicts."""
-    if rows.empty:
-        return ""
-    found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
-    inside, outside = found.get("inside", 0), found.get("outside", 0)
-    others = (
-        ("circular", "are what the cohort was built to have"),
-        ("recomputed", "only follow from the paper's own numbers"),
-        ("contradicted", "are contradicted by other numbers of the paper and not chased"),
-        ("not_computed", "are not computed"),
-    )
-    told = [f"{found[name]} {words}" for name, words in others if name in found]
-    words = (
-        f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
-        f"outside for {outside}"
-    )
-    return "; ".join(part for part in (words, ", ".join(told)) if part) + "."
-
-
-MOST_ROWS = 400
-"""More rows than this are left to the file of the table."""
-
-
 @dataclass(frozen=True)
 class Head:
     """A column's heading; ``meaning`` is its tooltip."""
@@ -161,82 +120,6 @@ class Sortable:
     heads: tuple[Head, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str
-
-
-def sortable(
-    name: str,
-    title: str,
-    about: str,
-    frame: pd.DataFrame,
-    columns: Sequence[Column],
-) -> Sortable:
-    """Rows of a frame.
-
-    Columns that say nothing are left out: all empty, or the one specimen or status of all rows.
-    """
-    kept = [c for c in columns if c.name in frame and _says_something(frame[c.name])]
-    shown = frame.head(MOST_ROWS)
-    note = ""
-    if len(frame) > len(shown):
-        note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {name}.parquet."
-    values = [[_cell(value, c) for value in shown[c.name]] for c in kept]
-    heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.kind in _NUMERIC) for c in kept)
-    return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note)
-
-
-_NUMERIC = ("number", "integer")
-_SAME = ("specimen", "status")
-_UNITS: Mapping[str, str] = {
-    "see unit": "",
-    "mm or deg, see unit": "",
-    "N/m or N m/rad, see unit": "",
-    "mm2, deg2": "",
-}
-
-
-def _unit(column: Column) -> str:
-    return _UNITS.get(column.unit, column.unit)
-
-
-def _meaning(column: Column) -> str:
-    empty = f"; empty: {column.null}" if column.null else ""
-    return f"{column.meaning}{empty}"
-
-
-def _title(column: Column) -> str:
-    """Name without the unit, which stands beside it."""
-    name = column.name.removesuffix(f"_{column.unit}") if column.unit else column.name
-    return name.replace("_", " ")
-
-
-def _says_something(values: pd.Series) -> bool:
-    if values.name in _SAME and values.nunique() <= 1:
-        return False
-    return bool((values.notna() & (values != "")).any())
-
-
-def _cell(value: Any, column: Column) -> Cell:
-    if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
-        return Cell("", None)
-    if column.kind == "number":
-        return Cell(number(float(value)), float(value))
-    if column.kind == "integer":
-        return Cell(f"{int(value):,}".replace(",", "\u2009"), float(value))
-    if column.kind == "flag":
-        return Cell("yes" if value else "no", None)
-    return Cell(str(value), None)
-
-
-_MOST_NAMES, _MOST_SHOWN = 12, 6
-
-
-@dataclass(frozen=True)
-class Headline:
-    """The answer in one sentence, how sure it is, and what casts doubt on it."""
-
-    words: str
-    how_sure: str
-    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,3 +201,117 @@ def _still(view: SpecimenView, cohort: Cohort) -> bytes:
 
 def _address(svg: bytes) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the tables come from.
+
+    Attributes
+    ----------
+    facts : name and value of what all tables agree on; where they do not, every value.
+    digests : table, digest of the code that made it and digest of its settings.
+    settings : all settings of the study as YAML.
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    digests: tuple[tuple[str, str, str], ...]
+    settings: str
+
+
+def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
+    """What the metadata of all tables say, in alphabetical order."""
+    settings = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    digests = tuple(
+        (name, found.get("code_digest", ""), found.get("config_digest", ""))
+        for name, found in sorted(metadata.items())
+    )
+    return Origin(tuple(_facts(metadata)), digests, settings)
+
+
+def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
+    names = sorted({name for found in metadata.values() for name in found})
+    plain = [name for name in names if not name.startswith(_VERSION)]
+    versions = [name for name in names if name.startswith(_VERSION)]
+    facts = []
+    for name in [*plain, *versions]:
+        if name in _OF_A_TABLE or name == "pandas":
+            continue
+        values = sorted({found[name] for found in metadata.values() if name in found})
+        label = name.removeprefix(_VERSION) if name in versions else name.replace("_", " ")
+        facts.append((label, ", ".join(values)))
+    return facts
+
+
+def sortable(
+    name: str,
+    title: str,
+    about: str,
+    frame: pd.DataFrame,
+    columns: Sequence[Column],
+) -> Sortable:
+    """Rows of a frame.
+
+    Columns that say nothing are left out: all empty, or the one specimen or status of all rows.
+    """
+    kept = [c for c in columns if c.name in frame and _says_something(frame[c.name])]
+    shown = frame.head(MOST_ROWS)
+    note = ""
+    if len(frame) > len(shown):
+        note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {name}.parquet."
+    values = [[_cell(value, c) for value in shown[c.name]] for c in kept]
+    heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.kind in _NUMERIC) for c in kept)
+    return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note)
+
+
+def _unit(column: Column) -> str:
+    return _UNITS.get(column.unit, column.unit)
+
+
+def _meaning(column: Column) -> str:
+    empty = f"; empty: {column.null}" if column.null else ""
+    return f"{column.meaning}{empty}"
+
+
+def _title(column: Column) -> str:
+    """Name without the unit, which stands beside it."""
+    name = column.name.removesuffix(f"_{column.unit}") if column.unit else column.name
+    return name.replace("_", " ")
+
+
+def _says_something(values: pd.Series) -> bool:
+    if values.name in _SAME and values.nunique() <= 1:
+        return False
+    return bool((values.notna() & (values != "")).any())
+
+
+def _cell(value: Any, column: Column) -> Cell:
+    if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
+        return Cell("", None)
+    if column.kind == "number":
+        return Cell(number(float(value)), float(value))
+    if column.kind == "integer":
+        return Cell(f"{int(value):,}".replace(",", "\u2009"), float(value))
+    if column.kind == "flag":
+        return Cell("yes" if value else "no", None)
+    return Cell(str(value), None)
+
+
+def judged(rows: pd.DataFrame) -> str:
+    """The same of any table of published quantities with verdicts."""
+    if rows.empty:
+        return ""
+    found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
+    inside, outside = found.get("inside", 0), found.get("outside", 0)
+    others = (
+        ("circular", "are what the cohort was built to have"),
+        ("recomputed", "only follow from the paper's own numbers"),
+        ("contradicted", "are contradicted by other numbers of the paper and not chased"),
+        ("not_computed", "are not computed"),
+    )
+    told = [f"{found[name]} {words}" for name, words in others if name in found]
+    words = (
+        f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
+        f"outside for {outside}"
+    )
+    return "; ".join(part for part in (words, ", ".join(told)) if part) + "."

@@ -1,7 +1,4 @@
-"""3-D view of a segment: vertebrae, its own joint frames, sampled ones, and the loads.
-
-Simple solids for vertebrae: two discs at the endplates, as wide as the pedicles are apart.
-"""
+"""3-D view of a segment: vertebrae, its own joint frames, sampled ones, and the loads."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,75 +25,6 @@ LONE_DISC_MM = 6.0
 _USUAL_RADIUS_MM = 18.0
 _PEDICLES = ("left_pedicle_base", "right_pedicle_base")
 
-
-@dataclass(frozen=True)
-class Solid:
-    """A drum: corners of its lower and upper face, mm.
-
-    Attributes
-    ----------
-    points : (2 * CORNERS + 2, 3) lower ring, upper ring, the two centres.
-    triangles : (n, 3) indices into the points.
-    """
-
-    points: Array
-    triangles: Array
-
-
-def solids(points: Landmarks, frames: Mapping[str, Pose], mm_per_m: float) -> dict[str, Solid]:
-    """Drum of each vertebra; one without endplate centres has none.
-
-    Parameters
-    ----------
-    points : landmarks, m.
-    frames : of each vertebra, the joint frame that gives a lone endplate its tilt.
-    """
-    widths = [
-        float(np.linalg.norm(named[_PEDICLES[1]] - named[_PEDICLES[0]]))
-        for named in points.values()
-        if set(_PEDICLES) <= set(named)
-    ]
-    radius = 0.5 * mm_per_m * float(np.mean(widths)) if widths else _USUAL_RADIUS_MM
-    found = {}
-    for vertebra, named in points.items():
-        ends = _ends(named, frames[vertebra].rotation[:, 1], mm_per_m)
-        if ends is not None:
-            found[vertebra] = _drum(*ends, radius)
-    return found
-
-
-def _ends(named: Mapping[str, Array], up: Array, mm_per_m: float) -> tuple[Array, Array] | None:
-    """Centres of the lower and upper face."""
-    low, high = (named.get(f"{side}_endplate_centre") for side in ("inferior", "superior"))
-    if low is not None and high is not None:
-        return low * mm_per_m, high * mm_per_m
-    if high is not None:
-        return high * mm_per_m - LONE_DISC_MM * up, high * mm_per_m
-    if low is not None:
-        return low * mm_per_m, low * mm_per_m + LONE_DISC_MM * up
-    return None
-
-
-def _drum(low: Array, high: Array, radius: float) -> Solid:
-    axis = (high - low) / np.linalg.norm(high - low)
-    across = np.cross(axis, [1.0, 0.0, 0.0])
-    across /= np.linalg.norm(across)
-    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
-    ring = radius * (
-        np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(axis, across))
-    )
-    points = np.vstack([low + ring, high + ring, low, high])
-    first = np.arange(CORNERS)
-    following = (first + 1) % CORNERS
-    sides = [
-        (first, following, first + CORNERS),
-        (following, following + CORNERS, first + CORNERS),
-        (first, following, np.full(CORNERS, 2 * CORNERS)),
-        (first + CORNERS, following + CORNERS, np.full(CORNERS, 2 * CORNERS + 1)),
-    ]
-    return Solid(points, np.vstack([np.column_stack(side) for side in sides]))
-
-
 MOST_POSES = 100
 GROUPS = {
     "vertebrae": "vertebrae and landmarks",
@@ -121,6 +49,12 @@ def groups_of(drawn: Mapping[str, Any]) -> dict[str, str]:
     """Those of `GROUPS` of which a scene shows something."""
     shown = {trace["meta"] for scene in drawn.values() for trace in scene["data"]}
     return {name: words for name, words in GROUPS.items() if name in shown}
+
+
+def as_script(scene: Mapping[str, Any]) -> str:
+    """JSON that can stand inside a script element, whatever a specimen is called."""
+    text = json.dumps(scene, sort_keys=True, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:
@@ -223,19 +157,6 @@ def _landmarks(view: SpecimenView) -> Iterator[Any]:
     )
 
 
-def _sampled(poses: pd.DataFrame, specimen: str) -> list[Pose]:
-    """Frames of at most so many sampled poses, evenly spaced over all that have frames."""
-    if poses.empty:
-        return []
-    rows = poses[(poses["specimen"] == specimen) & (poses["status"] == Status.CONVERGED.value)]
-    numbers = rows["pose"].unique()
-    step = max(1, -(-len(numbers) // MOST_POSES))
-    kept = rows[rows["pose"].isin(numbers[::step])]
-    origins = kept[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
-    angles = np.deg2rad(kept[[f"{name}_deg" for name in ROTATIONS]].to_numpy(float))
-    return [Pose(rotation_zxy(*a), origin) for a, origin in zip(angles, origins, strict=True)]
-
-
 def _frames(
     frames: list[Pose], group: str, length_mm: float, width: float, opacity: float
 ) -> Iterator[Any]:
@@ -261,6 +182,19 @@ def _frames(
             name=name,
             meta=group,
         )
+
+
+def _sampled(poses: pd.DataFrame, specimen: str) -> list[Pose]:
+    """Frames of at most so many sampled poses, evenly spaced over all that have frames."""
+    if poses.empty:
+        return []
+    rows = poses[(poses["specimen"] == specimen) & (poses["status"] == Status.CONVERGED.value)]
+    numbers = rows["pose"].unique()
+    step = max(1, -(-len(numbers) // MOST_POSES))
+    kept = rows[rows["pose"].isin(numbers[::step])]
+    origins = kept[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
+    angles = np.deg2rad(kept[[f"{name}_deg" for name in ROTATIONS]].to_numpy(float))
+    return [Pose(rotation_zxy(*a), origin) for a, origin in zip(angles, origins, strict=True)]
 
 
 def _loads(view: SpecimenView) -> Iterator[Any]:
@@ -327,7 +261,69 @@ def _lines(ends: list[tuple[Array, Array]]) -> list[list[float | None]]:
     return columns
 
 
-def as_script(scene: Mapping[str, Any]) -> str:
-    """JSON that can stand inside a script element, whatever a specimen is called."""
-    text = json.dumps(scene, sort_keys=True, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+@dataclass(frozen=True)
+class Solid:
+    """A drum: corners of its lower and upper face, mm.
+
+    Attributes
+    ----------
+    points : (2 * CORNERS + 2, 3) lower ring, upper ring, the two centres.
+    triangles : (n, 3) indices into the points.
+    """
+
+    points: Array
+    triangles: Array
+
+
+def solids(points: Landmarks, frames: Mapping[str, Pose], mm_per_m: float) -> dict[str, Solid]:
+    """Drum of each vertebra; one without endplate centres has none.
+
+    Parameters
+    ----------
+    points : landmarks, m.
+    frames : of each vertebra, the joint frame that gives a lone endplate its tilt.
+    """
+    widths = [
+        float(np.linalg.norm(named[_PEDICLES[1]] - named[_PEDICLES[0]]))
+        for named in points.values()
+        if set(_PEDICLES) <= set(named)
+    ]
+    radius = 0.5 * mm_per_m * float(np.mean(widths)) if widths else _USUAL_RADIUS_MM
+    found = {}
+    for vertebra, named in points.items():
+        ends = _ends(named, frames[vertebra].rotation[:, 1], mm_per_m)
+        if ends is not None:
+            found[vertebra] = _drum(*ends, radius)
+    return found
+
+
+def _ends(named: Mapping[str, Array], up: Array, mm_per_m: float) -> tuple[Array, Array] | None:
+    """Centres of the lower and upper face."""
+    low, high = (named.get(f"{side}_endplate_centre") for side in ("inferior", "superior"))
+    if low is not None and high is not None:
+        return low * mm_per_m, high * mm_per_m
+    if high is not None:
+        return high * mm_per_m - LONE_DISC_MM * up, high * mm_per_m
+    if low is not None:
+        return low * mm_per_m, low * mm_per_m + LONE_DISC_MM * up
+    return None
+
+
+def _drum(low: Array, high: Array, radius: float) -> Solid:
+    axis = (high - low) / np.linalg.norm(high - low)
+    across = np.cross(axis, [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+    ring = radius * (
+        np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(axis, across))
+    )
+    points = np.vstack([low + ring, high + ring, low, high])
+    first = np.arange(CORNERS)
+    following = (first + 1) % CORNERS
+    sides = [
+        (first, following, first + CORNERS),
+        (following, following + CORNERS, first + CORNERS),
+        (first, following, np.full(CORNERS, 2 * CORNERS)),
+        (first + CORNERS, following + CORNERS, np.full(CORNERS, 2 * CORNERS + 1)),
+    ]
+    return Solid(points, np.vstack([np.column_stack(side) for side in sides]))

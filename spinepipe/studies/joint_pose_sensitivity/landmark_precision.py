@@ -1,7 +1,4 @@
-"""Job: how errors grow with the landmarks' SD, and the largest SD that will do.
-
-The precision of an input that keeps an output's error below a limit.
-"""
+"""Job: how errors grow with the landmarks' SD, and the largest SD that will do."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,6 +21,9 @@ from spinepipe.tables import from_rows, read_frames, write
 
 CONFIDENCE = (2.5, 97.5)
 
+BOOTSTRAPS = 1000
+COLUMNS = {"translation": "translation_error_mm", "rotation": "rotation_error_deg"}
+
 
 @dataclass(frozen=True)
 class Required:
@@ -36,6 +36,89 @@ class Required:
     low: float | None
     high: float | None
     message: str
+
+
+def run(
+    root: str, study: str, tables: list[str], landmark_precision: str, required_precision: str
+) -> None:
+    """Write both tables from ``precision_errors``."""
+    settings, cohort = study_and_cohort(root, study)
+    asked = settings.landmark_precision
+    spread: list[dict[str, Any]] = []
+    needed: list[dict[str, Any]] = []
+    for (specimen, stiffness), rows in read_frames(tables)["precision_errors"].groupby(
+        ["specimen", "stiffness"], sort=False
+    ):
+        key = {"specimen": specimen, "stiffness": stiffness}
+        found = measured_errors(rows)
+        spread += [{**key, **row} for row in _spread(asked, found)]
+        seed = specimen_seed(settings.seed, f"required/{specimen}/{stiffness}")
+        needed += [{**key, **row} for row in _required(asked, found, seed)]
+    origin = provenance("landmark_precision", settings, cohort)
+    write(from_rows(LANDMARK_PRECISION, spread), landmark_precision, origin)
+    write(from_rows(REQUIRED_PRECISION, needed), required_precision, origin)
+
+
+def measured_errors(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Largest errors by kind of motion: a row per SD, a column per pose; infinite without result.
+
+    Kinds of motion that were not measured are left out; where no pose has a result, none is.
+    """
+    grids = {
+        kind: rows.pivot(index="sd_mm", columns="pose", values=column)
+        for kind, column in COLUMNS.items()
+    }
+    measured = {kind: grid for kind, grid in grids.items() if grid.notna().any(axis=None)}
+    return {kind: grid.fillna(np.inf) for kind, grid in (measured or grids).items()}
+
+
+def _spread(
+    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame]
+) -> Iterator[dict[str, Any]]:
+    for kind, grid in errors.items():
+        limit, unit = _limits(asked)[kind]
+        for sd, values in zip(grid.index, grid.to_numpy(float), strict=True):
+            below = int((values < limit).sum())
+            low, high = proportion_confint(below, len(values), method="wilson")
+            key = {"motion": kind, "sd_mm": float(sd), "unit": unit, "n": len(values)}
+            shares = {"below": below / len(values), "below_low": low, "below_high": high}
+            yield {**key, "limit": limit, **shares, **_quantiles(values)}
+
+
+def _quantiles(values: Array) -> dict[str, Any]:
+    """Quantiles of the errors there are."""
+    known = values[np.isfinite(values)]
+    names = ("median", "p90", "p95", "largest")
+    found = np.percentile(known, [50, 90, 95, 100]).tolist() if len(known) else [None] * 4
+    return {"without_result": len(values) - len(known), **dict(zip(names, found, strict=True))}
+
+
+def _required(
+    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame], seed: int
+) -> Iterator[dict[str, Any]]:
+    relative = {kind: grid / _limits(asked)[kind][0] for kind, grid in errors.items()}
+    if len(relative) > 1:
+        relative["both"] = pd.concat(relative.values()).groupby(level="sd_mm").max()
+    for kind, grid in relative.items():
+        sds, n = grid.index.to_numpy(float), grid.shape[1]
+        found = required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
+        ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
+        numbers = {"sd_mm": found.sd, **ends, "message": found.message}
+        numbers["message"] = "; ".join(filter(None, (found.message, _too_few(n, asked.share))))
+        yield {"motion": kind, "share": asked.share, "n": n, **numbers}
+
+
+def _too_few(n: int, share: float) -> str:
+    """What must be said when not even all poses below the limit would show the share."""
+    low, _ = proportion_confint(n, n, method="wilson")
+    return f"{n} poses cannot show a share of {share:g}: take more" if low < share else ""
+
+
+def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:
+    return {
+        "translation": (asked.translation_limit_mm, "mm"),
+        "rotation": (asked.rotation_limit_deg, "deg"),
+    }
 
 
 def required_precision(
@@ -92,90 +175,3 @@ def _beyond(sds: Array, low: float, high: float) -> str:
     ends = [f"begins below {sds[0]:g} mm"] if low == -np.inf else []
     ends += [f"ends above {sds[-1]:g} mm"] if high == np.inf else []
     return f"the interval {' and '.join(ends)}" if ends else ""
-
-
-BOOTSTRAPS = 1000
-COLUMNS = {"translation": "translation_error_mm", "rotation": "rotation_error_deg"}
-
-
-def run(
-    root: str, study: str, tables: list[str], landmark_precision: str, required_precision: str
-) -> None:
-    """Write both tables from ``precision_errors``."""
-    settings, cohort = study_and_cohort(root, study)
-    asked = settings.landmark_precision
-    spread: list[dict[str, Any]] = []
-    needed: list[dict[str, Any]] = []
-    for (specimen, stiffness), rows in read_frames(tables)["precision_errors"].groupby(
-        ["specimen", "stiffness"], sort=False
-    ):
-        key = {"specimen": specimen, "stiffness": stiffness}
-        found = measured_errors(rows)
-        spread += [{**key, **row} for row in _spread(asked, found)]
-        seed = specimen_seed(settings.seed, f"required/{specimen}/{stiffness}")
-        needed += [{**key, **row} for row in _required(asked, found, seed)]
-    origin = provenance("landmark_precision", settings, cohort)
-    write(from_rows(LANDMARK_PRECISION, spread), landmark_precision, origin)
-    write(from_rows(REQUIRED_PRECISION, needed), required_precision, origin)
-
-
-def measured_errors(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Largest errors by kind of motion: a row per SD, a column per pose; infinite without result.
-
-    Kinds of motion that were not measured are left out; where no pose has a result, none is.
-    """
-    grids = {
-        kind: rows.pivot(index="sd_mm", columns="pose", values=column)
-        for kind, column in COLUMNS.items()
-    }
-    measured = {kind: grid for kind, grid in grids.items() if grid.notna().any(axis=None)}
-    return {kind: grid.fillna(np.inf) for kind, grid in (measured or grids).items()}
-
-
-def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:
-    return {
-        "translation": (asked.translation_limit_mm, "mm"),
-        "rotation": (asked.rotation_limit_deg, "deg"),
-    }
-
-
-def _spread(
-    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame]
-) -> Iterator[dict[str, Any]]:
-    for kind, grid in errors.items():
-        limit, unit = _limits(asked)[kind]
-        for sd, values in zip(grid.index, grid.to_numpy(float), strict=True):
-            below = int((values < limit).sum())
-            low, high = proportion_confint(below, len(values), method="wilson")
-            key = {"motion": kind, "sd_mm": float(sd), "unit": unit, "n": len(values)}
-            shares = {"below": below / len(values), "below_low": low, "below_high": high}
-            yield {**key, "limit": limit, **shares, **_quantiles(values)}
-
-
-def _quantiles(values: Array) -> dict[str, Any]:
-    """Quantiles of the errors there are."""
-    known = values[np.isfinite(values)]
-    names = ("median", "p90", "p95", "largest")
-    found = np.percentile(known, [50, 90, 95, 100]).tolist() if len(known) else [None] * 4
-    return {"without_result": len(values) - len(known), **dict(zip(names, found, strict=True))}
-
-
-def _required(
-    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame], seed: int
-) -> Iterator[dict[str, Any]]:
-    relative = {kind: grid / _limits(asked)[kind][0] for kind, grid in errors.items()}
-    if len(relative) > 1:
-        relative["both"] = pd.concat(relative.values()).groupby(level="sd_mm").max()
-    for kind, grid in relative.items():
-        sds, n = grid.index.to_numpy(float), grid.shape[1]
-        found = required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
-        ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
-        numbers = {"sd_mm": found.sd, **ends, "message": found.message}
-        numbers["message"] = "; ".join(filter(None, (found.message, _too_few(n, asked.share))))
-        yield {"motion": kind, "share": asked.share, "n": n, **numbers}
-
-
-def _too_few(n: int, share: float) -> str:
-    """What must be said when not even all poses below the limit would show the share."""
-    low, _ = proportion_confint(n, n, method="wilson")
-    return f"{n} poses cannot show a share of {share:g}: take more" if low < share else ""

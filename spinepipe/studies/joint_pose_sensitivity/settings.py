@@ -1,7 +1,4 @@
-"""Parts of a joint-pose study beyond its poses: filters, bootstraps, methods, precision.
-
-The study kind that asks how much the landmarks' uncertainty does to stiffness and motion.
-"""
+"""Settings of a joint-pose study: what landmark uncertainty does to stiffness and motion."""
 
 from itertools import pairwise
 from typing import Annotated, Literal, Self

@@ -64,7 +64,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     settings, cohort = study_and_cohort(root, study)
     specimen = cohort.specimen_names[0]  # the paper has one
     frames = {name: _of(frame, specimen) for name, frame in read_frames(tables).items()}
-    rows = judged(CLAIMS, Run(frames, settings.success.failed_when))
+    rows = judged(CLAIMS, Run(frames, {"failed_when": settings.success.failed_when}))
     write(
         from_rows(AGAINST_GOULD_2024A, rows),
         output,

@@ -197,7 +197,7 @@ def _successful(part: str, loading: str) -> Callable[[Run], Ours]:
 
     def ours(run: Run) -> Ours:
         row = run.row("counts", part=part, loading=loading)
-        failed = int(row[f"near_start_{run.failed_when}"])
+        failed = int(row[f"near_start_{run.asked['failed_when']}"])
         return _percent(int(row["solved"]) - failed, int(row["fits"]))
 
     return ours
