@@ -79,11 +79,6 @@ class LoadStep:
     wrenches: tuple[Wrench, ...]
     time: float | None = None
 
-    @property
-    def loaded(self) -> bool:
-        """Whether anything acts; loads that balance each other still press and bend."""
-        return any(wrench.force.any() or wrench.moment.any() for wrench in self.wrenches)
-
 
 @dataclass(frozen=True)
 class LoadCase:

@@ -19,7 +19,7 @@ from spinepipe.cohort.specimen import joint_frames, landmarks, load_cases, spine
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS, SMALLEST_LENGTH_M, SMALLEST_SINE, Pose, joint_pose
-from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,18 @@ def asked_tests(
 def _asked(case: LoadCase, cohort: Cohort, all_steps: bool) -> AskedTest:
     """Joints have no memory, so the largest load can be computed without the steps before it."""
     # where nothing acts in step 0, that is the neutral pose and need not be subtracted
-    from_first = cohort.zeroed_at_step_0 and (cohort.gravity or case.steps[0].loaded)
+    from_first = cohort.zeroed_at_step_0 and (cohort.gravity or _loaded(case.steps[0]))
     if all_steps:
         return AskedTest(case, from_first, slice(None))
     largest = case.steps[peak_step(case)]
     if not from_first or largest is case.steps[0]:
         return AskedTest(replace(case, steps=(largest,)), from_first, slice(None))
     return AskedTest(replace(case, steps=(case.steps[0], largest)), from_first, slice(1, None))
+
+
+def _loaded(step: LoadStep) -> bool:
+    """Whether anything acts; loads that balance each other still press and bend."""
+    return any(wrench.force.any() or wrench.moment.any() for wrench in step.wrenches)
 
 
 Flags = NDArray[np.bool_]

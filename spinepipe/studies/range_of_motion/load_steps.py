@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import peak_step, virtual_load_cases
 from spinepipe.cohort.specimen import load_cases
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.model import LoadCase
+from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
 
@@ -58,10 +58,15 @@ def all_cases(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> tuple[L
 def _asked(case: LoadCase, gravity: bool, all_steps: bool) -> AskedTest:
     """Joints have no memory, so the largest load can be computed without the steps before it."""
     largest = case.steps[peak_step(case)]
-    from_neutral = not gravity and not case.steps[0].loaded
+    from_neutral = not gravity and not _loaded(case.steps[0])
     if all_steps:
         return AskedTest(case, from_neutral, largest.step, slice(None))
     if from_neutral or largest is case.steps[0]:
         return AskedTest(replace(case, steps=(largest,)), from_neutral, largest.step, slice(None))
     both = replace(case, steps=(case.steps[0], largest))
     return AskedTest(both, from_neutral, largest.step, slice(1, None))
+
+
+def _loaded(step: LoadStep) -> bool:
+    """Whether anything acts; loads that balance each other still press and bend."""
+    return any(wrench.force.any() or wrench.moment.any() for wrench in step.wrenches)
