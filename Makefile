@@ -3,8 +3,10 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
+PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) \
+	--dist loadgroup --no-loadscope-reorder
 
-.PHONY: all full test test-kernels lint bench validate report env dev-env lock clean
+.PHONY: all full test test-fast test-kernels lint bench validate report env dev-env lock clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/snakemake -j$(CORES) all
@@ -13,7 +15,10 @@ full: env  ## build the long studies too
 	$(BIN)/snakemake -j$(CORES) full
 
 test: dev-env  ## run all tests
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile
+	$(PYTEST)
+
+test-fast: dev-env  ## run unit and property tests, in a minute
+	$(PYTEST) tests/unit tests/properties -m "not slow"
 
 test-kernels: dev-env  ## numeric tests under each kernel of the linear algebra that this processor can run
 	$(BIN)/python -m tests.kernels -n $(CORES) --dist loadfile

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from spinepipe.jobs.layouts import files_of
 
 from benchmarks.engine import Result, off, with_moments
 from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import MeasuredCase, Problem, fit, pool
-from spinepipe.jobs.layouts import files_of
 from spinepipe.model import LoadCase
 from spinepipe.statics import System, follow, free_parameters, moved
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests

@@ -24,12 +24,16 @@ from spinepipe.calibrate.forward_runs import (
     relative_error,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, specimen_inputs, study_and_cohort
 from spinepipe.model import LoadStep, SpineModel
 from spinepipe.statics import Course, Program, System, settle
 from spinepipe.studies.joint_pose_sensitivity import bootstrap
 from spinepipe.studies.joint_pose_sensitivity import poses as build_models
 from spinepipe.studies.joint_pose_sensitivity import poses as sample_landmarks
+from spinepipe.studies.joint_pose_sensitivity.inputs import (
+    sampled_poses,
+    specimen_inputs,
+    study_and_cohort,
+)
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.success import near_start
 from tests.reference.bridge import system

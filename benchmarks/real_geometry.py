@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow.parquet as pq
+from spinepipe.jobs.layouts import files_of
 
 from benchmarks.study import Run, copy_of_project, run_workflow
-from spinepipe.jobs.layouts import files_of
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.read import check
 

@@ -16,3 +16,7 @@ class Status(StrEnum):
     def usable(self) -> bool:
         """Whether the numbers beside it are a solution."""
         return self in (Status.CONVERGED, Status.CONVERGED_AT_BOUND)
+
+
+USABLE = tuple(status.value for status in Status if status.usable)
+"""Status of rows whose numbers are a solution, as tables have it."""

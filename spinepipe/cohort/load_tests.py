@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.units import COORDINATES
 
-_DRIVEN = ("right_bending", "left_rotation", "extension")
+DRIVEN = ("right_bending", "left_rotation", "extension")
 """Coordinate driven by a moment about x, y and z of ground."""
 
 
@@ -44,7 +44,7 @@ def loaded_coordinate(case: LoadCase) -> str | None:
     largest = moments(case)[peak_step(case)]
     if not largest.any():
         return None
-    coordinate = _DRIVEN[int(np.argmax(np.abs(largest)))]
+    coordinate = DRIVEN[int(np.argmax(np.abs(largest)))]
     assert coordinate in COORDINATES
     return coordinate
 

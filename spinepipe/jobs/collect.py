@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from spinepipe.jobs.digest import code_digest, value_digest
+from spinepipe.jobs.code import code_digest
+from spinepipe.jobs.digest import value_digest
 from spinepipe.marks import KEY
 from spinepipe.studies.registry import kind_of
 from spinepipe.tables import Table, join, metadata_of, read

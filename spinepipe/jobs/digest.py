@@ -1,165 +1,24 @@
-"""Digests that decide what must be computed again: of code, by its meaning, and of values.
+"""What a result file hangs on, as one digest, and where it comes from, for its metadata."""
 
-Snakemake sees neither imported modules nor parts of a configuration, so the rules carry these
-digests in their `params`.
-
-Where a result file comes from: digests, seed and versions, for its Parquet metadata.
-"""
-
-import ast
 import hashlib
 import json
 import platform
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.jobs.code import code_digest
 from spinepipe.marks import KEY
 from spinepipe.studies.registry import PACKAGE, kind_of, place_of
 from spinepipe.studies.study import Study
-
-_ROOT = Path(__file__).resolve().parents[2]
-_PACKAGE = "spinepipe"
-_DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json", ".html", ".css")
-
-
-@cache
-def code_digest(module: str) -> str:
-    """sha256 over a module and everything of spinepipe that it imports, directly or not.
-
-    Comments, docstrings, layout and the version number do not count. The data files that lie
-    beside an imported module (published values) do. Imports are followed where they are written,
-    also inside functions; of modules loaded by a computed name only those are seen that a package
-    takes in by going through its own folder.
-
-    Parameters
-    ----------
-    module
-        Dotted name, for example ``spinepipe.jobs.calibrate``.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        When the module is not part of this package.
-    """
-    if _source(module) is None:
-        raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
-    closure = _closure(module)
-    lines = [f"{name} {_meaning(name)}" for name in sorted(closure)]
-    lines += [_bytes_digest(path) for path in _data_files(closure)]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 def value_digest(*values: Any) -> str:
     """sha256 over plain values (what JSON can hold), independent of the order of keys."""
     text = json.dumps(values, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _closure(module: str) -> set[str]:
-    """The module, its packages and all spinepipe modules they import in turn."""
-    found: set[str] = set()
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        if name not in found:
-            found.add(name)
-            waiting.extend(_imports(name))
-    return found
-
-
-@cache
-def _source(module: str) -> Path | None:
-    """The file of a module of this package, or None if there is no such module."""
-    base = _ROOT.joinpath(*module.split("."))
-    for path in (base / "__init__.py", base.with_suffix(".py")):
-        if path.is_file():
-            return path
-    return None
-
-
-@cache
-def _tree(module: str) -> ast.Module:
-    path = _source(module)
-    return ast.parse(path.read_bytes()) if path else ast.Module(body=[], type_ignores=[])
-
-
-@cache
-def _imports(module: str) -> frozenset[str]:
-    """Modules of spinepipe named in the import statements of one module, and its packages."""
-    names: set[str] = set(_parents(module))
-    for node in ast.walk(_tree(module)):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = _absolute(module, node)
-            names.add(base)
-            names.update(f"{base}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Name) and node.id == "__path__":
-            names.update(_modules_of(module))
-    ours = {name for name in names if name.split(".")[0] == _PACKAGE}
-    with_packages = ours | {parent for name in ours for parent in _parents(name)}
-    return frozenset(name for name in with_packages if _source(name))
-
-
-def _modules_of(package: str) -> list[str]:
-    """The modules in the folder of a package."""
-    path = _source(package)
-    assert path is not None
-    return [f"{package}.{file.stem}" for file in sorted(path.parent.glob("[!_]*.py"))]
-
-
-def _parents(module: str) -> list[str]:
-    parts = module.split(".")
-    return [".".join(parts[:count]) for count in range(1, len(parts))]
-
-
-def _absolute(module: str, node: ast.ImportFrom) -> str:
-    """The full name of what `from ... import` names, with leading dots resolved."""
-    if not node.level:
-        return node.module or ""
-    path = _source(module)
-    drop = node.level - (1 if path and path.name == "__init__.py" else 0)
-    parts = module.split(".")
-    return ".".join(parts[: len(parts) - drop] + ([node.module] if node.module else []))
-
-
-@cache
-def _meaning(module: str) -> str:
-    """Digest of one module's syntax tree without docstrings and version number."""
-    tree = _tree(module)
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [entry for entry in body if not _is_cosmetic(entry)]  # type: ignore[attr-defined]
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-
-
-def _is_cosmetic(node: ast.stmt) -> bool:
-    """A bare string (docstring) or the assignment of ``__version__``."""
-    if isinstance(node, ast.Assign):
-        return any(isinstance(to, ast.Name) and to.id == "__version__" for to in node.targets)
-    return (
-        isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
-    )
-
-
-def _data_files(modules: set[str]) -> list[Path]:
-    """Data files beside the modules, in a fixed order."""
-    folders = {path.parent for name in modules if (path := _source(name))}
-    files = (file for folder in folders for file in folder.iterdir())
-    return sorted(file for file in files if file.suffix in _DATA_SUFFIXES)
-
-
-@cache
-def _bytes_digest(path: Path) -> str:
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return f"{path.relative_to(_ROOT).as_posix()} {digest}"
 
 
 _LIBRARIES = (

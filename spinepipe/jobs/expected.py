@@ -79,32 +79,38 @@ class Expected:
         return report_digest(self.study, self.cohort)
 
     def _specimens(self, job: Job, place: Place) -> tuple[str, ...] | None:
-        if job.specimens == "none":
+        if job.header_alone:
             return ()
-        if "specimen" not in place or job.specimens == "all":
+        if "specimen" not in place:
             return None
         return (place["specimen"],)
 
     def _others(self, job: Job, place: Place) -> list[str]:
         """What else a job reads that decides, as the job itself names it."""
-        base = self._base() if job.reads_base else []
+        base = self._base if job.reads_base else []
         return [*base, *(job.also(self, place) if job.also else [])]
 
+    @cached_property
     def _base(self) -> list[str]:
         """The mark of the model file that the study builds on, also if it is yet to be made."""
         study: Any = self.study
         if study.base is None or study.base.model is None:
             return []
         root = Path(self.root)
-        maker = made_by(root / study.base.model, root)
-        if maker is None:
-            return base_marks(self.root, study.base.model)
-        return [Expected(self.root, *check(root, maker, starting=False)).of_models()]
+        path = root / study.base.model
+        maker = made_by(path, root)
+        if maker is not None:
+            other = Expected(self.root, *check(root, maker, starting=False))
+            job = kind_of(other.study.kind).makes_models
+            if job is not None and path in other.models:
+                return [other.of_job(job, {})]
+        return base_marks(self.root, study.base.model)
 
-    def of_models(self) -> str:
-        """The mark of the model files of the study."""
-        maker = kind_of(self.study.kind).makes_models
-        return self.of_job(maker, {}) if maker else ""
+    @property
+    def models(self) -> list[Path]:
+        """The model files that the study makes."""
+        names = [name for name in self.files.others if name.endswith(".yaml")]
+        return [Path(self.root, self.files.folder, name) for name in names]
 
 
 def place_of(path: str) -> dict[str, str]:

@@ -8,7 +8,9 @@ from spinepipe.studies.base_model import made_by
 
 
 def base_marks(root: str, model: str | None) -> list[str]:
-    """The mark of a model file that a study makes, else the digest of its bytes; none without one.
+    """The mark of a model file among a study's results, else the digest of its bytes.
+
+    Nothing without a file.
 
     Parameters
     ----------
@@ -17,6 +19,5 @@ def base_marks(root: str, model: str | None) -> list[str]:
     if model is None:
         return []
     path = Path(root) / model
-    if made_by(path, Path(root)):
-        return [read_mark(path)]
-    return [sha256(path.read_bytes()).hexdigest()]
+    mark = read_mark(path) if made_by(path, Path(root)) else ""
+    return [mark or sha256(path.read_bytes()).hexdigest()]

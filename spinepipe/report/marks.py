@@ -1,11 +1,4 @@
-"""How a sample is drawn in a row: its density, the middle half, the median, the middle 90 %.
-
-How an estimate with its interval is drawn.
-
-Numbers that are zero but for rounding: an exact fit leaves errors of 1e-16.
-
-How single results are drawn in a row: every one as a dot, their range and their median.
-"""
+"""How samples, single results and intervals are drawn in a row; what is only rounding."""
 
 from dataclasses import dataclass
 
@@ -16,35 +9,21 @@ from scipy.stats import gaussian_kde
 
 from spinepipe.report.style import BLACK, WHITE
 
-CROWDED_ALPHA = 0.5
-
-
-def draw_interval(
-    panel: Axes, x: float, ends: tuple[float, float], y: float, color: str, crowded: bool = False
-) -> None:
-    """A dot with a line from end to end; fainter where many share a row."""
-    alpha = CROWDED_ALPHA if crowded else 1.0
-    panel.plot(ends, [y, y], color=color, lw=1.2, alpha=alpha, solid_capstyle="butt", zorder=3)
-    panel.plot(
-        [x],
-        [y],
-        "o",
-        color=color,
-        ms=3.0 if crowded else 4.0,
-        mec=WHITE,
-        mew=0.4,
-        alpha=alpha,
-        zorder=4,
-        clip_on=False,
-    )
-
-
 Array = NDArray[np.float64]
-
-FEWEST_FOR_DENSITY = 10
 BAR_PT, THIN_BAR_PT = 4.0, 2.5
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+CROWDED_ALPHA = 0.5
+FEWEST_FOR_DENSITY = 10
 KEY = "bar: interquartile range (IQR), tick: median, thin line: 5th to 95th percentile"
+STRIP_KEY = "dot: one fit, line: range, tick: median"
+_MOST_OUTLINES = 400
+"""More dots than this become a picture inside the SVG, which stays small."""
+
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+EXACT_BELOW = 1e-9
+"""Errors below this, mm or degrees, are rounding: no instrument and no fit resolves them."""
+
+EXACT = "exact to rounding"
 
 
 @dataclass(frozen=True)
@@ -60,18 +39,6 @@ class Quartiles:
     def iqr(self) -> float:
         """Interquartile range."""
         return self.high - self.low
-
-
-def finite(values: object) -> Array:
-    """The finite ones of some values as (n,) numbers."""
-    array = np.asarray(values, dtype=float).ravel()
-    return array[np.isfinite(array)]
-
-
-def quartiles(values: Array) -> Quartiles:
-    """Median and quartiles of finite values (n,), n at least 1."""
-    low, median, high = np.percentile(values, [25.0, 50.0, 75.0])
-    return Quartiles(float(low), float(median), float(high), len(values))
 
 
 def draw_bar(
@@ -94,8 +61,16 @@ def draw_iqr(panel: Axes, found: Quartiles, y: float, color: str, thick_pt: floa
 
 def draw_upright(panel: Axes, values: Array, x: float, color: str, width: float) -> None:
     """Every value as a dot spread over a width, the middle half as a bar, the median as a tick."""
-    shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * width
-    panel.plot(x + shift, values, "o", color=color, ms=1.8, mew=0.0, alpha=0.5, zorder=3)
+    panel.plot(
+        x + spread_out(len(values)) * width,
+        values,
+        "o",
+        color=color,
+        ms=1.8,
+        mew=0.0,
+        alpha=0.5,
+        zorder=3,
+    )
     found = quartiles(values)
     panel.plot(
         [x, x], [found.low, found.high], color=color, lw=BAR_PT, solid_capstyle="butt", zorder=4
@@ -126,10 +101,61 @@ def draw_density(
     panel.plot(x, top, color=color, lw=0.6, zorder=2)
 
 
-EXACT_BELOW = 1e-9
-"""Errors below this, mm or degrees, are rounding: no instrument and no fit resolves them."""
+def draw_strip(
+    panel: Axes, values: Array, y: float, color: str, height: float = 0.3, size_pt: float = 2.0
+) -> None:
+    """Dots spread over a height around y, always alike; finite values (n,), n at least 1."""
+    panel.plot(
+        values,
+        y + spread_out(len(values)) * height,
+        "o",
+        color=color,
+        ms=size_pt,
+        mew=0.0,
+        alpha=0.45,
+        zorder=3,
+        rasterized=len(values) > _MOST_OUTLINES,
+    )
+    panel.plot([values.min(), values.max()], [y, y], color=color, lw=0.8, zorder=4)
+    panel.plot([np.median(values)], [y], "|", color=BLACK, ms=7.0, mew=1.0, zorder=5)
 
-EXACT = "exact to rounding"
+
+def spread_out(n: int) -> Array:
+    """(n,) between -0.5 and 0.5, evenly mixed and always alike: where dots of a row stand in it."""
+    places: Array = np.arange(n, dtype=np.float64) * _GOLDEN % 1.0 - 0.5
+    return places
+
+
+def draw_interval(
+    panel: Axes, x: float, ends: tuple[float, float], y: float, color: str, crowded: bool = False
+) -> None:
+    """A dot with a line from end to end; fainter where many share a row."""
+    alpha = CROWDED_ALPHA if crowded else 1.0
+    panel.plot(ends, [y, y], color=color, lw=1.2, alpha=alpha, solid_capstyle="butt", zorder=3)
+    panel.plot(
+        [x],
+        [y],
+        "o",
+        color=color,
+        ms=3.0 if crowded else 4.0,
+        mec=WHITE,
+        mew=0.4,
+        alpha=alpha,
+        zorder=4,
+        clip_on=False,
+    )
+
+
+def quartiles(values: Array) -> Quartiles:
+    """Median and quartiles of finite values (n,), n at least 1."""
+    low, median, high = np.percentile(values, [25.0, 50.0, 75.0])
+    return Quartiles(float(low), float(median), float(high), len(values))
+
+
+def finite(values: object) -> Array:
+    """The finite ones of some values as (n,) numbers."""
+    array = np.asarray(values, dtype=float).ravel()
+    return array[np.isfinite(array)]
 
 
 def rounded(values: object) -> Array:
@@ -142,29 +168,3 @@ def exact(values: object) -> bool:
     """Whether there are values and all of them are zero but for rounding."""
     array = np.asarray(values, dtype=float)
     return bool(array.size) and bool((np.abs(array) < EXACT_BELOW).all())
-
-
-STRIP_KEY = "dot: one fit, line: range, tick: median"
-
-_MOST_OUTLINES = 400
-"""More dots than this become a picture inside the SVG, which stays small."""
-
-
-def draw_strip(
-    panel: Axes, values: Array, y: float, color: str, height: float = 0.3, size_pt: float = 2.0
-) -> None:
-    """Dots spread over a height around y, always alike; finite values (n,), n at least 1."""
-    shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * height
-    panel.plot(
-        values,
-        y + shift,
-        "o",
-        color=color,
-        ms=size_pt,
-        mew=0.0,
-        alpha=0.45,
-        zorder=3,
-        rasterized=len(values) > _MOST_OUTLINES,
-    )
-    panel.plot([values.min(), values.max()], [y, y], color=color, lw=0.8, zorder=4)
-    panel.plot([np.median(values)], [y], "|", color=BLACK, ms=7.0, mew=1.0, zorder=5)

@@ -1,16 +1,10 @@
-"""Panels side by side that share their rows.
-
-Logarithmic axes that people can read.
-
-Which rows a panel has: a specimen, a joint, or a joint of a specimen, cranial on top.
-
-Sections of panels below each other, each with rows of its own.
-"""
+"""Panels of figures: how they stand, their rows, letters and axes, and what explains them."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -26,37 +20,18 @@ from spinepipe.report.words import tick
 
 _STEPS: tuple[tuple[float, ...], ...] = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
 
-
-def log_ticks(axis: Axis, low: float, high: float, most: int = 4) -> None:
-    """Few ticks with plain numbers: even ones within half a decade, else 1, 2, 5 or fewer.
-
-    Where even decades are more than ``most``, only some of them have a number.
-    """
-    decades = log10(high / low)
-    if decades < 0.5:
-        even = [x for x in MaxNLocator(most).tick_values(low, high) if low <= x <= high]
-        axis.set_major_locator(FixedLocator(even))
-        axis.set_minor_locator(NullLocator())
-    else:
-        subs = next((s for s in _STEPS if len(_within(low, high, s)) <= most), _STEPS[-1])
-        axis.set_major_locator(LogLocator(subs=subs, numticks=most if subs == _STEPS[-1] else None))
-        axis.set_minor_locator(LogLocator(subs=range(1, 10)))
-    axis.set_major_formatter(lambda x, _: tick(x))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _within(low: float, high: float, subs: Sequence[float]) -> list[float]:
-    """Multiples of the decades from low to high."""
-    ends = floor(log10(low)), floor(log10(high)) + 1
-    found = [s * 10.0**decade for decade in range(*ends) for s in subs]
-    return [x for x in found if low <= x <= high]
-
-
 MOST_ROWS = 40
 """More rows than this on one page cannot be read: then specimens are pooled."""
 
 MOST_ROWS_WITH_NUMBERS = 8
 EVERY_JOINT = "*"
+_ABOVE_AND_BELOW_MM = 14.0
+_KEY_MM = 17.0
+_CROWDED_MM = 4.2
+_LINE_LENGTH = 150
+_START_LINE: tuple[int, tuple[int, int]] = (0, (4, 2))
+
+MOST_ACROSS = 3
 
 
 @dataclass(frozen=True)
@@ -111,29 +86,20 @@ def _label(joint: str, specimen: str, n_specimens: int) -> str:
     return f"{specimen}  {joint}"
 
 
-_ABOVE_AND_BELOW_MM = 14.0
-_KEY_MM = 17.0
-_CROWDED_MM = 4.2
-_LINE_LENGTH = 150
-_START_LINE: tuple[int, tuple[int, int]] = (0, (4, 2))
-
-
 def row_height(rows: Rows, with_numbers_mm: float) -> float:
     """Height of a row, mm."""
     return with_numbers_mm if rows.with_numbers else _CROWDED_MM
 
 
-def grid(n: int, rows: Rows, row_mm: float, most_across: int = 3) -> tuple[list[Axes], Figure]:
+def grid(
+    n: int, rows: Rows, row_mm: float, most_across: int = MOST_ACROSS
+) -> tuple[list[Axes], Figure]:
     """``n`` panels of the same rows, so many side by side at most, and their figure."""
-    down = -(-n // most_across)
-    across = -(-n // down)
+    across = across_of(n, most_across)
+    down = -(-n // across)
     height = down * (len(rows) * row_mm + _ABOVE_AND_BELOW_MM) + _KEY_MM
     figure = blank(max(height, 45.0))
-    axes = figure.subplots(down, across, squeeze=False)
-    panels = list(axes.ravel())
-    for spare in panels[n:]:
-        spare.set_visible(False)
-    return panels[:n], figure
+    return side_by_side(figure, n, across), figure
 
 
 def label_rows(axis: Axes, rows: Rows, below: float, above: float) -> None:
@@ -145,14 +111,106 @@ def label_rows(axis: Axes, rows: Rows, below: float, above: float) -> None:
     axis.spines["left"].set_visible(False)
 
 
-def head(axis: Axes, number: int, words: str) -> None:
+def sections(
+    parts: Sequence[tuple[int, float]], key_mm: float, most_across: int = MOST_ACROSS
+) -> tuple[list[list[Axes]], Figure]:
+    """Panels of each section, and their figure.
+
+    Parameters
+    ----------
+    parts : of each section, the number of panels and the height of one, mm.
+    key_mm : height below all panels for what explains them.
+    most_across : most panels side by side.
+    """
+    across = across_of(max(n for n, _ in parts), most_across)
+    heights = [height for n, height in parts for _ in range(-(-n // across))]
+    figure = blank(sum(heights) + key_mm)
+    lines = figure.subplots(len(heights), across, squeeze=False, height_ratios=heights)
+    found: list[list[Axes]] = []
+    first = 0
+    for n, _ in parts:
+        down = -(-n // across)
+        panels = list(lines[first : first + down].ravel())
+        for spare in panels[n:]:
+            spare.set_visible(False)
+        found.append(panels[:n])
+        first += down
+    return found, figure
+
+
+def across_of(n: int, most: int = MOST_ACROSS) -> int:
+    """How many of n panels stand side by side, so that the lines are about equally long."""
+    return -(-n // -(-n // most))
+
+
+def side_by_side(figure: Figure, n: int, across: int, **how: Any) -> list[Axes]:
+    """``n`` panels line by line, so many side by side; ``how`` goes to ``subplots``."""
+    lines = lines_of(figure, n, across, **how)
+    return [panel for line in lines for panel in line][:n]
+
+
+def lines_of(figure: Figure, n: int, across: int, **how: Any) -> list[list[Axes]]:
+    """The same by lines, the last with its spare panels, which do not show."""
+    lines = figure.subplots(-(-n // across), across, squeeze=False, **how)
+    for spare in list(lines.ravel())[n:]:
+        spare.set_visible(False)
+    return [list(line) for line in lines]
+
+
+def head(axis: Axes, index: int, words: str) -> None:
     """Letter and heading of a panel."""
-    axis.set_title(f"{chr(ord('a') + number)}   {words}")
+    axis.set_title(lettered(index, words))
+
+
+def head_line(axis: Axes, index: int, words: str, above_pt: float) -> None:
+    """Letter and heading of several panels, so far above the first of them."""
+    axis.annotate(
+        lettered(index, words),
+        (0.0, 1.0),
+        (0.0, above_pt),
+        va="bottom",
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=7.5,
+        fontweight="bold",
+        annotation_clip=False,
+        in_layout=False,
+    )
+
+
+def lettered(index: int, words: str) -> str:
+    """A heading with the letter of a panel, from 0 on."""
+    return f"{chr(ord('a') + index)}   {words}"
 
 
 def mark_start(axis: Axes, x: float) -> None:
     """The dashed line of the value that a fit starts from."""
     axis.axvline(x, color=GREY, lw=0.7, ls=_START_LINE, zorder=1)
+
+
+def log_ticks(axis: Axis, low: float, high: float, most: int = 4) -> None:
+    """Few ticks with plain numbers: even ones within half a decade, else 1, 2, 5 or fewer.
+
+    Where even decades are more than ``most``, only some of them have a number.
+    """
+    decades = log10(high / low)
+    if decades < 0.5:
+        even = [x for x in MaxNLocator(most).tick_values(low, high) if low <= x <= high]
+        axis.set_major_locator(FixedLocator(even))
+        axis.set_minor_locator(NullLocator())
+    else:
+        subs = next((s for s in _STEPS if len(_within(low, high, s)) <= most), _STEPS[-1])
+        axis.set_major_locator(LogLocator(subs=subs, numticks=most if subs == _STEPS[-1] else None))
+        axis.set_minor_locator(LogLocator(subs=range(1, 10)))
+    axis.set_major_formatter(lambda x, _: tick(x))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _within(low: float, high: float, subs: Sequence[float]) -> list[float]:
+    """Multiples of the decades from low to high."""
+    ends = floor(log10(low)), floor(log10(high)) + 1
+    found = [s * 10.0**decade for decade in range(*ends) for s in subs]
+    return [x for x in found if low <= x <= high]
 
 
 def explain(figure: Figure, bars: Mapping[str, str], words: str, dashed: str = "") -> None:
@@ -182,38 +240,3 @@ def explain_marks(
         borderaxespad=0.2,
     )
     legend.get_title().set_multialignment("center")
-
-
-MOST_ACROSS = 3
-
-
-def across_of(n: int, most: int = MOST_ACROSS) -> int:
-    """How many of n panels stand side by side, so that the lines are about equally long."""
-    return -(-n // -(-n // most))
-
-
-def sections(
-    parts: Sequence[tuple[int, float]], key_mm: float, most_across: int = MOST_ACROSS
-) -> tuple[list[list[Axes]], Figure]:
-    """Panels of each section, and their figure.
-
-    Parameters
-    ----------
-    parts : of each section, the number of panels and the height of one, mm.
-    key_mm : height below all panels for what explains them.
-    most_across : most panels side by side.
-    """
-    across = across_of(max(n for n, _ in parts), most_across)
-    heights = [height for n, height in parts for _ in range(-(-n // across))]
-    figure = blank(sum(heights) + key_mm)
-    lines = figure.subplots(len(heights), across, squeeze=False, height_ratios=heights)
-    found: list[list[Axes]] = []
-    first = 0
-    for n, _ in parts:
-        down = -(-n // across)
-        panels = list(lines[first : first + down].ravel())
-        for spare in panels[n:]:
-            spare.set_visible(False)
-        found.append(panels[:n])
-        first += down
-    return found, figure

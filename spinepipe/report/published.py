@@ -1,24 +1,31 @@
-"""What the papers found for the cohorts that were rebuilt from them."""
+"""A paper whose cohort was rebuilt: its numbers stand beside results of that cohort alone."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from spinepipe.anatomy import published
 
-PAPER_OF_COHORT = {"palanca_l1l4": "gould_2024a", "t12s1_phantom": "gould_2024b"}
-"""Cohorts rebuilt from a paper, whose numbers are drawn beside ours."""
 
-OF_JOINT_POSE, OF_COHORTS = "gould_2024a", "gould_2024b"
-"""The paper that asked what studies of kind joint_pose_sensitivity ask, and cohort_stiffness."""
+@dataclass(frozen=True)
+class Rebuilt:
+    """A paper and its cohort.
 
-SHORT_NAME = {"gould_2024a": "Gould et al. 2024", "gould_2024b": "Gould et al. 2024b"}
+    Attributes
+    ----------
+    paper : name of its numbers, see `spinepipe.anatomy.published`.
+    cohort : name of the cohort that was rebuilt from it.
+    cited : the paper as figures and captions name it.
+    """
 
+    paper: str
+    cohort: str
+    cited: str
 
-def stands_for(cohort: str, paper: str) -> bool:
-    """Whether a cohort was rebuilt from this paper: only then may results be held against it."""
-    return PAPER_OF_COHORT.get(cohort) == paper
+    def stands_for(self, cohort: str) -> bool:
+        """Whether this cohort was rebuilt from it: only then may results be held against it."""
+        return cohort == self.cohort
 
-
-def paper_of(cohort: str, paper: str) -> tuple[str, Mapping[str, Any]] | None:
-    """Short name and numbers of a paper for a cohort that was rebuilt from it, else None."""
-    return (SHORT_NAME[paper], published(paper)) if stands_for(cohort, paper) else None
+    def beside(self, cohort: str) -> tuple[str, Mapping[str, Any]] | None:
+        """How it is cited, and its numbers, for the cohort that was rebuilt from it, else None."""
+        return (self.cited, published(self.paper)) if self.stands_for(cohort) else None

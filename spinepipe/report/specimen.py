@@ -19,6 +19,7 @@ from spinepipe.cohort.specimen import (
 from spinepipe.effects.contract import Array, Wrench
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase
+from spinepipe.report.panels import side_by_side
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, blank
 from spinepipe.report.words import count
 from spinepipe.units import MM_PER_M
@@ -114,7 +115,9 @@ def draw_specimen(cohort: Cohort, view: SpecimenView) -> Figure:
     figure = blank(_HEIGHT_MM, _WIDTH_MM)
     low, high = _extent(view)
     size = float((high - low)[1])
-    for axis, side in zip(figure.subplots(1, 2, sharey=True), (SAGITTAL, FRONTAL), strict=True):
+    for axis, side in zip(
+        side_by_side(figure, 2, 2, sharey=True), (SAGITTAL, FRONTAL), strict=True
+    ):
         axis.set_title(side.title)
         axis.set_xlabel(side.label)
         axis.set_aspect("equal", adjustable="box")

@@ -26,6 +26,9 @@ POSITIVE = {
 """What a positive value of the coordinate is."""
 
 _MINUS, _THIN_SPACE = "\u2212", "\u2009"
+_LONGEST = 22
+_MOST = 4
+_PAIRS = {"flexion extension": "flexion–extension", "bending rotation": "bending–rotation"}
 
 
 def unit(coordinate: str) -> str:
@@ -86,43 +89,6 @@ def count(n: int, one: str, many: str | None = None) -> str:
     return f"{n:,} {one if n == 1 else many or one + 's'}".replace(",", _THIN_SPACE)
 
 
-NAME = {
-    "literature": "published, one value",
-    "literature_levels": "published, level by level",
-    "per_specimen": "one value per specimen",
-    "level_ratio": "published ratio of levels",
-    "per_joint": "each joint its own",
-    "partially_pooled": "partially pooled",
-}
-"""Representations of stiffness in words."""
-
-_LONGEST = 22
-
-
-def case(test: str) -> str:
-    """A load case in words: ``left_axial_rotation`` is ``Left axial rotation``."""
-    words = test.replace("_", " ").strip()
-    return words[:1].upper() + words[1:]
-
-
-def short(name: str, longest: int = _LONGEST) -> str:
-    """A name that fits beside an axis; the middle of a longer one is left out."""
-    if len(name) <= longest:
-        return name
-    tail = longest // 2
-    return f"{name[: longest - 1 - tail]}…{name[-tail:]}"
-
-
-def first_of(names: tuple[str, ...], most: int) -> str:
-    """The first names, and how many more there are."""
-    shown = ", ".join(short(name) for name in names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
-
-
-_MOST = 4
-_PAIRS = {"flexion extension": "flexion–extension", "bending rotation": "bending–rotation"}
-
-
 def plain(name: str) -> str:
     """A name of results without underscores."""
     words = name.replace("_", " ").strip()
@@ -136,11 +102,29 @@ def capital(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def listed(names: Iterable[str], most: int = _MOST, last: str = "and") -> str:
-    """``a, b and c``; of many the first, and how many more."""
+def case(test: str) -> str:
+    """A load case in words: ``left_axial_rotation`` is ``Left axial rotation``."""
+    return capital(plain(test))
+
+
+def short(name: str, longest: int = _LONGEST) -> str:
+    """A name that fits beside an axis; the middle of a longer one is left out."""
+    if len(name) <= longest:
+        return name
+    tail = longest // 2
+    return f"{name[: longest - 1 - tail]}…{name[-tail:]}"
+
+
+def listed(names: Iterable[str], most: int = _MOST, last: str | None = "and") -> str:
+    """``a, b and c``; of many the first, and how many more.
+
+    Parameters
+    ----------
+    last : the word before the last name; None for a comma there too.
+    """
     every = list(names)
     if len(every) > most:
         return f"{', '.join(every[:most])} and {len(every) - most} more"
-    if len(every) < 2:
-        return "".join(every)
+    if len(every) < 2 or last is None:
+        return ", ".join(every)
     return f"{', '.join(every[:-1])} {last} {every[-1]}"

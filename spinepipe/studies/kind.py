@@ -8,7 +8,7 @@ digest of a job follows its own file alone.
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
@@ -39,8 +39,8 @@ class Job:
     writes : the tables it makes of them.
     ignores : settings that it does not look at: their names, with what of each is ignored. All
         others count, so that one added later is not overlooked.
-    specimens : whose data it reads: ``own``, of the specimen that its files are of, or of all where
-        they are of none; ``all``; or ``none``, the header of the cohort alone.
+    header_alone : whether it reads no specimen; else it reads the one that its files are of, or all
+        where they are of none.
     reads_base : whether it reads the model file that the study builds on.
     many : whether it comes by the hundreds, so that workers import it beforehand.
     also : what else it reads that decides, such as marks of other files; asked with what is
@@ -52,7 +52,7 @@ class Job:
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
     ignores: Mapping[str, Any] = field(default_factory=dict)
-    specimens: Literal["own", "all", "none"] = "own"
+    header_alone: bool = False
     reads_base: bool = False
     many: bool = False
     also: Callable[[Any, Mapping[str, str]], list[str]] | None = None

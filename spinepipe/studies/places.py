@@ -1,6 +1,6 @@
 """What all kinds of studies ask of a study file and its cohort: places, names, readings."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import pandas as pd
 
@@ -40,6 +40,17 @@ def unknown_names(
             remedy = did_you_mean(name, known, "delete it or correct its name")
             place = at(document, f"{key}.{index}")
             yield Problem(*place, f"unknown {what} '{name}'", one_of(known), remedy)
+
+
+def unknown_levels(
+    document: Document, levels: Iterable[str], joints: Sequence[str]
+) -> Iterator[Problem]:
+    """Joints that ``level_stiffness`` has values for and the cohort does not have."""
+    for name in levels:
+        if name not in joints:
+            remedy = did_you_mean(name, joints, "delete it or correct its name")
+            place = at(document, f"level_stiffness.{name}")
+            yield Problem(*place, f"unknown joint '{name}'", one_of(joints), remedy)
 
 
 _PLACE = ["specimen", "test", "step", "joint"]

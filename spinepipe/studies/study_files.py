@@ -6,11 +6,15 @@ files costs Snakemake quadratic time.
 
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.study import Study
+
+MOST_FILES_PER_BLOCK = 300
+"""Job files that are joined to one block."""
 
 
 @dataclass(frozen=True)
@@ -187,3 +191,15 @@ class StudyFiles(ABC):
     def _is_joined(self, table: str, specimen: str, block: str) -> bool:
         whole = f"{self.folder}/{table}.parquet"
         return os.path.exists(whole) or os.path.exists(self.block_file(table, specimen, block))
+
+
+def numbered_blocks(specimens: Sequence[str], files: int) -> list[tuple[str, str]]:
+    """(specimen, block) of a table with so many job files of each specimen."""
+    count = -(-files // MOST_FILES_PER_BLOCK)
+    return [(name, f"{block:03d}") for name in specimens for block in range(count)]
+
+
+def files_of_block(block: str, files: int) -> range:
+    """Numbers of the job files of a block, of so many of the specimen."""
+    first = int(block) * MOST_FILES_PER_BLOCK
+    return range(first, min(first + MOST_FILES_PER_BLOCK, files))

@@ -110,3 +110,8 @@ def against_as_shown(table: Table) -> tuple[Column, ...]:
     """What a reader compares stands first; the short name is left to the file."""
     columns = {column.name: column for column in table.columns}
     return tuple(columns[name] for name in _AGAINST_ORDER)
+
+
+def joined(*notes: str) -> str:
+    """Notes as one message."""
+    return "; ".join(note for note in notes if note)

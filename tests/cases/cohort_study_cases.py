@@ -12,7 +12,8 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.tables import TABLES, from_rows
+from spinepipe.studies.cohort_stiffness.tables import TABLES
+from spinepipe.tables import Tables, from_rows
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, STIFFNESS_UNITS
 
 Row = dict[str, Any]
@@ -91,8 +92,8 @@ def cohort_of(size: Size) -> Cohort:
     )
 
 
-def tables_of(size: Size) -> dict[str, pd.DataFrame]:
-    """Rows of all tables that figures and findings read."""
+def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
+    """Rows of all tables that figures and findings read, those of ``changed`` in their place."""
     rng = np.random.default_rng(5)
     rows = {
         "stiffness": _stiffness(size, rng),
@@ -105,13 +106,15 @@ def tables_of(size: Size) -> dict[str, pd.DataFrame]:
         "findings": iter(()),
         "statistics": iter(()),
     }
-    return {name: frame(name, list(found)) for name, found in rows.items()}
+    made = {name: frame(name, list(found)) for name, found in rows.items()}
+    return Tables(made | changed)
 
 
 def frame(name: str, rows: list[Row]) -> pd.DataFrame:
     """Rows as they come out of the file of a table."""
-    empty = dict.fromkeys(column.name for column in TABLES[name].columns)
-    return from_rows(TABLES[name], [{**empty, **row} for row in rows]).to_pandas()
+    (shape,) = (table for table in TABLES if table.name == name)
+    empty = dict.fromkeys(column.name for column in shape.columns)
+    return from_rows(shape, [{**empty, **row} for row in rows]).to_pandas()
 
 
 def _ended(size: Size) -> Row:

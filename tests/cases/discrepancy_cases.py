@@ -11,8 +11,9 @@ import pandas as pd
 import pyarrow as pa
 from chain_cases import JOINTS, ROTATIONS, STUDY, Chains
 
+from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
-from spinepipe.tables import Table, from_rows, write
+from spinepipe.tables import Table, Tables, from_rows, write
 
 Rows = list[dict[str, Any]]
 
@@ -39,6 +40,8 @@ _NAMED = {
     "name": "neutral_zone",
     "kind": "joint law",
     "scope": _SCOPE,
+    "variant": {"coordinate": "extension"},
+    "spread": "one joint",
     "parameters": [
         {"name": "half_width", "value": 1.55, "unit": "deg", "ci95": [1.42, 1.69]},
         {"name": "stiffness_ratio", "value": 0.21, "unit": "", "ci95": [0.17, 0.26]},
@@ -85,7 +88,7 @@ _COMMON = {
         {"name": name, "gap": round(0.15 + 0.3 * absorbed, 2)}
         for name, (_, absorbed, _) in EFFECTS.items()
     ],
-    "unknown": {"where": "", "shape": ""},
+    "unknown": None,
     "suspected_data_errors": [],
     "why": "",
     "threshold": {"log_evidence": 6.2, "false_alarm": 0.01, "draws": 500},
@@ -114,22 +117,13 @@ VERDICTS: dict[str, dict[str, Any]] = {
         "verdict": "NAMED",
         "effects": [_NAMED],
         "why": "the neutral zone beats every rival by more than the margin",
-        "detected_from": "flexion",
     },
     "NULL": _COMMON | {"verdict": "NULL"},
     "SET": _COMMON
     | _OPEN
     | {
         "verdict": "SET",
-        "candidates_in_set": [
-            _NAMED,
-            {
-                "name": "nonlinear_stiffening",
-                "kind": "joint law",
-                "scope": _SCOPE,
-                "log_evidence": 86.5,
-            },
-        ],
+        "candidates_in_set": ["neutral_zone", "nonlinear_stiffening"],
         "suspected_data_errors": [
             {
                 "where": "specimen b, flexion, cycle 2, L3L4",
@@ -150,8 +144,9 @@ VERDICTS: dict[str, dict[str, Any]] = {
     | {
         "verdict": "UNKNOWN",
         "unknown": {
-            "where": "L4L5, flexion-extension, in flexion above 5 N m",
+            "where": "L4L5, extension, test flexion (gap 9.3)",
             "shape": "one side only, grows with the cube of the angle",
+            "reason": "no_known_effect",
         },
         "gap": {
             **_OPEN["gap"],
@@ -183,6 +178,19 @@ def results(root: Path, answer: str) -> Path:
     for name, (table, rows) in _tables(answer).items():
         write(table_of(table, rows), folder / f"{name}.parquet", {"seed": "1"})
     return folder
+
+
+def files_of_a_search(folder: Path) -> dict[str, str]:
+    """Where its job writes what, by the names of the job's arguments."""
+    names = [*(f"{table.name}.parquet" for table in TABLES), *OTHERS]
+    return {name.partition(".")[0]: str(folder / name) for name in names}
+
+
+def tables(verdict: Mapping[str, Any], made: Mapping[str, pd.DataFrame], folder: Path) -> Tables:
+    """What a figure or page gets; the verdict is written to ``folder``."""
+    path = folder / "verdict.json"
+    path.write_text(json.dumps(verdict))
+    return Tables(made, {"verdict": str(path)})
 
 
 def table_of(table: Table, rows: Rows) -> pa.Table:

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from study_cases import START, Size
+from study_cases import START, TABLES, Size
 
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
-from spinepipe.tables import TABLES, to_arrow, write
+from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 Row = dict[str, Any]

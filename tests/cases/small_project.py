@@ -1,16 +1,26 @@
-"""A copy of the project that runs small studies, so that no test touches its results."""
+"""Copies of the project that run small studies, so that no test touches its results.
 
+A project that several tests look at is built once per run of the tests (`Shared`); a test that
+changes something takes a copy of it.
+"""
+
+import fcntl
+import json
 import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+
+from spinepipe.studies.registry import place_of
 
 _ROOT = Path(__file__).parents[2]
 _PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
-SKIPPED = shutil.ignore_patterns("__pycache__")
+_SKIPPED = shutil.ignore_patterns("__pycache__")
 _STUDY = """\
 study: {name}
 kind: joint_pose_sensitivity
@@ -22,11 +32,37 @@ block: 4
 calibration:
   weights:
     {{anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}}
-start_bootstrap: {{sets: 3, loadings: [equilibrium, quasi_static, dynamic]}}
+start_bootstrap: {{sets: 2, loadings: [equilibrium, quasi_static, dynamic]}}
 damping_bootstrap: {{sets: 2, loadings: [equilibrium]}}
-methods: {{poses: 1}}
+settle_time_s: 0.05
+methods: {{poses: 1, sane_step: 0.01, accuracy: 0.1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 """
+_HANGS_S = 3600
+"""A run that takes longer hangs: it does on no machine, however busy."""
+
+_KILLED = """
+
+import psutil
+import signal
+import threading
+jobs_left = {count}
+one_at_a_time = threading.Lock()
+whole_execute = execute
+
+
+def execute(rule, function, wildcards, log, arguments):
+    global jobs_left
+    whole_execute(rule, function, wildcards, log, arguments)
+    with one_at_a_time:
+        jobs_left -= rule == "{rule}"
+        if not jobs_left:
+            workers = psutil.Process().children(recursive=True)
+            lines = [f"{{worker.pid}} {{worker.create_time()}}\\n" for worker in workers]
+            Path("workers").write_text("".join(lines))
+            os.kill(os.getpid(), signal.SIGKILL)
+"""
+"""Added to the Snakefile: Snakemake ends as by `kill -9` when so many jobs of a rule are done."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +79,16 @@ class Project:
     def path(self, name: str) -> Path:
         return self.folder / name
 
+    def job(self, kind: str, name: str) -> Path:
+        """The file of a job of a kind of study."""
+        module = place_of(kind, name).partition(":")[0]
+        return self.path(f"{module.replace('.', '/')}.py")
+
     def edit(self, name: str, old: str, new: str) -> None:
         """Replace a text in a file; it must be there."""
         text = self.path(name).read_text()
         assert old in text
         self.path(name).write_text(text.replace(old, new))
-
-    def command(self, *arguments: str) -> list[str]:
-        return [sys.executable, "-m", "snakemake", *arguments]
 
     def environment(self) -> dict[str, str]:
         """Without the path of the original package: the copy must find itself."""
@@ -59,21 +97,52 @@ class Project:
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; `stdout` holds both streams."""
         return subprocess.run(
-            self.command(*arguments),
+            [sys.executable, "-m", "snakemake", *arguments],
             cwd=self.folder,
             env=self.environment(),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=170,
+            timeout=_HANGS_S,
             check=False,
         )
 
-    def run_all(self) -> str:
-        """`snakemake -j2 all` that has to succeed; returns what it said."""
-        done = self.snakemake("-j2", "all")
+    def run(self, *targets: str, cores: int = 2) -> str:
+        """`snakemake` for these targets, or for `all`, that has to succeed; what it said."""
+        done = self.snakemake(f"-j{cores}", *(targets or ("all",)))
         assert done.returncode == 0, done.stdout
         return done.stdout
+
+    def rerun(self, *targets: str) -> set[str]:
+        """Run again; the result files that were written."""
+        before = self.files()
+        self.run(*targets)
+        return written(before, self.files())
+
+    def planned(self, *targets: str) -> set[str]:
+        """Result files that a run for these targets, or for `all`, would write."""
+        done = self.snakemake("-n", *(targets or ("all",)), "--quiet", "host")
+        assert done.returncode == 0, done.stdout
+        lines = re.findall(r"^    output: (.*)$", done.stdout, re.MULTILINE)
+        files = {name for line in lines for name in line.split(", ")}
+        assert bool(files) != ("Nothing to be done" in done.stdout)
+        return {name.removeprefix("results/") for name in files}
+
+    def killed_after(self, count: int, rule: str, *targets: str) -> list[tuple[int, float]]:
+        """Kill Snakemake outright when so many jobs of a rule are done.
+
+        Returns
+        -------
+        Process id and start of each of its workers, which have to end by themselves.
+        """
+        snakefile = self.path("Snakefile")
+        whole = snakefile.read_text()
+        snakefile.write_text(whole + _KILLED.format(rule=rule, count=count))
+        ended = self.snakemake("-j2", *(targets or ("all",)))
+        assert ended.returncode == -signal.SIGKILL, ended.stdout
+        snakefile.write_text(whole)
+        lines = self.path("workers").read_text().splitlines()
+        return [(int(pid), float(start)) for pid, start in map(str.split, lines)]
 
     def files(self) -> dict[str, int]:
         """Result files and when each was written, ns; logs left out."""
@@ -87,6 +156,11 @@ class Project:
     def contents(self) -> dict[str, bytes]:
         return {name: self.path(f"results/{name}").read_bytes() for name in self.files()}
 
+    def copy(self, folder: Path) -> "Project":
+        """The same with its results, to be changed."""
+        shutil.copytree(self.folder, folder, ignore=_SKIPPED)
+        return Project(folder)
+
 
 def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
     """Files that were computed between two looks."""
@@ -95,15 +169,49 @@ def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
 
 def copy_project(folder: Path) -> Project:
     """The project without results and with nothing selected but a study `small`."""
+    folder.mkdir(parents=True)
     for part in _PARTS:
         source = _ROOT / part
         if source.is_dir():
-            shutil.copytree(source, folder / part, ignore=SKIPPED)
+            shutil.copytree(source, folder / part, ignore=_SKIPPED)
         else:
-            folder.mkdir(parents=True, exist_ok=True)
             shutil.copy2(source, folder / part)
     cohort = Path("config/cohorts/palanca_l1l4")
     shutil.copytree(_ROOT / cohort, folder / cohort)
     (folder / "config/studies").mkdir()
     (folder / "config/config.yaml").write_text("studies: [small]\n")
     return Project(folder)
+
+
+@dataclass
+class Shared:
+    """Projects built once per run of the tests, by whichever worker asks first; read-only.
+
+    Attributes
+    ----------
+    folder : the same for all workers.
+    """
+
+    folder: Path
+    _seen: dict[str, Project] = field(default_factory=dict)
+
+    def project(self, name: str, build: Callable[[Path], Project]) -> Project:
+        """The project of that name; ``build`` makes it in a folder that is yet to be made."""
+        if name not in self._seen:
+            with (self.folder / f"{name}.lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                self._seen[name] = self._built(name, build)
+        return self._seen[name]
+
+    def _built(self, name: str, build: Callable[[Path], Project]) -> Project:
+        folder, listing = self.folder / name, self.folder / f"{name}.json"
+        if not listing.exists():
+            assert not folder.exists(), f"the shared project {name} could not be built, see above"
+            listing.write_text(json.dumps(build(folder).files()))
+        return Project(folder)
+
+    def check(self) -> None:
+        """No test has changed what others look at."""
+        for name, project in self._seen.items():
+            built = json.loads((self.folder / f"{name}.json").read_text())
+            assert project.files() == built, f"a test has changed the shared project {name}"

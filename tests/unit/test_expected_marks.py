@@ -12,10 +12,10 @@ import pytest
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import read_mark
-from spinepipe.studies.range_of_motion import draw as draw_stiffness
-from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion import simulate
+from spinepipe.model.file import EffectEntry, ModelFile, write_model
+from spinepipe.studies.range_of_motion import draw, simulate
 from spinepipe.studies.read import check
 from spinepipe.tables import metadata_of, read
 
@@ -42,8 +42,8 @@ def made(root: Path) -> Expected:
     """Job files of specimen a, and what their marks must be."""
     told = expected(root)
     frames, sets = told.files.specimen_file("frames", "a"), "results/sets.parquet"
-    sample_frames.sample_frames(str(root), STUDY, "a", frames)
-    draw_stiffness.draw_stiffness(str(root), STUDY, sets)
+    draw.sample_frames(str(root), STUDY, "a", frames)
+    draw.draw_stiffness(str(root), STUDY, sets)
     for path in told.files.job_files("range_of_motion", "a", "000"):
         pose, stiffness = (part.split("=")[1].split(".")[0] for part in path.split("/")[-2:])
         simulate.run(str(root), STUDY, frames, sets, "a", pose, stiffness, path)
@@ -53,7 +53,7 @@ def made(root: Path) -> Expected:
 def join(told: Expected) -> None:
     files = told.files.job_files("range_of_motion", "a", "000")
     marks = [told.of_part("range_of_motion", path) for path in files]
-    collect.run("range_of_motion", files, marks, BLOCK)
+    collect.run("range_of_motion", "range_of_motion", files, marks, BLOCK)
 
 
 def test_jobs_write_the_marks_that_are_expected(root: Path) -> None:
@@ -63,7 +63,7 @@ def test_jobs_write_the_marks_that_are_expected(root: Path) -> None:
         assert read_mark(path) == told.of_part("range_of_motion", path)
     frames = told.files.specimen_file("frames", "a")
     assert read_mark(frames) == told.of_part("frames", frames)
-    assert read_mark("results/sets.parquet") == told.of_job("range_of_motion.draw_stiffness", {})
+    assert read_mark("results/sets.parquet") == told.of_job("draw_stiffness", {})
     assert read_mark(BLOCK) == told.of_block("range_of_motion", "a", "000")
 
 
@@ -110,6 +110,7 @@ def jobs(told: Expected) -> dict[str, str]:
         for table in told.files.by_specimen
         for s in specimens
     }
+    marks |= {f"table {table}": told.of_table(table) for table in told.files.by_specimen}
     for table in told.files.made_of_jobs:
         for s, block in told.files.blocks(table):
             files = told.files.job_files(table, s, block)
@@ -138,7 +139,7 @@ def test_a_changed_number_of_a_specimen_changes_what_it_makes_and_is_joined_to(r
     again = changed(lambda: expected(root), lambda: replace(joints, "b,L2L3,0,36,", "b,L2L3,0,37,"))
     files = expected(root).files
     own = set(files.job_files("range_of_motion", "b", "000"))
-    of_it = {"frames b", "block range_of_motion b", "table range_of_motion"}
+    of_it = {"frames b", "table frames", "block range_of_motion b", "table range_of_motion"}
     assert again == own | of_it
 
 
@@ -166,31 +167,91 @@ poses: 2
 best_models: 1
 methods: {{poses: 1}}
 start_bootstrap: {{sets: 2}}
+landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 """
 
 
-def on_the_phantom(root: Path, name: str) -> Expected:
+def expected_of(root: Path, name: str) -> Expected:
     return Expected(str(root), *check(root, name))
+
+
+def poses(tmp_path: Path) -> Path:
+    """The file of a joint-pose study in a project with the phantom."""
+    cohort, studies = Path("config/cohorts", COHORT), tmp_path / "config/studies"
+    shutil.copytree(ROOT / cohort, tmp_path / cohort)
+    studies.mkdir()
+    study = studies / "poses.yaml"
+    study.write_text(JOINT_POSES)
+    return study
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "job"),
+    [
+        ("poses: 4", "poses: 4, rotation_limit_deg: 2.0", "landmark_precision"),
+        ("best_models: 1", "best_models: 1\nsignificance: 0.01", "against_gould_2024a"),
+        ("best_models: 1", "best_models: 1\nsuccess: {outlier_times_start: 50}", "success"),
+    ],
+)
+def test_limits_are_applied_to_fits_that_are_there(
+    tmp_path: Path, old: str, new: str, job: str
+) -> None:
+    """No job file changes; what judges the fits does."""
+    study = poses(tmp_path)
+    before = expected_of(tmp_path, "poses").of_job(job, {})
+    again = changed(lambda: expected_of(tmp_path, "poses"), lambda: replace(study, old, new))
+    assert again == set()
+    assert expected_of(tmp_path, "poses").of_job(job, {}) != before
+
+
+def test_another_seed_samples_again_in_its_own_study_alone(tmp_path: Path) -> None:
+    study = poses(tmp_path)
+    (study.parent / "twin.yaml").write_text(JOINT_POSES.replace("study: poses", "study: twin"))
+    twin = jobs(expected_of(tmp_path, "twin"))
+    again = changed(
+        lambda: expected_of(tmp_path, "poses"), lambda: replace(study, "seed: 1", "seed: 2")
+    )
+    assert {"table landmarks", "table simulations", "landmarks s03"} <= again
+    assert jobs(expected_of(tmp_path, "twin")) == twin
 
 
 @pytest.mark.parametrize("study", ["poses", "t12s1_cohort_stiffness", "t12s1_range_of_motion"])
 def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, study: str) -> None:
     """In studies of every kind with job files; only what predicts from all hangs on all."""
-    cohort, studies = Path("config/cohorts", COHORT), tmp_path / "config/studies"
-    shutil.copytree(ROOT / cohort, tmp_path / cohort)
-    studies.mkdir()
-    (studies / "poses.yaml").write_text(JOINT_POSES)
+    studies = poses(tmp_path).parent
     if study != "poses":
         shutil.copy2(ROOT / "config/studies" / f"{study}.yaml", studies)
-    loads = tmp_path / cohort / "loads.csv"
+    loads = tmp_path / "config/cohorts" / COHORT / "loads.csv"
     rows = loads.read_text().splitlines(keepends=True)
     at = next(place for place, row in enumerate(rows) if row.startswith("s03,flexion,2,9,"))
     rows[at] = re.sub(r"(\d)(\n)$", lambda m: f"{(int(m[1]) + 1) % 10}{m[2]}", rows[at])
-    again = changed(
-        lambda: on_the_phantom(tmp_path, study), lambda: loads.write_text("".join(rows))
-    )
-    files = {name for name in jobs(on_the_phantom(tmp_path, study)) if name.endswith(".parquet")}
+    again = changed(lambda: expected_of(tmp_path, study), lambda: loads.write_text("".join(rows)))
+    files = {name for name in jobs(expected_of(tmp_path, study)) if name.endswith(".parquet")}
     joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
     own = {name for name in files if "specimen=s03/" in name}
     assert own
     assert again & files == own | joint
+
+
+def test_a_model_made_by_another_study_counts_before_it_is_there(tmp_path: Path) -> None:
+    """By the mark that it will have; a file of one's own beside it by its content."""
+    for part in ("cohorts/stiffening_spines", "studies"):
+        shutil.copytree(ROOT / "config" / part, tmp_path / "config" / part)
+    maker = expected_of(tmp_path, "stiffening_spines")
+    model = maker.files.folder + "/model_with_effects.yaml"
+    place = {"specimen": "s01", "representation": "per_specimen", "fitted_to": "all"}
+
+    def mark_of_fit() -> str:
+        return expected_of(tmp_path, "stiffening_spines_stiffness").of_job("fit", place)
+
+    before = mark_of_fit()
+    made = maker.of_job("search", {})
+    entry = EffectEntry(effect="linear_bushing")
+    whole = ModelFile(model="m", cohort="stiffening_spines", effects=(entry,))
+    (tmp_path / model).parent.mkdir(parents=True)
+    write_model(whole, tmp_path / model, made)
+    assert mark_of_fit() == before
+    assert base_marks(str(tmp_path), model) == [made]
+    file = tmp_path / "config/studies/stiffening_spines.yaml"
+    file.write_text(file.read_text() + "seed: 77\n")
+    assert mark_of_fit() != before

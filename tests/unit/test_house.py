@@ -1,28 +1,32 @@
-"""The house keeps its plan: who imports whom, and what no tracked file may hold.
-
-Rooms stand as in the plan of the house, but for three: `report` comes before `jobs`, which draw its
-figures, `tables` after `statics`, whose status they store, and `statistics` has left `sensitivity`.
-"""
+"""The house keeps its plan (docs/decisions/0015): who imports whom, what no tracked file holds."""
 
 import ast
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+
+from spinepipe.jobs.code import closure
+from spinepipe.studies.registry import kind_names, kind_of, place_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *("units", "problems", "decomposition", "files", "marks", "frames", "anatomy"),
-    *("effects", "model", "world", "statics"),
-    *("calibrate", "designs", "statistics", "sensitivity"),
-    *("tables", "comparison", "cohort", "studies", "discrepancy", "report", "jobs", "cli"),
+    *("status", "units", "problems", "files", "frames", "decomposition", "marks", "anatomy"),
+    *("effects", "model", "world", "statics", "calibrate"),
+    *("designs", "statistics", "sensitivity", "cohort", "tables", "comparison"),
+    *("studies", "report", "jobs", "kinds", "reference", "cli"),
 )
-"""Ground floor first; a room imports only itself and rooms before it."""
+"""Ground floor first; a room imports only itself and rooms before it.
 
+`studies` are the files beside the folders of the kinds, `kinds` those folders.
+"""
+
+KINDS = kind_names()
 MODULES = sorted((ROOT / PACKAGE).rglob("*.py"))
 LOCKS = sorted(ROOT.glob("requirements*.lock"))
 
@@ -63,7 +67,16 @@ HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}")
 def room_of(module: str) -> str | None:
     """The room of a dotted name inside the package, None outside it and for the package itself."""
     parts = module.split(".")
-    return parts[1] if parts[0] == PACKAGE and len(parts) > 1 else None
+    if parts[0] != PACKAGE or len(parts) == 1:
+        return None
+    return "kinds" if kind_named(module) else parts[1]
+
+
+def kind_named(module: str) -> str | None:
+    """The kind of study of a dotted name, None in all other rooms."""
+    parts = module.split(".")
+    inside = parts[:2] == [PACKAGE, "studies"] and len(parts) > 2 and parts[2] in KINDS
+    return parts[2] if inside else None
 
 
 def dotted(path: Path) -> str:
@@ -154,6 +167,120 @@ def test_a_room_knows_only_rooms_before_it(path: Path) -> None:
         if (other := room_of(name)) is not None and other not in allowed
     ]
     assert not wrong
+
+
+@pytest.mark.parametrize("path", MODULES, ids=dotted)
+def test_a_kind_knows_no_other_kind(path: Path) -> None:
+    own = kind_named(dotted(path))
+    others = [
+        f"line {line}: {name}"
+        for line, name in imports(path)
+        if kind_named(name) not in (None, own)
+    ]
+    assert not others, "kinds meet through files; what two need sinks into the core"
+
+
+def test_the_core_names_no_kind() -> None:
+    named = [
+        f"{dotted(path)}:{node.lineno}: {node.value}"
+        for path in MODULES
+        if kind_named(dotted(path)) is None
+        for node in ast.walk(ast.parse(path.read_bytes()))
+        if isinstance(node, ast.Constant) and node.value in KINDS
+    ]
+    assert not named, "a kind is found by its folder (spinepipe/studies/registry.py)"
+
+
+def modules_of_jobs(kind: str) -> set[str]:
+    """Full names of the files that hold jobs of a kind."""
+    return {place_of(kind, job.name).partition(":")[0] for job in kind_of(kind).jobs}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_within_a_kind_nobody_imports_upwards(kind: str) -> None:
+    base = f"{PACKAGE}.studies.{kind}"
+    jobs = modules_of_jobs(kind)
+    order = [
+        lambda name: name.startswith((f"{base}.settings", f"{base}.tables")),
+        lambda name: name == f"{base}.checks",
+        lambda name: name in jobs,
+        lambda name: name.startswith(f"{base}.figures"),
+        lambda name: name == f"{base}.page",
+        lambda name: name == f"{base}.kind",
+    ]
+
+    def floor(name: str) -> int | None:
+        return next((floor for floor, there in enumerate(order) if there(name)), None)
+
+    wrong = []
+    for path in (path for path in MODULES if kind_named(dotted(path)) == kind):
+        here = floor(dotted(path))
+        for line, name in imports(path):
+            there = floor(name)
+            if here is None or there is None or name == dotted(path):
+                continue
+            if there > here or (name in jobs and dotted(path) in jobs):
+                wrong.append(f"{dotted(path)}:{line}: {name}")
+    assert not wrong
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_folder_of_a_kind_hands_nothing_on(kind: str) -> None:
+    tree = ast.parse((ROOT / PACKAGE / "studies" / kind / "__init__.py").read_bytes())
+    assert not [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
+def parts_of_kinds() -> Iterator[tuple[str, str]]:
+    """Every kind with the full name of each file that a digest begins with."""
+    for name in KINDS:
+        yield from ((name, module) for module in sorted(modules_of_jobs(name)))
+        base = f"{PACKAGE}.studies.{name}"
+        yield from (
+            (name, f"{base}.{figure.at.partition(':')[0]}") for figure in kind_of(name).figures
+        )
+        yield name, f"{base}.page"
+
+
+@pytest.mark.parametrize(("kind", "module"), sorted(set(parts_of_kinds())))
+def test_a_digest_hangs_on_its_own_kind_alone(kind: str, module: str) -> None:
+    others = {name for name in closure(module) if kind_named(name) not in (None, kind)}
+    assert not others
+
+
+SOLVING = {
+    "cohort_stiffness": {"fit", "literature", "left_out", "pool"},
+    "discrepancy": {"search"},
+    "global_sensitivity": {"respond", "calibrate"},
+    "joint_pose_sensitivity": {
+        *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
+    },
+    "range_of_motion": {"simulate"},
+}
+"""Jobs that solve equilibria."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_solves_nothing_does_not_hang_on_the_engine(kind: str) -> None:
+    solving = {place_of(kind, job).partition(":")[0] for job in SOLVING.get(kind, ())}
+    others = {module for name, module in parts_of_kinds() if name == kind} - solving
+    others |= {f"{PACKAGE}.jobs.{job}" for job in ("collect", "draw", "report")}
+    assert not [module for module in sorted(others) if f"{PACKAGE}.world" in closure(module)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_kind_declares_is_there(kind: str) -> None:
+    declared = kind_of(kind)
+    for job in declared.jobs:
+        module, _, function = place_of(kind, job.name).partition(":")
+        assert callable(getattr(import_module(module), function))
+        assert set(job.writes) <= {table.name for table in declared.tables}
+    for figure in declared.figures:
+        module, _, function = figure.at.partition(":")
+        assert callable(getattr(import_module(f"{PACKAGE}.studies.{kind}.{module}"), function))
+        assert (ROOT / PACKAGE / "studies" / kind / "figures" / f"{figure.name}.rst").is_file()
+    page = import_module(f"{PACKAGE}.studies.{kind}.page")
+    assert callable(page.document)
+    assert set(page.READ) <= {table.name for table in declared.tables} | {"poses"}
 
 
 @pytest.mark.parametrize("name", ["tests", "benchmarks", "snakemake"])

@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from spinepipe.jobs.digest import code_digest
+from spinepipe.jobs.code import code_digest
 
 TESTS = Path(__file__).resolve().parents[1]
 SOURCES = ("generators/phantom", "validation")

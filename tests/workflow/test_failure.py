@@ -1,59 +1,60 @@
-"""Runs that go wrong: bad input, dying workers, folders that cannot be written, a killed run."""
+"""Runs that go wrong: bad input, dying workers, folders that cannot be written."""
 
 import shutil
-import subprocess
-import time
 from collections.abc import Callable
 
-import psutil
 import pytest
-from small_project import Project, written
+from small_project import Project
 
 pytestmark = pytest.mark.slow
 
-# Appended to a job of the copied package: what happens at one pose.
-ACCIDENT = """
+CALIBRATIONS = "small/calibrations/specimen=s01"
+ACCIDENTS = {
+    "0001": ("import os; os.kill(os.getpid(), 9)", "killed from outside (SIGKILL)"),
+    "0002": ("import os; os._exit(7)", "ended itself in mid-job with exit code 7"),
+    "0003": ("raise ValueError('no such spine')", "ValueError: no such spine"),
+    "0004": (
+        "raise OSError(28, 'full', 'results/x')",
+        "no space is left on the disk of results",
+    ),
+}
+"""What happens at a pose, and what must be said of it."""
 
-_run = run
+# Added to the Snakefile: the accidents stand beside it and are run in place of the job.
+RUN_ACCIDENTS = """
+
+whole_execute = execute
 
 
-def run(**arguments):
-    if arguments["pose"] == "0003":
-        {accident}
-    _run(**arguments)
+def execute(rule, function, wildcards, log, arguments):
+    pose = wildcards.get("pose")
+    if rule == "calibrate" and pose in {poses}:
+        function = f"accidents:at_{{pose}}"
+    whole_execute(rule, function, wildcards, log, arguments)
 """
 
 
-def arrange(project: Project, accident: str) -> None:
-    path = project.path("spinepipe/jobs/calibrate.py")
-    path.write_text(path.read_text() + ACCIDENT.format(accident=accident))
-
-
-@pytest.mark.parametrize(
-    ("accident", "words"),
-    [
-        ("import os; os.kill(os.getpid(), 9)", "killed from outside (SIGKILL)"),
-        ("import os; os._exit(7)", "ended itself in mid-job with exit code 7"),
-        ("raise ValueError('no such spine')", "ValueError: no such spine"),
-        ("raise OSError(28, 'full', 'results/x')", "no space is left on the disk of results"),
-    ],
-)
-def test_a_failing_job_is_named_and_the_others_are_kept(
-    project: Project, accident: str, words: str
-) -> None:
-    original = project.path("spinepipe/jobs/calibrate.py").read_text()
-    content = project.contents()
-    arrange(project, accident)
+def test_failing_jobs_are_named_and_the_others_are_kept(project: Project) -> None:
+    content, snakefile = project.contents(), project.path("Snakefile")
+    whole = snakefile.read_text()
+    shutil.rmtree(project.path(f"results/{CALIBRATIONS}"))
+    happens = [f"def at_{pose}(**_):\n    {what}\n" for pose, (what, _) in ACCIDENTS.items()]
+    project.path("accidents.py").write_text("\n".join(happens))
+    snakefile.write_text(whole + RUN_ACCIDENTS.format(poses=set(ACCIDENTS)))
     done = project.snakemake("-j2", "--keep-going", "all")
-    log = "results/small/logs/calibrate/specimen=s01/pose=0003.log"
     assert done.returncode != 0
-    assert "job calibrate study=small specimen=s01 pose=0003: " in done.stdout
-    assert words in done.stdout
-    assert log in done.stdout
     assert "Traceback" not in done.stdout
-    assert words in project.path(log).read_text()
-    project.path("spinepipe/jobs/calibrate.py").write_text(original)
-    project.run_all()
+    for pose, (_, words) in ACCIDENTS.items():
+        log = f"results/small/logs/calibrate/specimen=s01/pose={pose}.log"
+        assert f"job calibrate study=small specimen=s01 pose={pose}: " in done.stdout
+        assert words in done.stdout
+        assert log in done.stdout
+        assert words in project.path(log).read_text()
+
+    snakefile.write_text(whole)
+    again = project.rerun()
+    lost = {f"{CALIBRATIONS}/pose={pose}.parquet" for pose in ACCIDENTS}
+    assert {name for name in again if name.startswith(CALIBRATIONS)} == lost
     assert project.contents() == content
 
 
@@ -72,7 +73,7 @@ def test_an_unsound_cohort_is_told_before_anything_runs(
 
 def test_a_study_outside_the_selection_is_checked_when_asked_for(project: Project) -> None:
     project.write_study("other", poses=0)
-    assert "Nothing to be done" in project.run_all()
+    assert project.planned() == set()
     done = project.snakemake("-j2", "results/other/poses.parquet")
     assert done.returncode != 0
     assert "other.yaml" in done.stdout
@@ -96,42 +97,3 @@ def test_the_warm_pool_is_insisted_on(new_project: Callable[[int], Project]) -> 
     assert done.returncode != 0
     assert "force-use-threads" in done.stdout
     assert not project.path("results").exists()
-
-
-def test_a_killed_run_goes_on_where_it_was(new_project: Callable[[int], Project]) -> None:
-    project = new_project(30)
-    kill_in_mid_study(project)
-    cut_off = {path.name for path in project.path(".snakemake/incomplete").rglob("*")}
-    before = project.files()
-    assert project.snakemake("--unlock").returncode == 0
-    project.run_all()
-    again = written(before, project.files()) & set(before)
-    assert len(again) <= len(cut_off)
-    assert len([name for name in project.files() if "/jobs/" in name]) == 30 * 3
-    resumed = project.contents()
-    shutil.rmtree(project.path("results"))
-    project.run_all()
-    assert project.contents() == resumed
-
-
-def kill_in_mid_study(project: Project) -> None:
-    """Kill Snakemake outright during the simulations; its workers have to end by themselves."""
-    run = subprocess.Popen(
-        project.command("-j2", "all"),
-        cwd=project.folder,
-        env=project.environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 120
-    jobs = project.path("results/small/jobs")
-    while len(list(jobs.rglob("*.parquet"))) < 20:
-        assert run.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    workers = psutil.Process(run.pid).children(recursive=True)
-    run.kill()
-    run.wait()
-    assert workers
-    _, alive = psutil.wait_procs(workers, timeout=10)
-    assert not alive

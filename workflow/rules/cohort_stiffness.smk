@@ -12,12 +12,6 @@ wildcard_constraints:
     without="[^/=]+",
 
 
-def fits_of_others(wildcards):
-    """Fits of the other specimens, of which the left-out one takes the median."""
-    place = wildcards.specimen, wildcards.representation, wildcards.fitted_to
-    return layout(wildcards.study).fits_of_others(*place)
-
-
 rule literature:
     input:
         base_model,
@@ -51,7 +45,10 @@ rule fit:
 rule left_out:
     input:
         base_model,
-        others=fits_of_others,
+        # Fits of the other specimens, of which the left-out one takes the median.
+        others=lambda wildcards: layout(wildcards.study).fits_of_others(
+            wildcards.specimen, wildcards.representation, wildcards.fitted_to
+        ),
     output:
         stiffness=f"{COHORTS}/left_out/{OWN}/stiffness.parquet",
         errors=f"{COHORTS}/left_out/{OWN}/errors.parquet",

@@ -8,13 +8,6 @@ wildcard_constraints:
     batch="[0-9]{5,7}",
 
 
-def blocks_of_specimen(table):
-    """Input function: the blocks of a table that hold the specimen at hand."""
-    return lambda wildcards: layout(wildcards.study).blocks_of(
-        table, wildcards.specimen
-    )
-
-
 rule draw_design:
     output:
         output=f"{SENSITIVITIES}/design.parquet",
@@ -60,8 +53,12 @@ rule calibrate_samples:
 rule index_factors:
     input:
         design=f"{RESULTS}/design.parquet",
-        responses=blocks_of_specimen("responses"),
-        calibrated=blocks_of_specimen("calibrated"),
+        responses=lambda wildcards: layout(wildcards.study).blocks_of(
+            "responses", wildcards.specimen
+        ),
+        calibrated=lambda wildcards: layout(wildcards.study).blocks_of(
+            "calibrated", wildcards.specimen
+        ),
     output:
         indices=f"{SENSITIVITIES}/analysis/specimen={{specimen}}/indices.parquet",
         convergence=f"{SENSITIVITIES}/analysis/specimen={{specimen}}/convergence.parquet",

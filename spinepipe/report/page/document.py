@@ -17,7 +17,7 @@ from spinepipe.marks import KEY
 from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
 from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
 from spinepipe.report.style import picture, style
-from spinepipe.report.words import count, number
+from spinepipe.report.words import count, listed, number
 from spinepipe.studies.study import Study
 from spinepipe.tables import Tables
 from spinepipe.tables.schema import Column
@@ -307,9 +307,7 @@ def _part(name: str) -> str:
 
 def _specimens(cohort: Cohort) -> str:
     names = cohort.specimen_names
-    shown = ", ".join(names[:_MOST_NAMES])
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return f"{count(len(names), 'specimen')}: {shown}{more}"
+    return f"{count(len(names), 'specimen')}: {listed(names, _MOST_NAMES, last=None)}"
 
 
 def _still(view: SpecimenView, cohort: Cohort) -> bytes:

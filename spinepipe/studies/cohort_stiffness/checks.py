@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, one_of
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     ALL_BUT,
@@ -13,7 +14,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     NOTHING,
     CohortStiffness,
 )
-from spinepipe.studies.places import at, readings, unknown_tests
+from spinepipe.studies.places import at, readings, unknown_levels, unknown_tests
 from spinepipe.units import ROTATIONS
 
 _UNFIT = re.compile(r"[/={}\\\x00-\x1f]|^\.|^\s|\s$")
@@ -85,18 +86,16 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
 def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
     """Ratios of levels need a value for each level, and a value needs its level."""
     given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
-    for joint in given:
-        if joint not in cohort.joint_names:
-            place = at(document, f"level_stiffness.{joint}")
-            remedy = did_you_mean(joint, cohort.joint_names, "delete it or correct its name")
-            yield Problem(*place, f"unknown joint '{joint}'", one_of(cohort.joint_names), remedy)
-    if "level_ratio" not in study.representations:
+    yield from unknown_levels(document, given, cohort.joint_names)
+    chosen = [name for name in study.representations if named(name).by_level]
+    if not chosen:
         return
     missing = [joint for joint in cohort.joint_names if joint not in study.level_stiffness]
     if missing:
         found = f"no value for {', '.join(missing)}"
-        allowed = "a value for every joint of the cohort, as level_ratio is among representations"
-        remedy = "add them, or leave level_ratio out of representations"
+        names, verb = " and ".join(chosen), "is" if len(chosen) == 1 else "are"
+        allowed = f"a value for every joint of the cohort, as {names} {verb} among representations"
+        remedy = f"add them, or leave {names} out of representations"
         yield Problem(*at(document, "level_stiffness"), found, allowed, remedy)
 
 

@@ -1,30 +1,13 @@
-"""A finding that is claimed, and the rules by which numbers decide about it.
+"""A finding that is claimed, and the rule by which a mean decides about it."""
 
-Which errors are compared to decide about a finding, and what is claimed of them.
-
-Findings about errors: which stiffness predicts better, and where errors are large.
-"""
-
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from spinepipe.statistics import Mean, mean_of, wilcoxon_signed_rank
-from spinepipe.studies.cohort_stiffness.stages import (
-    FITTED,
-    LEFT_OUT_CASE,
-    LEFT_OUT_SPECIMEN,
-    LITERATURE,
-    measured_specimens,
-    of_joint_fits,
-    of_single_cases,
-    rotations,
-    specimen_rms,
-    without_result,
-)
+from spinepipe.statistics import Mean, mean_of
+from spinepipe.tables.shared import joined
 
 Row = dict[str, Any]
 
@@ -58,17 +41,6 @@ class Claim:
         return self.row("undecided", message)
 
 
-def told(mean: Mean) -> str:
-    """Of how many specimens a mean is, or why it has no interval."""
-    if mean.n == 0:
-        return "no specimen has all results"
-    if mean.n == 1:
-        return "one specimen only: no interval"
-    if mean.interval is None:
-        return f"the same in all {mean.n} specimens: no interval"
-    return f"{mean.n} specimens"
-
-
 def above_zero(claim: Claim, values: pd.Series, significance: float, note: str = "") -> Row:
     """Claim that the mean over specimens is above zero.
 
@@ -81,9 +53,15 @@ def above_zero(claim: Claim, values: pd.Series, significance: float, note: str =
     return claim.row(holds, joined(told(mean), note), mean.value, mean.interval, mean.p)
 
 
-def joined(*notes: str) -> str:
-    """Notes as one message."""
-    return "; ".join(note for note in notes if note)
+def told(mean: Mean) -> str:
+    """Of how many specimens a mean is, or why it has no interval."""
+    if mean.n == 0:
+        return "no specimen has all results"
+    if mean.n == 1:
+        return "one specimen only: no interval"
+    if mean.interval is None:
+        return f"the same in all {mean.n} specimens: no interval"
+    return f"{mean.n} specimens"
 
 
 def words(name: str) -> str:
@@ -96,312 +74,5 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"
 
 
-QUANTITY = (
-    "error with {} less that with {}: root mean square of all measured rotations, mean over "
-    "specimens, t interval"
-)
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Errors of one representation in one stage.
-
-    Attributes
-    ----------
-    single : whether of fits to single load cases, as published, or to all of them.
-    """
-
-    words: str
-    representation: str
-    stage: str
-    single: bool = True
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """The claim that one error is larger than another.
-
-    Attributes
-    ----------
-    own_readings : whether only the smaller one is of stiffness fitted to the very readings by
-        which both are judged.
-    """
-
-    finding: str
-    statement: str
-    larger: Errors
-    smaller: Errors
-    own_readings: bool = False
-
-    @property
-    def claim(self) -> Claim:
-        """The claim in words."""
-        quantity = QUANTITY.format(self.larger.words, self.smaller.words)
-        return Claim(self.finding, self.statement, quantity, "deg")
-
-
-PUBLISHED = Errors("published stiffness", "literature", LITERATURE)
-PUBLISHED_LEVELS = Errors("published stiffness of the levels", "literature_levels", LITERATURE)
-UNIFORM = Errors("one stiffness per specimen", "per_specimen", FITTED)
-UNIFORM_OF_OTHERS = Errors(
-    "median of the other specimens, one stiffness for all joints",
-    *("per_specimen", LEFT_OUT_SPECIMEN),
-)
-UNIFORM_OF_CASES = Errors(
-    "one stiffness per specimen from its other load cases", "per_specimen", LEFT_OUT_CASE
-)
-RATIO = Errors("published ratio of levels, scaled", "level_ratio", FITTED)
-RATIO_OF_OTHERS = Errors(
-    "median of the other specimens, published ratio of levels", "level_ratio", LEFT_OUT_SPECIMEN
-)
-RATIO_OF_CASES = Errors(
-    "published ratio of levels, scaled by the other load cases", "level_ratio", LEFT_OUT_CASE
-)
-
-PUBLISHED_FINDINGS = (
-    Comparison(
-        "optimised_beats_literature",
-        "One stiffness per specimen, fitted to a load case, describes that load case better than "
-        "the published stiffness.",
-        *(PUBLISHED, UNIFORM, True),
-    ),
-    Comparison(
-        "optimised_beats_literature_left_out_case",
-        "One stiffness per specimen predicts a load case it was not fitted to better than the "
-        "published stiffness.",
-        *(PUBLISHED, UNIFORM_OF_CASES),
-    ),
-    Comparison(
-        "cross_validation_beats_literature",
-        "The median stiffness of the other specimens predicts a specimen better than the "
-        "published stiffness.",
-        *(PUBLISHED, UNIFORM_OF_OTHERS),
-    ),
-    Comparison(
-        "optimised_beats_cross_validation",
-        "A specimen's own stiffness describes it better than the median of the others.",
-        *(UNIFORM_OF_OTHERS, UNIFORM, True),
-    ),
-    Comparison(
-        "optimised_level_ratio_beats_literature",
-        "Scaling the published stiffness of the levels to a specimen describes it better than "
-        "leaving it as published.",
-        *(PUBLISHED_LEVELS, RATIO, True),
-    ),
-    Comparison(
-        "wrong_level_ratio_worse_than_uniform",
-        "The published ratio of levels, scaled to a specimen, describes it worse than one "
-        "stiffness for all joints.",
-        *(RATIO, UNIFORM),
-    ),
-    Comparison(
-        "wrong_level_ratio_worse_than_uniform_left_out_specimen",
-        "The published ratio of levels predicts a specimen from the others worse than one "
-        "stiffness for all joints.",
-        *(RATIO_OF_OTHERS, UNIFORM_OF_OTHERS),
-    ),
-    Comparison(
-        "wrong_level_ratio_worse_than_uniform_left_out_case",
-        "The published ratio of levels predicts a load case from the others worse than one "
-        "stiffness for all joints.",
-        *(RATIO_OF_CASES, UNIFORM_OF_CASES),
-    ),
-)
-
-WORDS = {
-    "per_specimen": "one stiffness for all joints",
-    "level_ratio": "the published ratio of levels",
-    "per_joint": "a stiffness for each joint",
-    "partially_pooled": "partially pooled stiffness",
-}
-HELD_OUT = {
-    LEFT_OUT_SPECIMEN: "a specimen from the others",
-    LEFT_OUT_CASE: "a load case from the others",
-}
-CONTESTS = (
-    ("per_joint", "per_specimen"),
-    ("per_joint", "level_ratio"),
-    ("partially_pooled", "per_specimen"),
-    ("partially_pooled", "level_ratio"),
-    ("partially_pooled", "per_joint"),
-)
-"""Pairs of representations of which the first is claimed to predict better what is held out."""
-
-
-def _contest(better: str, worse: str, stage: str) -> Comparison:
-    first, second = WORDS[better], WORDS[worse]
-    statement = f"{first[0].upper()}{first[1:]} predicts {HELD_OUT[stage]} better than {second}."
-    return Comparison(
-        f"{better}_beats_{worse}_{stage}",
-        statement,
-        Errors(second, worse, stage, single=False),
-        Errors(first, better, stage, single=False),
-    )
-
-
-COMPARISONS = (
-    *PUBLISHED_FINDINGS,
-    *(_contest(better, worse, stage) for better, worse in CONTESTS for stage in HELD_OUT),
-)
-
-
-OWN_READINGS = "expected by construction: fitted to the readings it is judged by"
-
-EVERY_LEVEL = Claim(
-    "wrong_level_ratio_worse_at_every_level",
-    "The published ratio of levels, scaled to a specimen, describes every joint worse than one "
-    "stiffness for all joints.",
-    "joints with the larger error, mean over specimens, t test joint by joint",
-    "joints",
-)
-LOADED = Claim(
-    "error_is_largest_in_loaded_direction",
-    "With one stiffness per specimen the error is larger in the direction of the load than in the "
-    "others.",
-    "error in the loaded coordinate less that of the other rotations: root mean square, mean over "
-    "specimens, t interval",
-    "deg",
-)
-
-
-def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
-    """Rows of the table ``findings`` that follow from those of ``errors``."""
-    seen = rotations(errors)
-    for comparison in COMPARISONS:
-        yield compared(comparison, seen, significance)
-    yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)
-    yield loaded_direction(_of(seen, UNIFORM), seen, significance)
-    yield from overpredictions(seen, significance)
-
-
-def _of(errors: pd.DataFrame, wanted: Errors) -> pd.DataFrame:
-    stage = of_single_cases if wanted.single else of_joint_fits
-    chosen = stage(errors, wanted.stage)
-    return chosen[chosen["representation"] == wanted.representation]
-
-
-def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) -> Row:
-    """The row of a comparison; specimens that a side cannot predict are named."""
-    larger, smaller = (_of(errors, one) for one in (comparison.larger, comparison.smaller))
-    results = _results(larger, smaller, errors)
-    pair = pd.DataFrame(results).dropna()
-    if pair.empty:
-        return comparison.claim.unknown(_missing(larger, smaller))
-    asked = _asked(comparison, errors)
-    sides = (comparison.larger.words, comparison.smaller.words)
-    lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
-    note = joined(_note(pair), OWN_READINGS if comparison.own_readings else "", lost)
-    return _against(comparison.claim, results, asked, significance, note)
-
-
-def _results(
-    larger: pd.DataFrame, smaller: pd.DataFrame, errors: pd.DataFrame
-) -> dict[str, pd.Series]:
-    """Error by specimen of both sides."""
-    return {"larger": specimen_rms(larger, errors), "smaller": specimen_rms(smaller, errors)}
-
-
-def _asked(comparison: Comparison, errors: pd.DataFrame) -> list[str]:
-    """Specimens of which both sides should have a result: one load case leaves none out."""
-    cases = errors.groupby("specimen")["test"].nunique()
-    held_out = LEFT_OUT_CASE in (comparison.larger.stage, comparison.smaller.stage)
-    return list(cases.index[cases >= (2 if held_out else 1)])
-
-
-def _lost(found: Mapping[str, pd.Series], asked: Iterable[str]) -> str:
-    """Specimens left out, for a message."""
-    lost = without_result(found, asked)
-    return f"left out, without a result: {lost}" if lost else ""
-
-
-def _against(
-    claim: Claim,
-    results: Mapping[str, pd.Series],
-    asked: Iterable[str],
-    significance: float,
-    note: str = "",
-) -> Row:
-    """Undecided where the side that comes out better has failed: hard specimens may be lost."""
-    pair = pd.DataFrame(results).dropna()
-    row = above_zero(claim, pair["larger"] - pair["smaller"], significance, note)
-    if row["holds"] == "undecided":
-        return row
-    better = results["smaller" if row["holds"] == "yes" else "larger"]
-    return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
-
-
-def _missing(larger: pd.DataFrame, smaller: pd.DataFrame) -> str:
-    if larger.empty and smaller.empty:
-        return "neither was computed in this study"
-    if larger.empty or smaller.empty:
-        missing = "first" if larger.empty else "second"
-        return f"the {missing} was not computed in this study"
-    return "no specimen has all results of both"
-
-
-def _note(pair: pd.DataFrame) -> str:
-    larger, smaller = pair["larger"], pair["smaller"]
-    tested = wilcoxon_signed_rank(larger.to_numpy(float), smaller.to_numpy(float))
-    means = f"{larger.mean():.3g} less {smaller.mean():.3g} deg"
-    return joined(means, "" if tested.p is None else f"Wilcoxon p {tested.p:.2g}")
-
-
-def every_level(
-    ratio: pd.DataFrame, uniform: pd.DataFrame, errors: pd.DataFrame, significance: float
-) -> Row:
-    """Decided where it is at every joint: yes where the ratio of levels is worse at all."""
-    of: dict[str, list[str]] = {"yes": [], "no": [], "undecided": []}
-    values = []
-    for joint in errors["joint"].unique():
-        here = [table[table["joint"] == joint] for table in (ratio, uniform, errors)]
-        results = _results(*here)
-        row = _against(EVERY_LEVEL, results, measured_specimens(here[2]), significance)
-        of[row["holds"]].append(str(joint))
-        values.append(row["value"])
-    if not any(value is not None for value in values):
-        return EVERY_LEVEL.unknown(_missing(ratio, uniform))
-    told = f"better at: {listed(of['no'])}; undecided at: {listed(of['undecided'])}"
-    sides = {RATIO.words: specimen_rms(ratio, errors)}
-    sides |= {UNIFORM.words: specimen_rms(uniform, errors)}
-    lost = _lost(sides, measured_specimens(errors))
-    message = joined(f"of {len(values)} joints; {told}", lost)
-    holds = "undecided" if of["undecided"] else "no" if of["no"] else "yes"
-    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])))
-
-
-def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:
-    """Error in the loaded direction against that in the others."""
-    pair, read = {}, []
-    for name, loaded in (("loaded", True), ("others", False)):
-        here = errors[errors["loaded"] == loaded]
-        pair[name] = specimen_rms(fitted[fitted["loaded"] == loaded], here)
-        read.append(set(measured_specimens(here)))
-    difference = (pair["loaded"] - pair["others"]).dropna()
-    return above_zero(LOADED, difference, significance, _lost(pair, set.intersection(*read)))
-
-
-def overpredictions(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
-    """Does the published stiffness predict too much motion? One finding per load case."""
-    published = errors[(errors["representation"] == "literature") & errors["loaded"].astype(bool)]
-    for test, rows in published.groupby("test", sort=False):
-        claim = Claim(
-            f"literature_overpredicts_motion_{test}",
-            f"The published stiffness predicts too much motion under {words(str(test))}.",
-            "predicted less measured motion in the loaded coordinate at the largest load, mean "
-            "over joints as a share of the mean measured motion; mean over specimens, t interval",
-            "percent",
-        )
-        excess = overprediction_percent(rows)
-        lost = _lost({"published stiffness": excess}, measured_specimens(rows))
-        yield above_zero(claim, excess, significance, lost)
-
-
-def overprediction_percent(rows: pd.DataFrame) -> pd.Series:
-    """Excess of motion by specimen, in percent of what was measured; all joints must be known."""
-    measured = rows[rows["measured_peak"].notna()]
-    sign = np.sign(measured["measured_peak"])
-    by = measured["specimen"]
-    excess = (measured["peak_error"].astype(float) * sign).groupby(by)
-    motion = measured["measured_peak"].abs().groupby(by).sum()
-    known = (excess.count() == excess.size()) & (motion > 0.0)
-    return (100.0 * excess.sum() / motion.where(motion > 0.0))[known]
+FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
+"""What differs, and what it is seen in again and again."""

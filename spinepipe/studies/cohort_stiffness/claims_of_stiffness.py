@@ -1,36 +1,20 @@
-"""Findings about load cases: does a stiffness hang on the load case it was fitted to?
+"""What is claimed of stiffness: that it hangs on the load case, specimen and level."""
 
-Findings about differences: of stiffness, and of errors, between specimens and levels.
-
-Job: what the study says to the findings of Gould et al. 2024b, each with its number.
-"""
-
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
-from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.claims import (
-    Claim,
-    Row,
-    error_findings,
-    joined,
-    listed,
-    told,
-    words,
-)
-from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness, label_of_others
+from spinepipe.studies.cohort_stiffness.claims import FACTORS, Claim, Row, told, words
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.studies.cohort_stiffness.tables import FINDINGS
-from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables.shared import joined
 
 LITTLE_DEG = 0.05
 """Adjusted share of the squared error below which what is not significant is called absent."""
@@ -42,6 +26,7 @@ SHARE = (
     "share of specimens with a significant F test (Holm) of separate against joint fits, exact "
     "binomial interval; not this share decides but p, combined over specimens (Fisher)"
 )
+
 SPECIFIC = {
     "per_joint": Claim(
         "stiffness_is_load_case_specific",
@@ -56,8 +41,10 @@ SPECIFIC = {
         "",
     ),
 }
+
 MISFIT = "also misfit of a uniform stiffness, which differs between load cases, counts here"
-RATIO = Claim(
+
+STIFFER = Claim(
     "loaded_stiffness_differs",
     "A joint is stiffer, or softer, against the main moment than the other load cases tell.",
     "stiffness against the loaded coordinate, fitted to that load case, over that fitted to the "
@@ -65,6 +52,9 @@ RATIO = Claim(
     "specimens, t interval",
     "",
 )
+
+LITTLE = 0.1
+"""A share whose whole interval lies below this is called no difference."""
 
 
 def load_case_findings(
@@ -143,7 +133,7 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
 def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     """Yes where the mean differs from 1, no where all of the interval is near 1."""
     if ratios.empty:
-        return RATIO.unknown("no joint has both stiffnesses, constrained by the data")
+        return STIFFER.unknown("no joint has both stiffnesses, constrained by the data")
     mean = mean_of(mean_excess(ratios).to_numpy(float))
     assert mean.value is not None
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
@@ -155,7 +145,7 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     elif ends is not None and 1.0 + ends[0] > 1.0 / MARGIN and 1.0 + ends[1] < MARGIN:
         holds = "no"
     interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
-    return RATIO.row(holds, joined(told(mean), many), 1.0 + mean.value, interval, mean.p)
+    return STIFFER.row(holds, joined(told(mean), many), 1.0 + mean.value, interval, mean.p)
 
 
 def mean_excess(ratios: pd.DataFrame) -> pd.Series:
@@ -170,18 +160,6 @@ def mean_excess(ratios: pd.DataFrame) -> pd.Series:
     weight = (ratio * ratios["error"]) ** -2.0
     sums = ((ratio - 1.0) * weight).groupby(ratios["specimen"]).sum()
     return sums / weight.groupby(ratios["specimen"]).sum()
-
-
-LITTLE = 0.1
-"""A share whose whole interval lies below this is called no difference."""
-
-FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
-"""What differs, and what it is seen in again and again."""
-
-ERROR_CLAIMS = {
-    "per_specimen": ("", "one stiffness for all joints"),
-    "level_ratio": ("level_ratio_", "the published ratio of levels"),
-}
 
 
 def stiffness_spreads(
@@ -272,54 +250,3 @@ def _additive(values: pd.DataFrame) -> bool:
 def _share(f: float, times: int) -> float:
     """Intraclass correlation from F, each group seen so many times; below chance counts as 0."""
     return max(0.0, (f - 1.0) / (f - 1.0 + times))
-
-
-def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row]:
-    """Do errors in the loaded coordinate differ between specimens, and between levels?"""
-    for representation, (prefix, described) in ERROR_CLAIMS.items():
-        for what in FACTORS:
-            claim = Claim(
-                f"{prefix}errors_differ_between_{what}",
-                f"With {described}, fitted, errors in the loaded coordinate differ between {what} "
-                "under some load case.",
-                "largest Kendall's W of Friedman tests over load cases; p smallest, Holm",
-                "",
-            )
-            family = statistics["family"] == f"between_{what}/{representation}/fitted"
-            tests = statistics[family & (statistics["test"] == "Friedman")]
-            yield _errors_differ(claim, tests[tests["response"] == "loaded_error"], significance)
-
-
-def _errors_differ(claim: Claim, tests: pd.DataFrame, significance: float) -> Row:
-    """Yes where a test is significant, else undecided: a small cohort cannot tell no difference."""
-    known = tests.dropna(subset="p_holm")
-    if known.empty:
-        return claim.unknown(joined(*tests["message"].unique()) or "no such fits in this study")
-    p = float(known["p_holm"].min())
-    below = known.loc[known["p_holm"] < significance, "stratum"]
-    message = f"significant under: {listed(list(below))}; {len(known)} load cases; no interval"
-    value = float(known["effect"].max())
-    return claim.row("yes" if p < significance else "undecided", message, value, None, p)
-
-
-def run(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``findings.parquet``."""
-    settings, cohort = study_of_kind(CohortStiffness, root, study)
-    rows = list(finding_rows(read_frames(tables), settings.significance))
-    origin = provenance("findings", settings, cohort)
-    write(from_rows(FINDINGS, rows), output, origin)
-
-
-def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Iterator[Row]:
-    """Rows of the table ``findings``.
-
-    Parameters
-    ----------
-    frames : tables ``stiffness``, ``errors``, ``statistics``, and ``pooling`` where there is one.
-    significance : p below which a test decides.
-    """
-    stiffness, errors, statistics = (frames[n] for n in ("stiffness", "errors", "statistics"))
-    yield from error_findings(errors, significance)
-    yield from load_case_findings(stiffness, errors, statistics, significance)
-    yield from stiffness_spreads(stiffness, frames.get("pooling"), significance)
-    yield from error_spreads(statistics, significance)

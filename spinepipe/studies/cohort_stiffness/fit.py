@@ -12,7 +12,6 @@ from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    SHARED_ERROR,
     criteria,
     independent,
     no_fit,
@@ -25,15 +24,15 @@ from spinepipe.studies.cohort_stiffness.problem import (
     calibration_problem,
     origin,
     specimen_tests,
-    start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.tables.shared import joined
+from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
-IN_FOLDERS = ("specimen", "representation", "fitted_to")
-"""Columns that the folders of a job file carry."""
 
 
 def run(
@@ -123,7 +122,7 @@ def _record(problem: Problem, found: Fit) -> Row:
     several = f"{found.n_optima} optima: the answer depends on the start"
     alone = independent(problem)
     shared = "" if alone or cost is None else SHARED_ERROR
-    notes = [found.message, several if found.n_optima > 1 else "", shared]
+    notes = found.message, several if found.n_optima > 1 else "", shared
     return {
         "readings": readings,
         "unknowns": unknowns,
@@ -134,14 +133,13 @@ def _record(problem: Problem, found: Fit) -> Row:
         "evaluations": found.evaluations,
         "n_optima": found.n_optima,
         "status": found.status.value,
-        "message": "; ".join(note for note in notes if note),
+        "message": joined(*notes),
     }
 
 
 def _no_stiffness(settings: CohortStiffness, cohort: Cohort, refusal: str) -> list[Row]:
-    k = start_stiffness(settings, cohort, "literature")
-    nothing = np.full(k.shape, np.nan)
-    none = np.zeros(k.shape, dtype=int)
+    nothing = np.full((len(cohort.joint_names), len(COORDINATES)), np.nan)
+    none = np.zeros(nothing.shape, dtype=int)
     rows = stiffness_rows(
         cohort.joint_names, settings.free, nothing, nothing, 0.0, none.astype(bool), none
     )

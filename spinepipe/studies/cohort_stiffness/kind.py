@@ -6,13 +6,13 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.published import OF_COHORTS, stands_for
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
+from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
-    POOLED,
     CohortStiffness,
     load_sets,
     tests_of,
@@ -25,15 +25,10 @@ OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
 """Tables joined from job files."""
 
 _ANALYSES = (
-    Job("mae", "ranking:mae", ("errors",), ("mae",)),
-    Job("ranking", "ranking:ranking", ("errors", "fits", "pooling"), ("ranking",)),
+    Job("mae", "", ("errors",), ("mae",)),
+    Job("ranking", "", ("errors", "fits", "pooling"), ("ranking",)),
     Job("statistics", "significance", ("errors", "fits"), ("statistics",)),
-    Job(
-        "findings",
-        "claims_of_stiffness",
-        ("stiffness", "errors", "statistics", "pooling"),
-        ("findings",),
-    ),
+    Job("findings", "", ("stiffness", "errors", "statistics", "pooling"), ("findings",)),
     Job(
         "against_gould_2024b",
         "gould_2024b.against",
@@ -96,7 +91,7 @@ class CohortLayout(StudyFiles):
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
-        rebuilt = stands_for(cohort.name, OF_COHORTS)
+        rebuilt = GOULD_2024B.stands_for(cohort.name)
         return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt)
 
     @property
@@ -214,7 +209,6 @@ KIND = Kind(
         Job(
             "pool",
             ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
-            specimens="all",
             reads_base=True,
         ),
         *_ANALYSES,

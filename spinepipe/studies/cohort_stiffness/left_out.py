@@ -10,8 +10,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import read_mark
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.claims import joined
-from spinepipe.studies.cohort_stiffness.fit import IN_FOLDERS
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
@@ -22,8 +20,9 @@ from spinepipe.studies.cohort_stiffness.problem import (
     start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 SOURCE = "others_median"

@@ -1,7 +1,4 @@
-"""The report of a cohort study.
-
-Which tables the page of a cohort study shows, and which of their rows.
-"""
+"""The report of a cohort study: its tables, and what is said of parts that it leaves out."""
 
 from dataclasses import replace
 
@@ -14,6 +11,11 @@ from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, NOBODY, CohortS
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 from spinepipe.tables.shared import against_as_shown
+
+QUESTION = (
+    "Does stiffness differ between specimens, levels and load cases, how should it be described, "
+    "and does it carry over to what it was not fitted to?"
+)
 
 SHOWN = {
     "findings": "Claims about the cohort, checked",
@@ -28,46 +30,18 @@ SHOWN = {
 }
 """Tables of the page in their order, with their titles."""
 
+READ = SHOWN
+"""Tables whose rows the page needs; of the others it tells where they come from."""
+
 _CLAIM_ORDER = ("statement", "holds", "value", "unit", "low", "high", "p", "quantity", "message")
+
 _COLUMNS = {
     FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
     AGAINST_GOULD_2024B.name: against_as_shown(AGAINST_GOULD_2024B),
 }
 """What a reader compares stands first; short names are left to the files."""
 
-
 _SHAPES = {table.name: table for table in TABLES}
-
-
-def shown_tables(results: Results) -> list[Sortable]:
-    """Tables that the study has, as the page shows them; those without rows are left out."""
-    found = []
-    for name, title in SHOWN.items():
-        frame = results.table(name)
-        if not len(frame):
-            continue
-        rows, told = _rows(name, frame)
-        shape = _SHAPES[name]
-        columns = _COLUMNS.get(shape.name, shape.columns)
-        found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
-    return [table for table in found if table.rows]
-
-
-def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
-    """Rows that the page shows, and what is said of those that it does not."""
-    chosen, told = frame, ""
-    if name == "stiffness":
-        whole = frame["fitted_to"] == joint_label_of(frame)
-        chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
-    elif name == "pooling":
-        chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
-    elif name in ("fits", "mae"):
-        left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
-        chosen, told = frame[~left_out], "fits that leave no load case out"
-    if len(chosen) == len(frame):
-        return frame, ""
-    return chosen, f"Here: {told}; the others are in {name}.parquet."
-
 
 HELD_OUT_ERROR = "held_out_error"
 """The figure of errors of held-out motion."""
@@ -77,13 +51,6 @@ NOT_HELD_OUT = (
     "the file's in every bar: those for all specimens where it has such, else those for the "
     "specimen itself. Readings that they were found on count as held out here for stiffness only."
 )
-
-QUESTION = (
-    "Does stiffness differ between specimens, levels and load cases, how should it be described, "
-    "and does it carry over to what it was not fitted to?"
-)
-READ = SHOWN
-"""Tables whose rows the page needs; of the others it tells where they come from."""
 
 
 def document(study: CohortStiffness, cohort: Cohort, results: Results) -> Document:
@@ -124,3 +91,33 @@ def left_out(study: CohortStiffness, specimens: int) -> tuple[str, ...]:
         ),
     )
     return tuple(f"{part} ({why})" for part, why, done in parts if not done)
+
+
+def shown_tables(results: Results) -> list[Sortable]:
+    """Tables that the study has, as the page shows them; those without rows are left out."""
+    found = []
+    for name, title in SHOWN.items():
+        frame = results.table(name)
+        if not len(frame):
+            continue
+        rows, told = _rows(name, frame)
+        shape = _SHAPES[name]
+        columns = _COLUMNS.get(shape.name, shape.columns)
+        found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
+    return [table for table in found if table.rows]
+
+
+def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
+    """Rows that the page shows, and what is said of those that it does not."""
+    chosen, told = frame, ""
+    if name == "stiffness":
+        whole = frame["fitted_to"] == joint_label_of(frame)
+        chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
+    elif name == "pooling":
+        chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
+    elif name in ("fits", "mae"):
+        left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
+        chosen, told = frame[~left_out], "fits that leave no load case out"
+    if len(chosen) == len(frame):
+        return frame, ""
+    return chosen, f"Here: {told}; the others are in {name}.parquet."

@@ -1,13 +1,4 @@
-"""Findings that cast doubt on others: flipped signs, fits that failed, doubtful stiffness.
-
-Findings about the paper's claims and numbers.
-
-Findings about errors: which representation is best, and how large errors are.
-
-Finding about the cohort: how much stiffness differs between specimens, levels and joints.
-
-Key findings of a cohort study as sentences, what casts doubt on all others first.
-"""
+"""Key findings of a cohort study as sentences, what casts doubt on all others first."""
 
 from collections.abc import Callable, Iterator
 from math import exp
@@ -16,59 +7,41 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.page.document import Results, judged
-from spinepipe.report.words import AXIS, NAME, case, count, number, percent
+from spinepipe.report.words import AXIS, case, count, number, percent
 from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, PUBLISHED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+
+_MOST_PLACES = 6
 
 _VERDICTS = {
     "yes": ("hold", "Holds here"),
     "no": ("do not hold", "Does not hold here"),
     "undecided": ("cannot be decided", "Cannot be decided with this cohort"),
 }
-_MOST = 6
+
+_MOST_CLAIMS = 6
+
+_CRITERIA = {
+    "fitted": "Motion that was fitted",
+    "left_out_case": "Motion under a left-out load case",
+    "left_out_specimen": "Motion of a left-out specimen",
+}
+
+_PARTS = {
+    "between_specimens": "between specimens",
+    "between_levels": "between levels",
+    "between_joints": "of joints beyond that",
+}
+
+Finding = Callable[[CohortStiffness, Results], Iterator[str]]
 
 
-def claims(study: CohortStiffness, results: Results) -> Iterator[str]:
-    """How many claims hold, and the first of each verdict with their numbers."""
-    rows = results.table("findings")
-    if rows.empty:
-        return
-    parts = {name: rows[rows["holds"] == name] for name in _VERDICTS}
-    told = [f"{_VERDICTS[name][0]} {len(part)}" for name, part in parts.items() if len(part)]
-    yield (
-        f"Of {count(len(rows), 'claim')} about this cohort: {', '.join(told)}; table 1 has the "
-        "numbers that decide, and what they are."
-    )
-    for name, part in parts.items():
-        if len(part):
-            first = "; ".join(_claim(row) for row in part.head(_MOST).to_dict("records"))
-            more = f"; and {len(part) - _MOST} more" if len(part) > _MOST else ""
-            yield f"{_VERDICTS[name][1]}: {first}{more}."
-
-
-def _claim(row: dict[Any, Any]) -> str:
-    """Statement with its value, interval and p; the message where there is no value."""
-    statement = str(row["statement"]).rstrip(".")
-    words = f"{statement[:1].lower()}{statement[1:]}"
-    if pd.isna(row["value"]):
-        return f"{words} ({row['message']})" if row["message"] else words
-    numbers = [f"{number(row['value'])} {row['unit']}".rstrip()]
-    if not (pd.isna(row["low"]) or pd.isna(row["high"])):
-        numbers.append(f"95 % interval {number(row['low'])} to {number(row['high'])}")
-    if not pd.isna(row["p"]):
-        numbers.append(f"p {number(row['p'], 2)}")
-    return f"{words} ({', '.join(numbers)})"
-
-
-def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
-    """How the published quantities were judged."""
-    told = judged(results.table("against_gould_2024b"))
-    if told:
-        yield told
-
-
-_MOST_PLACES = 6
+def findings(study: CohortStiffness, results: Results) -> list[str]:
+    """The sentences, without those that the study has no table for."""
+    told = [sentence for make in MAKERS for sentence in make(study, results)]
+    return [sentence.replace(" %", "\u00a0%") for sentence in told]
 
 
 def signs(study: CohortStiffness, results: Results) -> Iterator[str]:
@@ -160,24 +133,17 @@ def _lost(name: str, part: pd.DataFrame) -> str:
     lost = int((~flags).sum())
     if not lost:
         return ""
-    return f"{NAME[name]} {lost} of {len(flags)} values ({percent(lost, len(flags))})"
+    return f"{IN_WORDS[name]} {lost} of {len(flags)} values ({percent(lost, len(flags))})"
 
 
 def _fit(row: dict[Any, Any]) -> str:
     fitted = str(row["fitted_to"]).replace("_", " ")
-    return f"{row['specimen']}, {NAME[row['representation']]}, fitted to {fitted}"
+    return f"{row['specimen']}, {IN_WORDS[row['representation']]}, fitted to {fitted}"
 
 
 def _some(places: list[str]) -> str:
     more = len(places) - _MOST_PLACES
     return "; ".join(places[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
-
-
-_CRITERIA = {
-    "fitted": "Motion that was fitted",
-    "left_out_case": "Motion under a left-out load case",
-    "left_out_specimen": "Motion of a left-out specimen",
-}
 
 
 def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
@@ -187,7 +153,7 @@ def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
         return
     for criterion, words in _CRITERIA.items():
         ranked = rows[(rows["criterion"] == criterion) & rows["rank"].notna()].sort_values("rank")
-        if (~ranked["representation"].str.startswith("literature")).any():
+        if (~ranked["representation"].isin(PUBLISHED)).any():
             told = [_place(row, study.significance) for row in ranked.to_dict("records")]
             yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}."
     best = [
@@ -208,11 +174,43 @@ def _place(row: dict[Any, Any], significance: float) -> str:
         if pd.isna(row["p"]) or row["p"] < significance
         else (f" (not told apart from the first, p {number(row['p'], 2)})")
     )
-    return f"{NAME[row['representation']]} {number(row['value'])}{spread}°{same}"
+    return f"{IN_WORDS[row['representation']]} {number(row['value'])}{spread}°{same}"
 
 
 def _best(part: pd.DataFrame) -> str:
-    return " and ".join(NAME[name] for name in part["representation"])
+    return " and ".join(IN_WORDS[name] for name in part["representation"])
+
+
+def claims(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """How many claims hold, and the first of each verdict with their numbers."""
+    rows = results.table("findings")
+    if rows.empty:
+        return
+    parts = {name: rows[rows["holds"] == name] for name in _VERDICTS}
+    told = [f"{_VERDICTS[name][0]} {len(part)}" for name, part in parts.items() if len(part)]
+    yield (
+        f"Of {count(len(rows), 'claim')} about this cohort: {', '.join(told)}; table 1 has the "
+        "numbers that decide, and what they are."
+    )
+    for name, part in parts.items():
+        if len(part):
+            first = "; ".join(_claim(row) for row in part.head(_MOST_CLAIMS).to_dict("records"))
+            more = f"; and {len(part) - _MOST_CLAIMS} more" if len(part) > _MOST_CLAIMS else ""
+            yield f"{_VERDICTS[name][1]}: {first}{more}."
+
+
+def _claim(row: dict[Any, Any]) -> str:
+    """Statement with its value, interval and p; the message where there is no value."""
+    statement = str(row["statement"]).rstrip(".")
+    words = f"{statement[:1].lower()}{statement[1:]}"
+    if pd.isna(row["value"]):
+        return f"{words} ({row['message']})" if row["message"] else words
+    numbers = [f"{number(row['value'])} {row['unit']}".rstrip()]
+    if not (pd.isna(row["low"]) or pd.isna(row["high"])):
+        numbers.append(f"95 % interval {number(row['low'])} to {number(row['high'])}")
+    if not pd.isna(row["p"]):
+        numbers.append(f"p {number(row['p'], 2)}")
+    return f"{words} ({', '.join(numbers)})"
 
 
 def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
@@ -229,7 +227,7 @@ def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
     ]
     for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
         told = [
-            f"{NAME[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
+            f"{IN_WORDS[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
             for row in part.to_dict("records")
         ]
         yield (
@@ -241,13 +239,6 @@ def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
 def _share(row: dict[Any, Any]) -> str:
     share = row["mae_percent"]
     return "" if pd.isna(share) else f" ({number(share, 2)} %)"
-
-
-_PARTS = {
-    "between_specimens": "between specimens",
-    "between_levels": "between levels",
-    "between_joints": "of joints beyond that",
-}
 
 
 def spreads(study: CohortStiffness, results: Results) -> Iterator[str]:
@@ -275,15 +266,14 @@ def _spread(row: dict[Any, Any]) -> str:
     return f"{centre} ({', '.join(factors)})" if factors else centre
 
 
-Finding = Callable[[CohortStiffness, Results], Iterator[str]]
+def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
+    """How the published quantities were judged."""
+    told = judged(results.table("against_gould_2024b"))
+    if told:
+        yield told
+
 
 MAKERS: tuple[Finding, ...] = (
     *(signs, failed, bounds, optima, identifiable),
     *(ranking, claims, loaded_errors, spreads, beside_the_paper),
 )
-
-
-def findings(study: CohortStiffness, results: Results) -> list[str]:
-    """The sentences, without those that the study has no table for."""
-    told = [sentence for make in MAKERS for sentence in make(study, results)]
-    return [sentence.replace(" %", "\u00a0%") for sentence in told]

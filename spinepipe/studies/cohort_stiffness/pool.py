@@ -1,7 +1,4 @@
-"""Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one.
-
-Rows of the tables of a pooled fit.
-"""
+"""Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,9 +12,7 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.claims import joined
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    SHARED_ERROR,
     criteria,
     independent,
     no_fit,
@@ -32,17 +27,81 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
     start_stiffness,
 )
-from spinepipe.studies.cohort_stiffness.settings import NOBODY, POOLED, CohortStiffness
+from spinepipe.studies.cohort_stiffness.representations import POOLED
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
 from spinepipe.tables import from_rows, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]
 NOBODY_FITTED = "no specimen has motion to fit"
+
 DECIDED = 0.5
 """Share of a newcomer's variance below which a specimen's own readings decide."""
 
 NOT_DECIDED = "the specimen's readings do not decide: value and interval are the cohort's"
+
+
+def run(
+    root: str,
+    study: str,
+    fitted_to: str,
+    without: str,
+    stiffness: str,
+    fits: str,
+    errors: str,
+    pooling: str,
+) -> None:
+    """Write what the pooled fit says of its specimens, or of the one that was left out."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    fitted = [name for name in cohort.specimen_names if name != without]
+    others = {
+        name: base_effects(root, settings, cohort, name, left_out=name == without)
+        for name in cohort.specimen_names
+    }
+    problems, refusals = _problems(settings, cohort, fitted, fitted_to, others)
+    found = pool(list(problems.values())) if problems else None
+    everyone = without == NOBODY
+    note = "" if everyone else seen_note(root, settings, cohort, without)
+    rows = PooledRows(settings, cohort, fitted_to, problems, refusals, found, others, note)
+    told = fitted if everyone else [without]
+    values = [row for name in told for row in rows.stiffness(name)]
+    seen = [row for name in told for row in rows.errors(name)]
+    records = [rows.record(name) for name in told] if everyone else []
+    source = "own" if everyone else "others_pooled"
+    by = {"representation": POOLED, "source": source}
+    made = origin("pool", root, settings, cohort)
+    shape = STIFFNESS.without("fitted_to")
+    write(from_rows(shape, [{**row, **by} for row in values]), stiffness, made)
+    write(from_rows(ERRORS.without("fitted_to"), [{**row, **by} for row in seen]), errors, made)
+    write(from_rows(FITS.without("fitted_to"), [{**row, **by} for row in records]), fits, made)
+    write(from_rows(POOLING.without("fitted_to", "without"), rows.pooling()), pooling, made)
+
+
+def _problems(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    names: list[str],
+    fitted_to: str,
+    others: Mapping[str, tuple[ScopedEffect, ...]],
+) -> tuple[dict[str, Problem], dict[str, str]]:
+    """The problem of each specimen that has motion to fit, and why the others have none."""
+    found, refusals = {}, {}
+    for name in names:
+        tests = specimen_tests(settings, cohort, name)
+        chosen = tests.fitted_to(fitted_to)
+        if not chosen:
+            refusals[name] = f"{name}: {tests.why_none(fitted_to)}"
+            continue
+        try:
+            found[name] = calibration_problem(
+                settings, cohort, name, POOLED, tests.frames, chosen, others[name]
+            )
+        except RefusedModel as error:
+            refusals[name] = str(error)
+    return found, refusals
 
 
 @dataclass(frozen=True)
@@ -220,63 +279,3 @@ class PooledRows:
     def _specimens(self) -> int:
         """How many specimens the spreads were estimated from."""
         return sum(bool(one.poses) for one in self.found.specimens) if self.found else 0
-
-
-def run(
-    root: str,
-    study: str,
-    fitted_to: str,
-    without: str,
-    stiffness: str,
-    fits: str,
-    errors: str,
-    pooling: str,
-) -> None:
-    """Write what the pooled fit says of its specimens, or of the one that was left out."""
-    settings, cohort = study_of_kind(CohortStiffness, root, study)
-    fitted = [name for name in cohort.specimen_names if name != without]
-    others = {
-        name: base_effects(root, settings, cohort, name, left_out=name == without)
-        for name in cohort.specimen_names
-    }
-    problems, refusals = _problems(settings, cohort, fitted, fitted_to, others)
-    found = pool(list(problems.values())) if problems else None
-    everyone = without == NOBODY
-    note = "" if everyone else seen_note(root, settings, cohort, without)
-    rows = PooledRows(settings, cohort, fitted_to, problems, refusals, found, others, note)
-    told = fitted if everyone else [without]
-    values = [row for name in told for row in rows.stiffness(name)]
-    seen = [row for name in told for row in rows.errors(name)]
-    records = [rows.record(name) for name in told] if everyone else []
-    source = "own" if everyone else "others_pooled"
-    by = {"representation": POOLED, "source": source}
-    made = origin("pool", root, settings, cohort)
-    shape = STIFFNESS.without("fitted_to")
-    write(from_rows(shape, [{**row, **by} for row in values]), stiffness, made)
-    write(from_rows(ERRORS.without("fitted_to"), [{**row, **by} for row in seen]), errors, made)
-    write(from_rows(FITS.without("fitted_to"), [{**row, **by} for row in records]), fits, made)
-    write(from_rows(POOLING.without("fitted_to", "without"), rows.pooling()), pooling, made)
-
-
-def _problems(
-    settings: CohortStiffness,
-    cohort: Cohort,
-    names: list[str],
-    fitted_to: str,
-    others: Mapping[str, tuple[ScopedEffect, ...]],
-) -> tuple[dict[str, Problem], dict[str, str]]:
-    """The problem of each specimen that has motion to fit, and why the others have none."""
-    found, refusals = {}, {}
-    for name in names:
-        tests = specimen_tests(settings, cohort, name)
-        chosen = tests.fitted_to(fitted_to)
-        if not chosen:
-            refusals[name] = f"{name}: {tests.why_none(fitted_to)}"
-            continue
-        try:
-            found[name] = calibration_problem(
-                settings, cohort, name, POOLED, tests.frames, chosen, others[name]
-            )
-        except RefusedModel as error:
-            refusals[name] = str(error)
-    return found, refusals

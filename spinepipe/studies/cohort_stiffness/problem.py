@@ -1,8 +1,6 @@
-"""What is fitted: a specimen's model in one representation, its readings and their weights.
+"""What is fitted of a specimen: its tests, its model in one representation, readings and weights.
 
-The effects of the model file that a study builds on, and what must be told of them.
-
-The tests of one specimen that a cohort study uses: chosen cycles, loads and readings.
+Effects of the model file that a study builds on act in that model besides the bushings.
 """
 
 import hashlib
@@ -28,66 +26,13 @@ from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.parts import Damping, stiffness_of_joints
-from spinepipe.units import (
-    COORDINATES,
-    ROTATIONS,
-    STIFFNESS_COLUMNS,
-    TRANSLATIONS,
-)
-
-SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
-
-
-@lru_cache(maxsize=8)
-def _model(where: Stamp) -> ModelFile:
-    return read_model(where[0])
-
-
-def _of_study(root: str, study: CohortStiffness) -> ModelFile | None:
-    return None if study.base is None else _model(stamp(study.base.path(Path(root))))
-
-
-def base_effects(
-    root: str, study: CohortStiffness, cohort: Cohort, specimen: str, left_out: bool = False
-) -> tuple[ScopedEffect, ...]:
-    """Effects that act on a specimen besides bushings; ``left_out`` as in `effects_for`."""
-    model = _of_study(root, study)
-    return () if model is None else beside_bushings(model, specimen, cohort.joint_names, left_out)
-
-
-def seen_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) -> str:
-    """What must be told of a left-out specimen whose effects have values found on itself."""
-    model = _of_study(root, study)
-    return SEEN if model and own_values(model, specimen, cohort.joint_names) else ""
-
-
-def origin(
-    job: str,
-    root: str,
-    study: CohortStiffness,
-    cohort: Cohort,
-    specimens: Sequence[str] | None = None,
-    others: Sequence[str] = (),
-) -> dict[str, str]:
-    """Metadata of a file, see `provenance`, with the digest of the model file."""
-    base = base_marks(root, study.base.model if study.base else None)
-    whole = provenance(job, study, cohort, specimens, [*base, *others])
-    return {**whole, "base_model_digest": _digest(root, study)} if base else whole
-
-
-def _digest(root: str, study: CohortStiffness) -> str:
-    assert study.base is not None
-    return hashlib.sha256(study.base.path(Path(root)).read_bytes()).hexdigest()
-
+from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
 
 FIRST_CYCLE = 1
-
-
-def driven(cycles: Sequence[MeasuredCycle]) -> str | None:
-    """The coordinate that most cycles of a test load; of equally many that of the first."""
-    return Counter(one.loaded for one in cycles).most_common(1)[0][0]
+SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
 
 
 @dataclass(frozen=True)
@@ -146,39 +91,9 @@ def _chosen(cycles: str, found: Sequence[MeasuredCycle]) -> list[MeasuredCycle]:
     return chosen
 
 
-LEVEL_REPRESENTATIONS = ("level_ratio", "literature_levels")
-"""Representations that start from the published values of each level."""
-
-GROUPING = {
-    "per_specimen": "per_specimen",
-    "level_ratio": "per_specimen",
-    "per_joint": "per_joint",
-    "partially_pooled": "per_joint",
-}
-"""Which joints share an unknown: those that keep their ratios move together."""
-
-
-def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:
-    """(J, 6) SI: the published stiffness a representation starts from."""
-    levels = {}
-    if representation in LEVEL_REPRESENTATIONS:
-        levels = {joint: study.level_stiffness[joint] for joint in cohort.joint_names}
-    return stiffness_of_joints(cohort, study.stiffness, levels)
-
-
-def stiff_model(
-    cohort: Cohort,
-    specimen: str,
-    frames: tuple[Pose, ...],
-    stiffness: Array,
-    others: tuple[ScopedEffect, ...] = (),
-) -> SpineModel:
-    """A specimen with this stiffness (J, 6) SI and ``others``, effects besides the bushings.
-
-    Equilibria do not hang on damping.
-    """
-    damping = np.array(Damping().in_order(), dtype=float)
-    return on_bushings(cohort, specimen, frames, stiffness, damping, others)
+def driven(cycles: Sequence[MeasuredCycle]) -> str | None:
+    """The coordinate that most cycles of a test load; of equally many that of the first."""
+    return Counter(one.loaded for one in cycles).most_common(1)[0][0]
 
 
 def calibration_problem(
@@ -200,7 +115,9 @@ def calibration_problem(
     start = start_stiffness(study, cohort, representation)
     model = stiff_model(cohort, specimen, frames, start, others)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
-    free = free_parameters(model, 0, names, GROUPING[representation])
+    grouping = named(representation).grouping
+    assert grouping is not None  # nothing of a published set is fitted
+    free = free_parameters(model, 0, names, grouping)
     reach = np.full(len(free), np.log(study.bound_factor))
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested
@@ -230,3 +147,68 @@ def _weights(study: CohortStiffness, cohort: Cohort) -> Array:
     of = dict.fromkeys(TRANSLATIONS, sd.translation_mm)
     of |= dict.fromkeys(ROTATIONS, sd.rotation_deg)
     return np.array([of[name] ** -2.0 if name in study.free else 0.0 for name in COORDINATES])
+
+
+def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:
+    """(J, 6) SI: the published stiffness a representation starts from."""
+    levels = {}
+    if named(representation).by_level:
+        levels = {joint: study.level_stiffness[joint] for joint in cohort.joint_names}
+    return stiffness_of_joints(cohort, study.stiffness, levels)
+
+
+def stiff_model(
+    cohort: Cohort,
+    specimen: str,
+    frames: tuple[Pose, ...],
+    stiffness: Array,
+    others: tuple[ScopedEffect, ...] = (),
+) -> SpineModel:
+    """A specimen with this stiffness (J, 6) SI and ``others``, effects besides the bushings.
+
+    Equilibria do not hang on damping.
+    """
+    damping = np.array(Damping().in_order(), dtype=float)
+    return on_bushings(cohort, specimen, frames, stiffness, damping, others)
+
+
+def base_effects(
+    root: str, study: CohortStiffness, cohort: Cohort, specimen: str, left_out: bool = False
+) -> tuple[ScopedEffect, ...]:
+    """Effects that act on a specimen besides bushings; ``left_out`` as in `effects_for`."""
+    model = _of_study(root, study)
+    return () if model is None else beside_bushings(model, specimen, cohort.joint_names, left_out)
+
+
+def seen_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) -> str:
+    """What must be told of a left-out specimen whose effects have values found on itself."""
+    model = _of_study(root, study)
+    return SEEN if model and own_values(model, specimen, cohort.joint_names) else ""
+
+
+def _of_study(root: str, study: CohortStiffness) -> ModelFile | None:
+    return None if study.base is None else _model(stamp(study.base.path(Path(root))))
+
+
+@lru_cache(maxsize=8)
+def _model(where: Stamp) -> ModelFile:
+    return read_model(where[0])
+
+
+def origin(
+    job: str,
+    root: str,
+    study: CohortStiffness,
+    cohort: Cohort,
+    specimens: Sequence[str] | None = None,
+    others: Sequence[str] = (),
+) -> dict[str, str]:
+    """Metadata of a file, see `provenance`, with the digest of the model file."""
+    base = base_marks(root, study.base.model if study.base else None)
+    whole = provenance(job, study, cohort, specimens, [*base, *others])
+    return {**whole, "base_model_digest": _digest(root, study)} if base else whole
+
+
+def _digest(root: str, study: CohortStiffness) -> str:
+    assert study.base is not None
+    return hashlib.sha256(study.base.path(Path(root)).read_bytes()).hexdigest()

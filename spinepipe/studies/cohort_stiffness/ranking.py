@@ -1,7 +1,4 @@
-"""Job: which representation is best, by errors and by information criteria.
-
-Job: mean absolute errors in the loaded coordinate, as in Table 4 of Gould et al. 2024b.
-"""
+"""Job: which representation is best, by errors and by information criteria."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -14,33 +11,32 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import wilcoxon_signed_rank
-from spinepipe.studies.cohort_stiffness.claims import joined
-from spinepipe.studies.cohort_stiffness.settings import NOBODY, POOLED, CohortStiffness
+from spinepipe.studies.cohort_stiffness.representations import NAMES, POOLED, PUBLISHED
+from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_SPECIMEN,
     LITERATURE,
     joint_label_of,
-    largest_mean_motion,
     of_joint_fits,
     specimen_rms,
     without_result,
 )
-from spinepipe.studies.cohort_stiffness.tables import CRITERIA, MAE, RANKING, REPRESENTATIONS
+from spinepipe.studies.cohort_stiffness.tables import CRITERIA, RANKING
 from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables.shared import joined
 
 INFORMATION = ("aicc", "bic")
-NOT_FITTED = ("literature", "literature_levels")
 SPREADS = ("between_levels", "between_specimens", "between_joints")
 NO_P = "no p for information criteria: pooled specimens are not independent"
 NO_RESULT = "no specimen has a result"
 NONE_COMPLETE = "no specimen has a result in every representation"
-
 Row = dict[str, Any]
+
 Candidate = tuple[str, str]
 """Representation and source."""
 
 
-def ranking(root: str, study: str, tables: list[str], output: str) -> None:
+def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``ranking.parquet``."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     frames = read_frames(tables)
@@ -54,12 +50,12 @@ def ranking_rows(
 ) -> list[Row]:
     """Rows of the table ``ranking`` from those of ``errors``, ``fits`` and ``pooling``."""
     present = {*errors["representation"], *fits["representation"]}
-    names = [name for name in REPRESENTATIONS if name in present]
+    names = [name for name in NAMES if name in present]
     specimens = {*errors["specimen"], *fits["specimen"]}
     rows = []
     for criterion in CRITERIA:
         if criterion in INFORMATION:
-            found = _information(fits, criterion, [n for n in names if n not in NOT_FITTED])
+            found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
             count = estimated_spreads(fits, pooling)
             order = ranked(found, True, specimens, _penalty(fits, criterion, count))
             order = [_conditional(row, count) for row in order]
@@ -98,7 +94,7 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
     """Error by specimen of each representation; the literature's is the same everywhere."""
     found = {}
     for name in names:
-        stage = LITERATURE if name in NOT_FITTED else criterion
+        stage = LITERATURE if name in PUBLISHED else criterion
         chosen = of_joint_fits(errors, stage)
         chosen = chosen[chosen["representation"] == name]
         found[name, _source(name, criterion)] = specimen_rms(chosen, errors)
@@ -106,7 +102,7 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
 
 
 def _source(name: str, criterion: str) -> str:
-    if name in NOT_FITTED:
+    if name in PUBLISHED:
         return "literature"
     if criterion != LEFT_OUT_SPECIMEN:
         return "own"
@@ -194,51 +190,3 @@ def _total(values: Array, summed: bool) -> tuple[float, float | None]:
     scale = float(n) if summed else 1.0
     error = float(scale * values.std(ddof=1) / np.sqrt(n)) if n > 1 else None
     return float(scale * values.mean()), error
-
-
-STEPS = {"peak": ("peak_error", "measured_peak"), "all": ("mae", "measured")}
-"""Columns of the error and of the motion, at the largest load and over all load steps."""
-
-PLACE = ["test", "coordinate"]
-GROUP = ["representation", "fitted_to", "source", "stage", *PLACE]
-
-
-def mae(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``mae.parquet``."""
-    settings, cohort = study_of_kind(CohortStiffness, root, study)
-    rows = mae_rows(read_frames(tables)["errors"])
-    write(from_rows(MAE, rows), output, provenance("mae", settings, cohort))
-
-
-def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows of the table ``mae`` from those of ``errors``."""
-    loaded = errors[errors["loaded"].astype(bool)]
-    once = loaded.drop_duplicates(["specimen", *PLACE, "joint"])
-    measured = dict(iter(once.groupby(PLACE, sort=False)))
-    rows = []
-    for key, part in loaded.groupby(GROUP, sort=False):
-        named = dict(zip(GROUP, map(str, key), strict=True))
-        here = measured[named["test"], named["coordinate"]]
-        for steps, (error, motion) in STEPS.items():
-            found = specimen_mae(part, error, motion)
-            largest = largest_mean_motion(here, motion)
-            rows.append({**named, "steps": steps, **_spread(found, largest)})
-    return rows
-
-
-def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:
-    """Mean absolute error over the joints with a motion, by specimen; all of them must be known."""
-    measured = part[part[motion].notna()]
-    by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
-    known: pd.Series = by_joint.mean()[by_joint.count() == by_joint.size()]
-    return known
-
-
-def _spread(values: pd.Series, largest: float | None) -> dict[str, Any]:
-    empty = dict.fromkeys(("mae_deg", "low_quartile_deg", "high_quartile_deg", "mae_percent"))
-    row: dict[str, Any] = {"specimens": len(values), "largest_motion_deg": largest, **empty}
-    if values.empty:
-        return row
-    low, median, high = values.quantile([0.25, 0.5, 0.75])
-    row |= {"mae_deg": median, "low_quartile_deg": low, "high_quartile_deg": high}
-    return row | {"mae_percent": 100.0 * median / largest if largest else None}

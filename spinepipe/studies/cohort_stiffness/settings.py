@@ -1,10 +1,7 @@
-"""The study kind that asks how stiffness differs between specimens, levels and load cases.
-
-What fits of a cohort study are fitted to, and what that is called in files and tables.
-"""
+"""What a cohort study asks, and what its fits are fitted to under which name."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import BaseModel, Field
 
@@ -12,6 +9,7 @@ from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.studies.base_model import Base
+from spinepipe.studies.cohort_stiffness.representations import FITTED
 from spinepipe.studies.parts import (
     FORM,
     Coordinates,
@@ -25,7 +23,10 @@ from spinepipe.units import COORDINATE_COLUMNS
 
 _PAPER = published("gould_2024b")
 
-Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
+if TYPE_CHECKING:
+    Fitted = str
+else:
+    Fitted = Literal[FITTED]
 
 
 def _published_levels() -> dict[str, LevelStiffness]:
@@ -67,8 +68,8 @@ class CohortStiffness(Study):
     steps: Literal["all", "peak"] = Field(
         default="all", description="load steps that enter the cost: all, or that of largest moment"
     )
-    representations: EachOnce[Representation] = Field(
-        default=("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
+    representations: EachOnce[Fitted] = Field(
+        default=FITTED,
         description="how stiffness is described; what the literature says is always shown beside",
     )
     free: Coordinates = Field(
@@ -118,9 +119,6 @@ ALL, ALL_BUT, NOTHING = "all", "all_but_", "nothing"
 
 NOBODY = "nobody"
 """Who is left out of a pooled fit of all specimens."""
-
-POOLED = "partially_pooled"
-"""The representation that is fitted to all specimens at once."""
 
 
 def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:

@@ -1,10 +1,7 @@
-"""Do two stiffness sets differ in their errors? Tables 6 and 7 of Gould et al. 2024b.
+"""Job: the tests of Gould et al. 2024b (Tables 5 to 7), and beside them those that fit the data.
 
-Do errors differ between specimens, or between levels? Table 5 of Gould et al. 2024b.
-
-Does stiffness hang on the load case? Separate fits per load case against one joint fit.
-
-Job: the tests of Gould et al. 2024b, and beside them those that fit the data.
+Do errors differ between specimens or levels, and between two stiffness sets; does stiffness hang on
+the load case?
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,10 +22,9 @@ from spinepipe.statistics import (
     wilcoxon_signed_rank,
 )
 from spinepipe.statistics.normality import NESTED
-from spinepipe.studies.cohort_stiffness.fit_rows import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.representations import POOLED, start_of
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
-    POOLED,
     CohortStiffness,
     joint_label,
     load_cases,
@@ -38,19 +34,41 @@ from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
+    SHARED_ERROR,
     of_single_cases,
     rotations,
 )
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import STATISTICS
+from spinepipe.tables.shared import STATISTICS, joined
 from spinepipe.units import ROTATIONS
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)
 GROUPS = {"specimens": "specimen", "levels": "joint"}
+
 BLOCKS = {"specimen": "joint", "joint": "specimen"}
 """In what each factor is seen again and again."""
 
 VALUES_AS_PUBLISHED = "takes values of the same specimen and joint as independent, as published"
+FITS_AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
+FAMILY = "load_case_specific"
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``statistics.parquet``."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    frames = read_frames(tables)
+    rows = list(corrected_rows(all_tests(frames["errors"], frames["fits"])))
+    origin = provenance("statistics", settings, cohort)
+    write(from_rows(STATISTICS, rows), output, origin)
+
+
+def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
+    """Every test of the tables ``errors`` and ``fits``, family by family."""
+    seen = rotations(errors)
+    yield from between_groups(seen)
+    yield from signed_ranks(seen)
+    yield from against_level_ratio(seen)
+    yield from load_case_specific(fits)
 
 
 def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
@@ -94,59 +112,7 @@ def _noted(outcome: Outcome, note: str, when: bool = True) -> Outcome:
     """The outcome with a note in its message."""
     if not when:
         return outcome
-    return replace(outcome, message="; ".join(part for part in (outcome.message, note) if part))
-
-
-FAMILY = "load_case_specific"
-
-
-def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
-    """The extra sum of squares F test for each specimen and each plain representation.
-
-    Pooled fits are no least squares fits: they are drawn towards the cohort.
-    """
-    plain = fits[fits["representation"] != POOLED]
-    for (representation, specimen), rows in plain.groupby(
-        ["representation", "specimen"], sort=False
-    ):
-        family = f"{FAMILY}/{representation}"
-        outcome = _without(SHARED_ERROR) if _correlated(rows) else nested_fits(rows)
-        yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
-
-
-def nested_fits(rows: pd.DataFrame) -> Outcome:
-    """The test for the fits of one specimen in one representation."""
-    if joint_label(rows["fitted_to"]) != ALL:
-        return _without("one load case only: nothing to compare")
-    joint = rows[rows["fitted_to"] == ALL]
-    single = rows[rows["fitted_to"].isin(load_cases(rows["fitted_to"]))]
-    single = single[single["readings"] > 0]  # the specimen has no such load case
-    if joint["cost"].isna().any() or joint.empty or single["cost"].isna().any():
-        return _without("a fit is missing")
-    if len(single) < 2:
-        return _without("one load case only: nothing to compare")
-    readings, unknowns = int(joint["readings"].sum()), int(joint["unknowns"].sum())
-    if readings != int(single["readings"].sum()):
-        return _without("the fits are not to the same readings")
-    free = readings - int(single["unknowns"].sum())
-    costs = float(joint["cost"].sum()), float(single["cost"].sum())
-    return f_test_nested(costs[0], readings - unknowns, costs[1], free)
-
-
-def _correlated(rows: pd.DataFrame) -> bool:
-    """Whether a fit says that its sum of squares is not one of independent errors."""
-    notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
-    return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
-
-
-def _without(message: str) -> Outcome:
-    return NESTED.without(Ended.TOO_FEW, 0, message)
-
-
-PUBLISHED_OF = {"level_ratio": "literature_levels"}
-"""The published set a representation starts from, where it is not ``literature``."""
-
-FITS_AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
+    return replace(outcome, message=joined(outcome.message, note))
 
 
 def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
@@ -159,10 +125,9 @@ def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
         of_single_cases(errors, stage) for stage in (LITERATURE, FITTED, LEFT_OUT_SPECIMEN)
     )
     for representation in fitted["representation"].unique():
-        start = PUBLISHED_OF.get(representation, "literature")
         own = fitted[fitted["representation"] == representation]
         others = held_out[held_out["representation"] == representation]
-        before = published[published["representation"] == start]
+        before = published[published["representation"] == start_of(representation)]
         for comparison, first, second in (
             ("literature_against_fitted", before, own),
             ("fitted_against_left_out_specimen", own, others),
@@ -223,19 +188,44 @@ def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
     return found
 
 
-def run(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``statistics.parquet``."""
-    settings, cohort = study_of_kind(CohortStiffness, root, study)
-    frames = read_frames(tables)
-    rows = list(corrected_rows(all_tests(frames["errors"], frames["fits"])))
-    origin = provenance("statistics", settings, cohort)
-    write(from_rows(STATISTICS, rows), output, origin)
+def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
+    """The extra sum of squares F test for each specimen and each plain representation.
+
+    Pooled fits are no least squares fits: they are drawn towards the cohort.
+    """
+    plain = fits[fits["representation"] != POOLED]
+    for (representation, specimen), rows in plain.groupby(
+        ["representation", "specimen"], sort=False
+    ):
+        family = f"{FAMILY}/{representation}"
+        outcome = _without(SHARED_ERROR) if _correlated(rows) else nested_fits(rows)
+        yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
 
 
-def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
-    """Every test of the tables ``errors`` and ``fits``, family by family."""
-    seen = rotations(errors)
-    yield from between_groups(seen)
-    yield from signed_ranks(seen)
-    yield from against_level_ratio(seen)
-    yield from load_case_specific(fits)
+def nested_fits(rows: pd.DataFrame) -> Outcome:
+    """The test for the fits of one specimen in one representation."""
+    if joint_label(rows["fitted_to"]) != ALL:
+        return _without("one load case only: nothing to compare")
+    joint = rows[rows["fitted_to"] == ALL]
+    single = rows[rows["fitted_to"].isin(load_cases(rows["fitted_to"]))]
+    single = single[single["readings"] > 0]  # the specimen has no such load case
+    if joint["cost"].isna().any() or joint.empty or single["cost"].isna().any():
+        return _without("a fit is missing")
+    if len(single) < 2:
+        return _without("one load case only: nothing to compare")
+    readings, unknowns = int(joint["readings"].sum()), int(joint["unknowns"].sum())
+    if readings != int(single["readings"].sum()):
+        return _without("the fits are not to the same readings")
+    free = readings - int(single["unknowns"].sum())
+    costs = float(joint["cost"].sum()), float(single["cost"].sum())
+    return f_test_nested(costs[0], readings - unknowns, costs[1], free)
+
+
+def _correlated(rows: pd.DataFrame) -> bool:
+    """Whether a fit says that its sum of squares is not one of independent errors."""
+    notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
+    return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
+
+
+def _without(message: str) -> Outcome:
+    return NESTED.without(Ended.TOO_FEW, 0, message)

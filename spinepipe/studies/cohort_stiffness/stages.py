@@ -1,7 +1,4 @@
-"""From the table ``errors``: one error, and one motion, per specimen.
-
-Which errors a stage is told by: of fits to one load case, or of fits to all of them.
-"""
+"""From the table ``errors``: which of its rows tell a stage, and one error per specimen of them."""
 
 from collections.abc import Iterable, Mapping
 
@@ -10,6 +7,10 @@ import pandas as pd
 
 from spinepipe.studies.cohort_stiffness.settings import joint_label, label_of_others
 from spinepipe.units import ROTATIONS
+
+SHARED_ERROR = (
+    "readings zeroed at step 0 share its error, which the published cost takes no account of"
+)
 
 LITERATURE, FITTED = "literature", "fitted"
 LEFT_OUT_SPECIMEN, LEFT_OUT_CASE = "left_out_specimen", "left_out_case"

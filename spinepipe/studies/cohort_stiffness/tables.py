@@ -1,19 +1,9 @@
-"""Tables of studies of kind cohort_stiffness that are made of job files: fits and their errors.
+"""Tables of studies of kind cohort_stiffness: fits, their errors, and what follows from them."""
 
-Columns that tables of studies of kind cohort_stiffness share.
-
-Tables of studies of kind cohort_stiffness that are computed from its fits and their errors.
-"""
-
+from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.tables.shared import STATISTICS, against_paper
 from spinepipe.units import COORDINATES
-
-REPRESENTATIONS = (
-    *("literature", "literature_levels"),
-    *("per_specimen", "level_ratio", "per_joint", "partially_pooled"),
-)
-"""How stiffness is described, from what is taken as published to what is free in each joint."""
 
 SOURCES = ("literature", "own", "others_median", "others_pooled")
 STAGES = ("literature", "fitted", "left_out_case", "left_out_specimen")
@@ -22,11 +12,8 @@ NO_POSE = "not measured, or no pose was found"
 REPRESENTATION = Column(
     "representation",
     "text",
-    "literature: one published value for all joints; literature_levels: published values level by "
-    "level; per_specimen: one stiffness for all joints of a specimen; level_ratio: published ratio "
-    "of levels times one factor; per_joint: each joint its own; partially_pooled: each joint its "
-    "own, drawn towards its specimen and its cohort as far as the data ask for it",
-    allowed=REPRESENTATIONS,
+    "; ".join(f"{one.name}: {one.about}" for one in EVERY),
+    allowed=NAMES,
 )
 FITTED_TO = Column(
     "fitted_to",
@@ -413,6 +400,9 @@ FINDINGS = Table(
 )
 
 AGAINST_GOULD_2024B = against_paper("against_gould_2024b")
+
+IN_FOLDERS = ("specimen", "representation", "fitted_to")
+"""Columns that the folders of a file of one fit carry."""
 
 TABLES = (
     *(STIFFNESS, FITS, ERRORS, POOLING, SIGN_CHECKS),

@@ -1,9 +1,4 @@
-"""What else a reader should know, in a few sentences.
-
-The verdict in one sentence, and how sure it is in another.
-
-What a search could not tell, or hardly: names alike, gaps too small, effects without a trace.
-"""
+"""The verdict in one sentence, how sure it is, and what else a reader should know."""
 
 from collections.abc import Iterator
 
@@ -11,7 +6,7 @@ import pandas as pd
 
 from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, count, fixed, listed, number, plain
-from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Reason, Verdict
 from spinepipe.studies.discrepancy.words import (
     axis,
     called,
@@ -19,37 +14,34 @@ from spinepipe.studies.discrepancy.words import (
     estimate_of,
     readable,
     what_of,
-    where_of,
     with_article,
 )
 
 
-def headline(verdict: Verdict) -> str:
-    """What is missing and where, or that nothing is, or that nobody can tell."""
-    return {
-        Answer.NAMED: _named,
-        Answer.SET: _one_of,
-        Answer.NULL: _nothing,
-        Answer.UNKNOWN: _unknown,
-    }[verdict.answer](verdict)
+def headline(verdict: Verdict, where: pd.DataFrame) -> str:
+    """What is missing and where, or that nothing is, or that nobody can tell.
+
+    Parameters
+    ----------
+    where : rows of the table of that name.
+    """
+    if verdict.verdict is Answer.UNKNOWN:
+        return _unknown(verdict, where)
+    if verdict.verdict is Answer.NULL:
+        return _nothing(verdict)
+    if verdict.verdict is Answer.SET:
+        return _one_of(verdict)
+    return _lacks(verdict.effects)
 
 
-def _named(verdict: Verdict) -> str:
-    return f"The model lacks {_and(verdict.effects)}."
-
-
-def _and(effects: tuple[Missing, ...]) -> str:
-    return "; and ".join(what_of(effect) for effect in effects)
+def _lacks(effects: tuple[Missing, ...]) -> str:
+    return f"The model lacks {'; and '.join(what_of(effect) for effect in effects)}."
 
 
 def _one_of(verdict: Verdict) -> str:
-    names = listed([with_article(name) for name in verdict.in_set], 8, "or")
-    places = {where_of(one) for one in verdict.candidates}
-    where = f", {places.pop()}" if len(places) == 1 and places != {""} else ""
-    told = f"one of these is missing{where}, and these tests cannot tell which: {names}."
-    if verdict.effects:
-        return f"The model lacks {_and(verdict.effects)}. Besides, {told}"
-    return capital(told)
+    names = listed([with_article(name) for name in verdict.candidates_in_set], 8, "or")
+    told = f"one of these is missing, and these tests cannot tell which: {names}."
+    return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
 
 
 def _nothing(verdict: Verdict) -> str:
@@ -64,34 +56,34 @@ def _nothing(verdict: Verdict) -> str:
     )
 
 
-def _unknown(verdict: Verdict) -> str:
-    if _no_base(verdict):
+def _unknown(verdict: Verdict, where: pd.DataFrame) -> str:
+    if verdict.reason is Reason.NO_BASE:
         return "Nothing can be said of what is missing: the base model cannot be fitted."
-    if verdict.suspicions and verdict.why:
+    if verdict.reason is Reason.DATA_ERRORS:
         return f"{capital(readable(verdict.why)).rstrip('.')}."
-    told = "something is missing that is none of the known effects"
-    if not _of_unknown_shape(verdict):
-        told = "something is missing, but no name is believed"
-    if verdict.effects:
-        told = f"The model lacks {_and(verdict.effects)}. Beyond that, {told}"
-    first = readable(verdict.unknown_where).split(";")[0].partition(" (gap")[0]
-    place = ", ".join(axis(part.replace(" ", "_")) for part in first.split(", "))
-    where = f" It shows most at {place}." if first and not first.startswith(_NOWHERE) else ""
-    return f"{capital(told)}.{where}"
-
-
-_NOWHERE = "no single place"
+    told = "Something is missing, but no name is believed."
+    if _of_unknown_shape(verdict):
+        told = "Something is missing that is none of the known effects."
+    worst = _worst(where)
+    if worst.empty:
+        return told
+    first = worst.iloc[0]
+    place = f"{first['joint']}, {axis(first['coordinate'])}, test {plain(first['test'])}"
+    return f"{told} It shows most at {place}."
 
 
 def _of_unknown_shape(verdict: Verdict) -> bool:
     """Whether the reason for no name is what generic shapes explain and known effects do not."""
-    why = verdict.why
-    return not why or verdict.unknown_shape in why or " stays" in why
+    return not _shape_of(verdict) or verdict.reason in (
+        Reason.NO_KNOWN_EFFECT,
+        Reason.A_PART_STAYS,
+        Reason.MOST_STAYS,
+    )
 
 
-def _no_base(verdict: Verdict) -> bool:
-    """Whether there is no motion of a base model that measured motion could be held against."""
-    return bool(verdict.why) and not verdict.effects and verdict.rms_residual.base is None
+def _shape_of(verdict: Verdict) -> str:
+    """What is missing as generic shapes see it; empty where they see nothing."""
+    return "" if verdict.unknown is None else verdict.unknown.shape or ""
 
 
 def how_sure(verdict: Verdict) -> str:
@@ -107,36 +99,29 @@ def how_sure(verdict: Verdict) -> str:
 
 
 def _evidence(effect: Missing, verdict: Verdict) -> str:
-    if effect.log_evidence is None:
-        return ""
     told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
-    if verdict.threshold is not None:
-        told += f", {number(verdict.threshold, 2)} is needed"
-    rivals = [rival for rival in effect.rivals if rival.margin is not None]
-    if rivals:
-        first = min(rivals, key=lambda rival: rival.margin or 0.0)
-        told += f"; next best {plain(first.name)}, {number(first.margin or 0.0, 2)} behind"
+    if verdict.threshold.log_evidence is not None:
+        told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
+    if effect.rivals:
+        first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
+        told += f"; next best {plain(first.name)}, {number(first.log_evidence_margin, 2)} behind"
     return f"{told}."
 
 
 def _why_unknown(verdict: Verdict) -> str:
     """Why no name is given, where that is more than the shape of what is missing."""
-    shape = verdict.unknown_shape
-    if verdict.answer is not Answer.UNKNOWN or not verdict.why or (shape and shape in verdict.why):
-        return ""
-    if verdict.suspicions and not _no_base(verdict):
-        return ""  # the headline says it
+    if verdict.reason in (None, Reason.NO_KNOWN_EFFECT, Reason.DATA_ERRORS):
+        return ""  # or the headline says it
     return f"Why no name: {readable(verdict.why).rstrip('.')}."
 
 
 def _shape(verdict: Verdict) -> str:
-    known = verdict.unknown_shape and not _no_base(verdict) and _of_unknown_shape(verdict)
-    if verdict.answer is not Answer.UNKNOWN or not known:
+    if verdict.reason is Reason.NO_BASE or not _of_unknown_shape(verdict):
         return ""
-    shape = readable(verdict.unknown_shape).rstrip(".")
+    shape = readable(_shape_of(verdict)).rstrip(".")
     for spread, words in _SPREADS.items():
         shape = shape.removesuffix(spread) + words if shape.endswith(spread) else shape
-    return f"Its shape: {shape}."
+    return f"Its shape: {shape}." if shape else ""
 
 
 _SPREADS = {
@@ -160,7 +145,7 @@ def _misfit(verdict: Verdict) -> str:
 
 def _closed(verdict: Verdict) -> str:
     closed = verdict.gap.held_out_closed
-    if closed is None or not (verdict.effects or verdict.candidates):
+    if closed is None or not (verdict.effects or verdict.candidates_in_set):
         return ""
     share = f"{100.0 * closed:.0f} %" if closed < 0.995 else ">99 %"
     share = "100 %" if closed >= 1.0 else share
@@ -176,7 +161,7 @@ _ALIKE = 0.3
 
 def would_have_been_seen(verdict: Verdict) -> str:
     """Of a search that named nothing: the gaps from which effects would have been named."""
-    if verdict.answer is not Answer.NULL or not verdict.smallest_detectable:
+    if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
         return ""
     ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
     told = [f"{plain(one.name)} {number(one.gap, 2)}" for one in ordered]
@@ -206,14 +191,14 @@ def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
 
 def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
     """Of what no known effect explains: the one that comes nearest, and why it is not named."""
-    unknown = verdict.answer is Answer.UNKNOWN and verdict.unknown_shape in verdict.why
-    if not unknown or not verdict.unknown_shape or verdict.effects or candidates.empty:
+    threshold = verdict.threshold.log_evidence
+    if verdict.reason is not Reason.NO_KNOWN_EFFECT or threshold is None or candidates.empty:
         return ""
     rows = candidates[candidates["stage"] == "refit 1"].dropna(subset="log_evidence")
-    if rows.empty or verdict.threshold is None:
+    if rows.empty:
         return ""
     best = max(rows.to_dict("records"), key=lambda row: row["log_evidence"])
-    if best["log_evidence"] <= verdict.threshold:
+    if best["log_evidence"] <= threshold:
         return ""
     return (
         f"Nearest known effect: {plain(best['effect'])}, log evidence "
@@ -228,7 +213,7 @@ def not_testable(verdict: Verdict) -> str:
     if not names:
         return ""
     told = f"These tests cannot show {listed(names, 8, 'or')}"
-    if verdict.answer is Answer.NULL:
+    if verdict.verdict is Answer.NULL:
         told += ", so nothing is said about them"
     by_test: dict[str, list[str]] = {}
     for one in verdict.not_testable:
@@ -254,7 +239,7 @@ def warnings(verdict: Verdict) -> tuple[str, ...]:
     return tuple(
         f"Look at the data first: {readable(one.where)}: {readable(one.what)}"
         + (f" ({readable(one.evidence)})." if one.evidence else ".")
-        for one in verdict.suspicions
+        for one in verdict.suspected_data_errors
     )
 
 
@@ -267,7 +252,6 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
         _where(results.table("where")),
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
-        _detected_from(verdict),
         not_testable(verdict),
         _noise(verdict),
     ]
@@ -284,11 +268,6 @@ def _sizes(verdict: Verdict) -> Iterator[str]:
             spread = f"; {differing(effect)}" if differing(effect) else ""
             told = ", ".join(sizes[:_MOST_SIZES])
             yield f"{capital(called(effect))}: {told}{more}{spread}."
-
-
-def _detected_from(verdict: Verdict) -> str:
-    told = readable(verdict.detected_from).rstrip(".")
-    return f"Detected from: {told}." if told else ""
 
 
 def _before_and_after(where: pd.DataFrame) -> str:
@@ -309,22 +288,35 @@ def _where(where: pd.DataFrame) -> str:
     """The places of the largest gap of the base that is above the noise."""
     if where.empty:
         return ""
-    chosen = (where["by"] == "joint x coordinate x test") & (where["model"] == "base")
-    rows = where[chosen & (where["gap_low"] > 0.0)]
-    if rows.empty:
+    chosen, ordered = _at_places(where), _worst(where)
+    if ordered.empty:
         return "Base model and measurement agree within the noise at every joint in every test."
-    ordered = rows.sort_values("gap", ascending=False, kind="stable")
     places = [
         f"{row['joint']} in {axis(row['coordinate'])}, test {plain(row['test'])}: "
         f"{fixed(row['gap'], 1)} ({fixed(row['gap_low'], 1)} to {fixed(row['gap_high'], 1)})"
         for row in ordered.head(_MOST_PLACES).to_dict("records")
     ]
-    total = f"{len(rows)} of {count(int(chosen.sum()), 'place')}"
-    chance = fixed(_BY_CHANCE * float(chosen.sum()), 0)
+    above = f"{len(ordered)} of {count(len(chosen), 'place')}"
+    chance = fixed(_BY_CHANCE * len(chosen), 0)
     return (
         f"Where the base is off most (gap in noise SD, 95 % interval): {'; '.join(places)}. "
-        f"The gap is above the noise at {total}; noise alone would do that at about {chance}."
+        f"The gap is above the noise at {above}; noise alone would do that at about {chance}."
     )
+
+
+def _at_places(where: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the base at each joint and coordinate in each test."""
+    if where.empty:
+        return where
+    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == "base")]
+
+
+def _worst(where: pd.DataFrame) -> pd.DataFrame:
+    """Of these, those whose gap is above the noise, largest first."""
+    rows = _at_places(where)
+    if rows.empty:
+        return rows
+    return rows[rows["gap_low"] > 0.0].sort_values("gap", ascending=False, kind="stable")
 
 
 def _noise(verdict: Verdict) -> str:
@@ -334,8 +326,7 @@ def _noise(verdict: Verdict) -> str:
     sds = ((noise.rotation_sd_deg, "°"), (noise.translation_sd_mm, " mm"))
     told = [f"{number(value, 2)}{unit}" for value, unit in sds if value is not None]
     size = f" SD of one reading {' and '.join(told)}" if told else ""
-    if noise.source == "declared":
+    if noise.source == DECLARED:
         return f"Noise:{size}, as declared: no cycle was repeated, so all hangs on that number."
-    serial = noise.serial_correlation
-    along = f", correlation from step to step {fixed(serial)}" if serial is not None else ""
-    return f"Noise:{size}, from repeated cycles{along}."
+    along = f"correlation from step to step {fixed(noise.serial_correlation)}"
+    return f"Noise:{size}, from repeated cycles, {along}."

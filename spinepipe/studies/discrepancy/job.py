@@ -1,19 +1,18 @@
-"""What is written where the base model cannot be fitted: why, and what looks wrong in the data.
+"""Job: search what the base model of a study lacks, prove it on held-out data, write it down.
 
-What a search for missing effects leaves behind, before it is written to files.
-
-What is written where the base model has a fit: verdict, rows of all tables, both models.
-
-Search what the base model of a study lacks, prove it on held-out data, and write it down.
+A base that cannot be fitted is a verdict too: why, and what looks wrong in the data.
 """
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
@@ -22,7 +21,6 @@ from spinepipe.marks import KEY, with_mark
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.studies.discrepancy.rows import (
     candidate_rows,
     confusion_rows,
@@ -32,29 +30,55 @@ from spinepipe.studies.discrepancy.rows import (
     held_out_rows,
     where_rows,
 )
-from spinepipe.studies.discrepancy.search.gaps import places, residual_frame
+from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.hypothesis import BUSHING
+from spinepipe.studies.discrepancy.search.hypothesis import BUSHING, Form
+from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
-    declared_sd,
+    Prepared,
     investigate,
-    measured,
-    with_noise,
+    prepared,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import EVERY, model_file
-from spinepipe.studies.discrepancy.search.noise import Noise
-from spinepipe.studies.discrepancy.search.outcome import Verdict
+from spinepipe.studies.discrepancy.search.model_files import fitted_values, model_file
+from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
+from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
-from spinepipe.studies.discrepancy.verdict import noise_data, verdict_data
+from spinepipe.studies.discrepancy.verdict import (
+    EVERY,
+    UNIT,
+    Answer,
+    Estimate,
+    Gaps,
+    Missing,
+    Noise,
+    Reason,
+    Rival,
+    Scope,
+    Sizes,
+    Threshold,
+    Unknown,
+    Verdict,
+    plain_data,
+)
 from spinepipe.tables import from_rows, write
-from spinepipe.units import STIFFNESS_COLUMNS
+from spinepipe.units import BORDER_PER_SI, ROTATIONS, STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
-Rows = Mapping[str, Sequence[Row]]
+
+JOB = "search"
+STORE = "store"
+
+STARTED_FROM = "not_fitted"
+"""In the names of the model files: they are where the fit started, not where it ended."""
+
+NO_SHAPE = "not known: there is no motion of the base model to compare with"
+
+MOST_RIVALS, MOST_PLACES = 5, 3
 
 
 @dataclass(frozen=True)
@@ -63,136 +87,14 @@ class Results:
 
     Attributes
     ----------
-    verdict : content of ``verdict.json``. rows : of each table by its name; a table that is not
-        there has no rows. model_base, model_with_effects : the two model files.
+    rows : of each table by its name; a table that is not there has no rows.
+    model_base, model_with_effects : the two model files.
     """
 
-    verdict: Mapping[str, Any]
-    rows: Rows
+    verdict: Verdict
+    rows: Mapping[str, Sequence[Row]]
     model_base: ModelFile
     model_with_effects: ModelFile
-
-
-STARTED_FROM = "not_fitted"
-"""In the names of the model files: they are where the fit started, not where it ended."""
-
-SHAPE = "not known: there is no motion of the base model to compare with"
-
-
-def without_base(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, trouble: NoBase
-) -> Results:
-    """The results of a study whose base has no fit.
-
-    Parameters
-    ----------
-    file : the model file that the study starts from, if it does.
-    trouble : where the fit failed, and why.
-    """
-    readings = measured(study, cohort)
-    _, noise = with_noise(study, cohort, readings)
-    errors = before_a_fit(readings, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
-    return Results(
-        verdict=_verdict_without_base(cohort, noise, errors, str(trouble), study.false_alarm),
-        rows={},
-        model_base=start_model(study, cohort, file, "base"),
-        model_with_effects=start_model(study, cohort, file, "with_effects"),
-    )
-
-
-def start_model(study: Discrepancy, cohort: Cohort, file: ModelFile | None, of: str) -> ModelFile:
-    """The model where the fit started, under a name that says so."""
-    effects = file.effects if file is not None else (_bushing(study),)
-    return ModelFile(
-        model=f"{study.study}_{of}_{STARTED_FROM}", cohort=cohort.name, effects=effects
-    )
-
-
-def _bushing(study: Discrepancy) -> EffectEntry:
-    """The study's stiffness at all joints."""
-    start = dict(zip(STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True))
-    return EffectEntry(effect=BUSHING, values=(Values.model_validate(start),))
-
-
-def _verdict_without_base(
-    cohort: Cohort,
-    noise: Noise,
-    errors: Sequence[SuspectedError],
-    trouble: str,
-    false_alarm: float,
-) -> Mapping[str, Any]:
-    """All keys of ``verdict.json``; what nobody knows is null or empty."""
-    sizes = dict.fromkeys(("base", "with_effects", "held_out_base", "held_out_with_effects"))
-    return {
-        "cohort": cohort.name,
-        "verdict": Verdict.UNKNOWN.value,
-        "why": f"the base model cannot be fitted: {trouble}",
-        "effects": [],
-        "candidates_in_set": [],
-        "not_testable": [],
-        "noise": noise_data(noise),
-        "rms_residual": {"unit": "noise sd", **sizes},
-        "gap": {"unit": "noise sd", **sizes, "held_out_closed": None},
-        "smallest_detectable": [],
-        "unknown": {"where": trouble, "shape": SHAPE},
-        "suspected_data_errors": [vars(one) for one in errors],
-        "threshold": {"log_evidence": None, "false_alarm": false_alarm, "draws": None},
-        "families": [],
-    }
-
-
-def with_base(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, ended: Investigation, run: Run
-) -> Results:
-    """The results of an investigation, and what the tests could tell apart.
-
-    Parameters
-    ----------
-    file : the model file that the study starts from, if it does.
-    """
-    told = _told_apart(study, cohort, ended, run)
-    ended = ended.as_told()
-    return Results(
-        verdict=_verdict(study, cohort, ended, told),
-        rows=_rows(cohort, ended, told),
-        model_base=_model(study, cohort, ended.grounds.fit, file, "base"),
-        model_with_effects=_model(study, cohort, ended.found.final.fit, file, "with_effects"),
-    )
-
-
-def _told_apart(study: Discrepancy, cohort: Cohort, ended: Investigation, run: Run) -> ToldApart:
-    needed = ended.found.stages[0].screen.threshold + study.margin
-    declared = declared_sd(study, cohort)
-    return told_apart(ended.grounds, ended.rules.trials, needed, declared, study.seed, run)
-
-
-def _verdict(
-    study: Discrepancy, cohort: Cohort, ended: Investigation, told: ToldApart
-) -> Mapping[str, Any]:
-    final = places(residual_frame(ended.grounds, ended.found.final.fit, cohort.joint_names))
-    return verdict_data(cohort, ended, told, final, study.false_alarm)
-
-
-def _rows(cohort: Cohort, ended: Investigation, told: ToldApart) -> Mapping[str, Sequence[Row]]:
-    joints, found, proof = cohort.joint_names, ended.found, ended.proof
-    return {
-        GAP.name: gap_rows(found, joints, held_out_readings(proof)),
-        CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
-        WHERE.name: where_rows(found, joints),
-        CONFUSIONS.name: confusion_rows(told),
-        HELD_OUT.name: held_out_rows(proof),
-    }
-
-
-def _model(
-    study: Discrepancy, cohort: Cohort, fit: JointFit, file: ModelFile | None, of: str
-) -> ModelFile:
-    base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
-    return model_file(fit, f"{study.study}_{of}", cohort.name, base)
-
-
-JOB = "search"
-STORE = "store"
 
 
 def run(
@@ -207,10 +109,7 @@ def run(
     model_base: str,
     model_with_effects: str,
 ) -> None:
-    """Write the verdict, its tables and the two model files of a study.
-
-    A base that cannot be fitted is a verdict too: UNKNOWN, and why.
-    """
+    """Write the verdict, its tables and the two model files of a study."""
     settings, cohort = study_of_kind(Discrepancy, root, study)
     store = Store(Path(verdict).parent / STORE, __name__)
     results = searched(settings, cohort, root, store)
@@ -226,7 +125,7 @@ def run(
         write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
     write_model(results.model_base, model_base, metadata[KEY])
     write_model(results.model_with_effects, model_with_effects, metadata[KEY])
-    told = with_mark(dict(results.verdict), metadata[KEY])
+    told = with_mark(plain_data(results.verdict), metadata[KEY])
     with appearing(verdict) as temporary:
         temporary.write_text(json.dumps(told, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     store.forget_the_rest()
@@ -235,8 +134,174 @@ def run(
 def searched(study: Discrepancy, cohort: Cohort, root: str, run: Run) -> Results:
     """All that the files of a study hold, whether or not its base has a fit."""
     file = None if study.base.model is None else read_model(Path(root) / study.base.model)
+    ready = prepared(study, cohort, file)
     try:
-        ended = investigate(study, cohort, file, run)
+        ended = investigate(ready, run)
     except NoBase as trouble:
-        return without_base(study, cohort, file, trouble)
-    return with_base(study, cohort, file, ended, run)
+        return _without_base(ready, trouble)
+    return _with_base(ready, ended, run)
+
+
+def _without_base(ready: Prepared, trouble: NoBase) -> Results:
+    """The results of a study whose base has no fit; ``trouble`` says where and why."""
+    cohort, noise = ready.cohort, ready.noise
+    errors = before_a_fit(ready.measured, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
+    verdict = Verdict(
+        cohort=cohort.name,
+        verdict=Answer.UNKNOWN,
+        why=f"the base model cannot be fitted: {trouble}",
+        noise=_noise(noise),
+        unknown=Unknown(str(trouble), NO_SHAPE, Reason.NO_BASE),
+        suspected_data_errors=errors,
+        threshold=Threshold(false_alarm=ready.study.false_alarm),
+    )
+    return Results(
+        verdict=verdict,
+        rows={},
+        model_base=_start_model(ready, "base"),
+        model_with_effects=_start_model(ready, "with_effects"),
+    )
+
+
+def _start_model(ready: Prepared, of: str) -> ModelFile:
+    """The model where the fit started, under a name that says so."""
+    study, file = ready.study, ready.file
+    start = dict(zip(STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True))
+    bushing = EffectEntry(effect=BUSHING, values=(Values.model_validate(start),))
+    effects = file.effects if file is not None else (bushing,)
+    name = f"{study.study}_{of}_{STARTED_FROM}"
+    return ModelFile(model=name, cohort=ready.cohort.name, effects=effects)
+
+
+def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
+    """The results of an investigation, and what the tests could tell apart."""
+    needed = ended.found.stages[0].screen.threshold + ended.rules.margin
+    seed, trials = ended.rules.seed, ended.rules.trials
+    told = told_apart(ended.grounds, trials, needed, ready.declared, seed, run)
+    ended = ended.as_told()
+    return Results(
+        verdict=_verdict(ready, ended, told),
+        rows=_rows(ready.cohort.joint_names, ended, told),
+        model_base=_model(ready, ended.grounds.fit, "base"),
+        model_with_effects=_model(ready, ended.found.final.fit, "with_effects"),
+    )
+
+
+def _rows(
+    joints: Sequence[str], ended: Investigation, told: ToldApart
+) -> Mapping[str, Sequence[Row]]:
+    found, proof = ended.found, ended.proof
+    return {
+        GAP.name: gap_rows(found, joints, held_out_readings(proof)),
+        CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
+        WHERE.name: where_rows(found, joints),
+        CONFUSIONS.name: confusion_rows(told),
+        HELD_OUT.name: held_out_rows(proof),
+    }
+
+
+def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
+    file = ready.file
+    base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
+    return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base)
+
+
+def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> Verdict:
+    cohort = ready.cohort
+    found, proof, ended = investigation.found, investigation.proof, investigation.ended
+    final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
+    screen = found.stages[0].screen
+    gaps = (
+        found.base_gap,
+        found.final_gap,
+        proof.base and proof.base.against(proof.expected),
+        proof.with_effects and proof.with_effects.against(proof.expected),
+    )
+    return Verdict(
+        cohort=cohort.name,
+        verdict=ended.verdict,
+        why=ended.why,
+        effects=tuple(_missing(found, one, cohort) for one in ended.named),
+        candidates_in_set=ended.tied,
+        not_testable=told.not_testable,
+        noise=_noise(found.base.noise),
+        rms_residual=Sizes(UNIT, *(gap.rms if gap else None for gap in gaps)),
+        gap=Gaps(
+            **asdict(Sizes(UNIT, *(gap.gap if gap else None for gap in gaps))),
+            held_out_closed=proof.closed,
+        ),
+        smallest_detectable=told.smallest_detectable,
+        unknown=_unknown(found, ended, final),
+        suspected_data_errors=investigation.errors,
+        threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
+        families=told.families,
+    )
+
+
+def _missing(found: Found, one: Standing, cohort: Cohort) -> Missing:
+    number = next(k for k, standing in enumerate(found.standing) if standing is one)
+    form = one.supposed.form
+    return Missing(
+        name=one.name,
+        kind=form.variant.create().kind.value,
+        scope=_scope(form, cohort),
+        variant=dict(form.variant.options),
+        spread=form.spread.value,
+        parameters=tuple(
+            Estimate(
+                "@".join([value.name, *value.place]),
+                value.value,
+                value.unit,
+                (value.low, value.high),
+                value.at_bound,
+            )
+            for value in fitted_values(found.final.fit, number)
+        ),
+        log_evidence=one.log_evidence,
+        rivals=tuple(Rival(other.name, other.margin) for other in one.rivals[:MOST_RIVALS]),
+    )
+
+
+def _scope(form: Form, cohort: Cohort) -> Scope:
+    options = dict(form.variant.options)
+    coordinate = options.get("coordinate")
+    if coordinate is None:
+        coordinates = tuple(options.get("pair", EVERY))
+    else:
+        coordinates = ROTATIONS if coordinate == "rotations" else (coordinate,)
+    return Scope(
+        joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
+        coordinates=coordinates,
+        specimens=EVERY if form.specimen is None else (form.specimen,),
+    )
+
+
+def _noise(noise: FittedNoise) -> Noise:
+    """SDs of one reading in the units of tables, and how they are known."""
+    sd = noise.sd * BORDER_PER_SI
+    return Noise(
+        source=noise.source,
+        rotation_sd_deg=_rms(sd[3:]),
+        translation_sd_mm=_rms(sd[:3]),
+        serial_correlation=noise.correlation,
+        outliers_left_out=noise.outliers,
+    )
+
+
+def _rms(sd: Array) -> float | None:
+    """Of what was read; None where nothing was."""
+    read = sd[np.isfinite(sd)]
+    return float(np.sqrt(np.mean(read**2))) if len(read) else None
+
+
+def _unknown(found: Found, ended: Outcome, final: Sequence[Place]) -> Unknown | None:
+    if ended.reason is None:
+        return None
+    where = "; ".join(
+        f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
+        f"(gap {p.gap.gap:.1f})"
+        for p in worst(final, MOST_PLACES)
+    )
+    evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
+    shape = found.lack.shape if evident else None
+    return Unknown(where or "no single place stands out", shape, ended.reason)

@@ -128,14 +128,9 @@ _COLUMNS: Mapping[str, tuple[Column, ...]] = {
     "rivals": (
         _EFFECT,
         Column("rival", "text", "another name for the same discrepancy"),
-        Column("margin", "number", "log evidence by which it is behind", null="not told"),
+        Column("margin", "number", "log evidence by which it is behind"),
     ),
-    "set": (
-        _EFFECT,
-        Column("kind", "text", "what it acts on"),
-        Column("where", "text", "joints, coordinates, specimens and tests"),
-        Column("log_evidence", "number", "log evidence against the model without it", null="none"),
-    ),
+    "set": (_EFFECT,),
     "not_testable": (
         _EFFECT,
         Column("why", "text", "why these tests cannot show it"),
@@ -177,7 +172,8 @@ def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
 def _from_verdict(verdict: Verdict) -> dict[str, Records]:
     return {
         "errors": [
-            {key: readable(words) for key, words in vars(one).items()} for one in verdict.suspicions
+            {key: readable(words) for key, words in vars(one).items()}
+            for one in verdict.suspected_data_errors
         ],
         "parameters": [
             {
@@ -190,17 +186,13 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
             for effect in verdict.effects
             for one in effect.parameters
         ],
-        "set": [
-            {
-                "effect": plain(one.name),
-                "kind": one.kind,
-                "where": where_of(one),
-                "log_evidence": one.log_evidence,
-            }
-            for one in verdict.candidates
-        ],
+        "set": [{"effect": plain(name)} for name in verdict.candidates_in_set],
         "rivals": [
-            {"effect": plain(effect.name), "rival": plain(rival.name), "margin": rival.margin}
+            {
+                "effect": plain(effect.name),
+                "rival": plain(rival.name),
+                "margin": rival.log_evidence_margin,
+            }
             for effect in verdict.effects
             for rival in effect.rivals
         ],
@@ -242,13 +234,15 @@ def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
         tables=shown_tables(verdict, results),
         metadata=results.metadata,
         left_out=tuple(left_out(study)),
-        headline=Headline(headline(verdict), _joined(how_sure(verdict)), warnings(verdict)),
+        headline=Headline(
+            headline(verdict, results.table("where")), _joined(how_sure(verdict)), warnings(verdict)
+        ),
     )
 
 
 def _ordered(pictures: Mapping[str, Picture], verdict: Verdict) -> list[Picture]:
     """Where nothing is missing, what could have been seen comes first."""
-    first = "effect_confusions" if verdict.answer is Answer.NULL else ""
+    first = "effect_confusions" if verdict.verdict is Answer.NULL else ""
     return sorted(pictures.values(), key=lambda picture: picture.name != first)
 
 

@@ -24,7 +24,6 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Tried
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
-from spinepipe.studies.discrepancy.verdict import against_expected
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
 
 Row = dict[str, Any]
@@ -275,8 +274,7 @@ def _fold_row(row: FoldRow) -> Row:
 
 
 def _rms(gap: Gap | None, expected: float) -> float | None:
-    sized = against_expected(gap, expected)
-    return None if sized is None else sized.rms
+    return None if gap is None else gap.against(expected).rms
 
 
 def held_out_readings(

@@ -32,7 +32,8 @@ import numpy as np
 from pydra.compose import python
 from pydra.engine.submitter import Submitter
 
-from spinepipe.jobs.digest import code_digest, versions
+from spinepipe.jobs.code import code_digest
+from spinepipe.jobs.digest import versions
 from spinepipe.studies.discrepancy.codec import decoded, encoded
 from spinepipe.studies.discrepancy.kept import Kept
 

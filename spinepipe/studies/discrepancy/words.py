@@ -4,9 +4,8 @@ import re
 from collections.abc import Callable
 
 from spinepipe.report.words import AXIS, listed, number, plain
-from spinepipe.studies.discrepancy.verdict import Estimate, Missing
+from spinepipe.studies.discrepancy.verdict import EVERY, Estimate, Missing
 
-ALL = "*"
 _UNCOUNTED = (
     *("asymmetry", "contact", "coupling", "creep", "dependence", "hysteresis", "laxity"),
     *("migration", "stiffening", "tilt", "weight"),
@@ -35,21 +34,17 @@ def axis(coordinate: str) -> str:
 
 def where_of(effect: Missing) -> str:
     """``at L4L5, in flexion-extension, in specimens a and b``; what is everywhere is left out."""
+    scope = effect.scope
     parts = [
-        _chosen(effect, "joints", "at {}", str),
-        _chosen(effect, "coordinates", "in {}", axis),
-        _chosen(effect, "specimens", "in specimen {}", str),
-        _chosen(effect, "tests", "during {}", plain),
+        _chosen(scope.joints, "at", str) or "at all joints",
+        _chosen(scope.coordinates, "in", axis),
+        _chosen(scope.specimens, f"in specimen{'s' * (len(scope.specimens) > 1)}", str),
     ]
     return ", ".join(part for part in parts if part)
 
 
-def _chosen(effect: Missing, key: str, words: str, say: Callable[[str], str]) -> str:
-    names = effect.scope.get(key, ())
-    if not names or names == (ALL,):
-        return "at all joints" if key == "joints" and names else ""
-    text = words.format(listed([say(name) for name in names]))
-    return text.replace("in specimen ", "in specimens ") if len(names) > 1 else text
+def _chosen(names: tuple[str, ...], word: str, say: Callable[[str], str]) -> str:
+    return "" if names == EVERY else f"{word} {listed([say(name) for name in names])}"
 
 
 def what_of(effect: Missing) -> str:
@@ -59,7 +54,12 @@ def what_of(effect: Missing) -> str:
 
 def called(effect: Missing) -> str:
     """``nonlinear stiffening (tangent)``: its name and the variant of it."""
-    return plain(effect.name) + (f" ({', '.join(effect.options)})" if effect.options else "")
+    options = [str(value) for key, value in effect.variant.items() if key not in _IN_SCOPE]
+    return plain(effect.name) + (f" ({', '.join(options)})" if options else "")
+
+
+_IN_SCOPE = ("coordinate", "pair")
+"""Options that the scope says as well."""
 
 
 def differing(effect: Missing) -> str:
@@ -88,27 +88,21 @@ def name_and_place(parameter: Estimate) -> tuple[str, str]:
 
 
 def value_of(parameter: Estimate) -> str:
-    """``3.1 [2.8, 3.4]``: with its 95 % interval, or what there is instead."""
-    if parameter.value is None:
-        return "not known"
+    """``3.1 [2.8, 3.4]``: with its 95 % interval, or that it is at its bound."""
     value = number(parameter.value)
     if parameter.at_bound:
         return f"{value}, at its bound"
-    if parameter.low is None or parameter.high is None:
-        return value
-    return f"{value} [{number(parameter.low)}, {number(parameter.high)}]"
+    low, high = parameter.ci95
+    return f"{value} [{number(low)}, {number(high)}]"
 
 
 def estimate_of(parameter: Estimate) -> str:
     """``width 3.1° (95 % interval 2.8 to 3.4)``."""
     name, place = name_and_place(parameter)
     name = f"{name} ({place})" if place else name
-    if parameter.value is None:
-        return f"{name} not known"
     unit = unit_of(parameter.unit)
     told = f"{name} {number(parameter.value)}{unit if unit == '°' else f' {unit}'.rstrip()}"
     if parameter.at_bound:
         return f"{told}, at its bound"
-    if parameter.low is None or parameter.high is None:
-        return told
-    return f"{told} (95 % interval {number(parameter.low)} to {number(parameter.high)})"
+    low, high = parameter.ci95
+    return f"{told} (95 % interval {number(low)} to {number(high)})"

@@ -1,7 +1,4 @@
-"""Job: indices of all factors for all outputs of one specimen, and how they settle.
-
-Outputs of a study as arrays: all samples of one test and step, joint by joint.
-"""
+"""Job: indices of all factors for all outputs of one specimen, and how they settle."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,23 +22,33 @@ from spinepipe.sensitivity.global_indices import (
     noise_floor,
 )
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import design_of
+from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.tables import CALIBRATED, CONVERGENCE, INDICES, RESPONSES
+from spinepipe.studies.global_sensitivity.tables import (
+    CALIBRATED,
+    CONVERGENCE,
+    EVERY,
+    INDICES,
+    RESPONSES,
+)
 from spinepipe.tables import Table, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
 
-EVERY = "*"
+Rows = list[dict[str, Any]]
+
 SETTLED = 1e-6
 """Outputs (mm, deg, N, N m) that vary by less than a solver can tell are constant."""
+
+WHERE = ("output", "test", "step", "joint", "coordinate")
 
 _MOTION = {
     c.name.removeprefix("predicted_").rsplit("_", 1)[0]: c.name
     for c in RESPONSES.columns
     if c.name.startswith("predicted_")
 }
+
 _LOAD = {
     c.name.removeprefix("load_").rsplit("_", 1)[0]: c.name
     for c in RESPONSES.columns
@@ -63,58 +70,6 @@ class Output:
     values: Array
     ok: NDArray[np.bool_]
     resolution: float
-
-
-def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
-    """Outputs of each test and step from the blocks of a specimen's responses."""
-    if not (study.outputs.motion or study.outputs.joint_load):
-        return
-    kinds = {
-        "motion": {name: _MOTION[name] for name in study.outputs.motion},
-        "joint_load": {name: _LOAD[name] for name in study.outputs.joint_load},
-    }
-    columns = [column for kind in kinds.values() for column in kind.values()]
-    rows = _rows(blocks, ["sample", "test", "step", "joint", "status", *columns])
-    head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
-    per_sample = len(head)
-    good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)
-    numbers = {
-        name: np.nan_to_num(rows[name].to_numpy()).reshape(-1, per_sample) for name in columns
-    }
-    for test, step in dict.fromkeys((row["test"], row["step"]) for row in head):
-        at = [n for n, row in enumerate(head) if (row["test"], row["step"]) == (test, step)]
-        where = tuple(
-            (kind, test, step, head[n]["joint"], name)
-            for kind, names in kinds.items()
-            for name in names
-            for n in at
-        )
-        values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
-        ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
-        yield Output(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
-
-
-def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
-    """Stiffness in each coordinate from the blocks of a specimen's fits."""
-    if not blocks:
-        return
-    free = study.calibration.free
-    names = {c.name.rsplit("_n", 1)[0]: c.name for c in CALIBRATED.columns if "_per_" in c.name}
-    rows = _rows(blocks, ["status", *(names[name] for name in free)])
-    ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
-    values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
-    where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
-    yield Output(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
-
-
-def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:
-    """Rows of all blocks; they come in the order of the samples."""
-    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])
-
-
-Rows = list[dict[str, Any]]
-
-WHERE = ("output", "test", "step", "joint", "coordinate")
 
 
 def run(
@@ -217,3 +172,50 @@ def _numbers(index: Index) -> Sequence[dict[str, float | None]]:
         {"estimate": estimate, "ci_low": low, "ci_high": high}
         for estimate, low, high in zip(*ends, strict=True)
     ]
+
+
+def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+    """Outputs of each test and step from the blocks of a specimen's responses."""
+    if not (study.outputs.motion or study.outputs.joint_load):
+        return
+    kinds = {
+        "motion": {name: _MOTION[name] for name in study.outputs.motion},
+        "joint_load": {name: _LOAD[name] for name in study.outputs.joint_load},
+    }
+    columns = [column for kind in kinds.values() for column in kind.values()]
+    rows = _rows(blocks, ["sample", "test", "step", "joint", "status", *columns])
+    head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
+    per_sample = len(head)
+    good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)
+    numbers = {
+        name: np.nan_to_num(rows[name].to_numpy()).reshape(-1, per_sample) for name in columns
+    }
+    for test, step in dict.fromkeys((row["test"], row["step"]) for row in head):
+        at = [n for n, row in enumerate(head) if (row["test"], row["step"]) == (test, step)]
+        where = tuple(
+            (kind, test, step, head[n]["joint"], name)
+            for kind, names in kinds.items()
+            for name in names
+            for n in at
+        )
+        values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
+        ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
+        yield Output(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
+
+
+def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+    """Stiffness in each coordinate from the blocks of a specimen's fits."""
+    if not blocks:
+        return
+    free = study.calibration.free
+    names = {c.name.rsplit("_n", 1)[0]: c.name for c in CALIBRATED.columns if "_per_" in c.name}
+    rows = _rows(blocks, ["status", *(names[name] for name in free)])
+    ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
+    values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
+    where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
+    yield Output(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
+
+
+def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:
+    """Rows of all blocks; they come in the order of the samples."""
+    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])

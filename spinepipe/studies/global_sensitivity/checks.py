@@ -1,11 +1,4 @@
-"""Is the design of a global sensitivity study one that can be drawn, with distinct names?
-
-Is the landmark that a factor moves there, and does a joint frame hang on it?
-
-Is what each factor changes there in the cohort, and does changing it do anything?
-
-What a study of global sensitivity demands of its cohort.
-"""
+"""What a study of global sensitivity demands of its cohort, its design and its factors."""
 
 from collections.abc import Callable, Iterator, Sequence
 from math import log2
@@ -18,166 +11,39 @@ from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.global_sensitivity.change import Change, Of
 from spinepipe.studies.global_sensitivity.settings import DUMMY, INDICES, GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by
-from spinepipe.studies.places import at, measured_columns, readings, unknown_names, unknown_tests
+from spinepipe.studies.places import (
+    at,
+    measured_columns,
+    readings,
+    unknown_levels,
+    unknown_names,
+    unknown_tests,
+)
 from spinepipe.units import COORDINATE_COLUMNS
 
-
-def check_landmark(
-    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
-) -> Iterator[Problem]:
-    """Problems of one factor.
-
-    Parameters
-    ----------
-    key : of the factor in the study file.
-    specimens : of the cohort, those that the study has.
-    """
-    (vertebra,) = change.at
-    if cohort.landmarks is None:
-        found = f"a landmark in cohort '{cohort.name}', which has no landmarks.csv"
-        allowed = "landmarks of a cohort that has them"
-        remedy = "use joint_centre and joint_axes, or take another cohort"
-        yield Problem(*at(document, key), found, allowed, remedy)
-        return
-    if vertebra not in cohort.vertebrae:
-        known = cohort.vertebrae
-        remedy = did_you_mean(vertebra, known, "correct its name")
-        place = at(document, f"{key}.vertebra")
-        yield Problem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
-    if change.landmark not in FRAME_LANDMARKS:
-        yield _no_frame_landmark(document, key, change, cohort)
-    elif vertebra in cohort.vertebrae:
-        yield from _of_specimens(document, key, change, cohort, specimens)
-
-
-def _no_frame_landmark(document: Document, key: str, change: Change, cohort: Cohort) -> Problem:
-    """A landmark that makes no frame may be moved as far as one likes."""
-    assert cohort.landmarks is not None
-    there = change.landmark in set(cohort.landmarks["landmark"])
-    why = "in no joint frame: it would do nothing" if there else "unknown"
-    remedy = did_you_mean(
-        change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
-    )
-    place = at(document, f"{key}.landmark")
-    return Problem(*place, f"landmark '{change.landmark}', {why}", one_of(FRAME_LANDMARKS), remedy)
-
-
-def _of_specimens(
-    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
-) -> Iterator[Problem]:
-    """Specimens without the landmark, then those in which nothing hangs on it."""
-    vertebra = cohort.vertebrae.index(change.at[0])
-    landmark = FRAME_LANDMARKS.index(change.landmark)
-    without, idle = [], []
-    for specimen in specimens:
-        _, known = frame_landmarks(cohort, specimen)
-        if not known[vertebra, landmark]:
-            without.append(specimen)
-        elif not moved_by(known, given_joints(cohort, specimen), vertebra, landmark):
-            idle.append(specimen)
-    what = f"{change.landmark} of {change.at[0]}"
-    if without:
-        found = f"{what}, which landmarks.csv does not have of {', '.join(without[:5])}"
-        allowed = "a landmark of all chosen specimens"
-        yield Problem(*at(document, f"{key}.landmark"), found, allowed, "delete the factor")
-    if idle:
-        found = f"{what}, on which no joint frame of {', '.join(idle[:5])} hangs"
-        allowed = "a landmark of a frame that joints.csv does not give: it would do nothing"
-        remedy = "delete the factor, or use joint_centre and joint_axes"
-        yield Problem(*at(document, key), found, allowed, remedy)
-
-
+TAKE_GROUPS = ("sobol", "morris")
+FEWEST = 2
 _FORCES = ["fx_n", "fy_n", "fz_n"]
 _MOMENTS = ["mx_nm", "my_nm", "mz_nm"]
 
 
-def check_factors(
+def check_global_sensitivity(
     document: Document, study: GlobalSensitivity, cohort: Cohort
 ) -> Iterator[Problem]:
-    """Problems of all factors, in their order."""
-    specimens = [s for s in study.chosen_specimens(cohort) if s in cohort.specimen_names]
-    for number, factor in enumerate(study.factors):
-        change, key = factor.change, f"factors.{number}"
-        if change.of is Of.LANDMARK:
-            yield from check_landmark(document, key, change, cohort, specimens)
-        elif change.of in _CHECKS:
-            yield from _CHECKS[change.of](document, key, change, cohort, study, specimens)
+    """Every way in which a sound study and a sound cohort do not fit.
 
-
-def _joints(
-    document: Document, key: str, change: Change, cohort: Cohort, *_: Any
-) -> Iterator[Problem]:
-    yield from unknown_names(document, f"{key}.joints", "joint", change.at, cohort.joint_names)
-
-
-def _bodies(
-    document: Document,
-    key: str,
-    change: Change,
-    cohort: Cohort,
-    study: GlobalSensitivity,
-    specimens: Sequence[str],
-) -> Iterator[Problem]:
-    """Bodies must be vertebrae that move, listed, and felt: in equilibrium only weight is."""
-    moving, place = cohort.vertebrae[1:], f"{key}.vertebrae"
-    yield from unknown_names(document, place, "moving vertebra", change.at, moving)
-    if cohort.bodies is None:
-        found = f"{change.of.value} in cohort '{cohort.name}', which has no bodies.csv"
-        allowed = "factors of bodies in a cohort that lists them"
-        yield Problem(*at(document, key), found, allowed, "delete the factor, or add bodies.csv")
-        return
-    if not cohort.gravity:
-        found = f"{change.of.value} in cohort '{cohort.name}' without gravity: it would do nothing"
-        allowed = "factors of bodies where gravity is true: in equilibrium bodies only weigh"
-        yield Problem(*at(document, key), found, allowed, "delete the factor")
-    rows = zip(cohort.bodies["specimen"], cohort.bodies["vertebra"], strict=True)
-    listed = set(rows)
-    asked = [name for name in change.at or moving if name in moving]
-    missing = [f"{v} of {s}" for s in specimens for v in asked if (s, v) not in listed]
-    if missing:
-        found = f"no body in bodies.csv for {', '.join(missing[:5])}"
-        allowed = "bodies that the cohort lists, of all chosen specimens"
-        yield Problem(*at(document, place), found, allowed, "leave them out, or add their bodies")
-
-
-def _loads(
-    document: Document,
-    key: str,
-    change: Change,
-    cohort: Cohort,
-    study: GlobalSensitivity,
-    specimens: Sequence[str],
-) -> Iterator[Problem]:
-    """Something must act: a point matters to forces, direction and size to moments as well."""
-    if cohort.loads is None:
-        return
-    columns = _FORCES if change.of is Of.LOAD_POINT else [*_FORCES, *_MOMENTS]
-    chosen = cohort.loads["test"].isin(study.chosen_tests(cohort))
-    chosen &= cohort.loads["specimen"].isin([*specimens, "*"])
-    if chosen.any() and not cohort.loads.loc[chosen, columns].any(axis=None):
-        what = "force" if change.of is Of.LOAD_POINT else "load"
-        found = f"{change.of.value}, but no {what} acts in any chosen test: it would do nothing"
-        allowed = f"{change.of.value} in tests with a {what}"
-        yield Problem(
-            *at(document, key), found, allowed, "delete the factor, or choose other tests"
-        )
-
-
-_CHECKS: dict[Of, Callable[..., Iterator[Problem]]] = {
-    Of.STIFFNESS: _joints,
-    Of.JOINT_CENTRE: _joints,
-    Of.JOINT_AXES: _joints,
-    Of.MASS: _bodies,
-    Of.CENTRE_OF_MASS: _bodies,
-    Of.LOAD_POINT: _loads,
-    Of.LOAD_DIRECTION: _loads,
-    Of.LOAD_SIZE: _loads,
-}
-"""What is demanded of the cohort; damping is always there."""
-
-
-TAKE_GROUPS = ("sobol", "morris")
-FEWEST = 2
+    Parameters
+    ----------
+    document : the study file, for the lines of its keys.
+    """
+    yield from check_sensitivity_design(document, study)
+    yield from unknown_names(
+        document, "specimens", "specimen", study.specimens, cohort.specimen_names
+    )
+    yield from unknown_levels(document, study.level_stiffness, cohort.joint_names)
+    yield from _tests(document, study, cohort)
+    yield from _motion(document, study, cohort)
+    yield from check_factors(document, study, cohort)
 
 
 def check_sensitivity_design(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
@@ -255,33 +121,6 @@ def _groups(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
             yield Problem(*place, found, allowed, "delete the group, or choose another method")
 
 
-def check_global_sensitivity(
-    document: Document, study: GlobalSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
-    """Every way in which a sound study and a sound cohort do not fit.
-
-    Parameters
-    ----------
-    document : the study file, for the lines of its keys.
-    """
-    yield from check_sensitivity_design(document, study)
-    yield from unknown_names(
-        document, "specimens", "specimen", study.specimens, cohort.specimen_names
-    )
-    yield from _levels(document, study, cohort)
-    yield from _tests(document, study, cohort)
-    yield from _motion(document, study, cohort)
-    yield from check_factors(document, study, cohort)
-
-
-def _levels(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
-    for name in study.level_stiffness:
-        if name not in cohort.joint_names:
-            remedy = did_you_mean(name, cohort.joint_names, "delete it")
-            place = at(document, f"level_stiffness.{name}")
-            yield Problem(*place, f"unknown joint '{name}'", one_of(cohort.joint_names), remedy)
-
-
 def _tests(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
     """Tests must exist, and every specimen must have one."""
     if cohort.loads is None:
@@ -328,3 +167,153 @@ def _motion(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Ite
         place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
         yield Problem(*place, found, f"a weight on {one_of(columns)}", "weigh what was measured")
+
+
+def check_factors(
+    document: Document, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[Problem]:
+    """Problems of all factors, in their order."""
+    specimens = [s for s in study.chosen_specimens(cohort) if s in cohort.specimen_names]
+    for number, factor in enumerate(study.factors):
+        change, key = factor.change, f"factors.{number}"
+        if change.of is Of.LANDMARK:
+            yield from check_landmark(document, key, change, cohort, specimens)
+        elif change.of in _CHECKS:
+            yield from _CHECKS[change.of](document, key, change, cohort, study, specimens)
+
+
+def _joints(
+    document: Document, key: str, change: Change, cohort: Cohort, *_: Any
+) -> Iterator[Problem]:
+    yield from unknown_names(document, f"{key}.joints", "joint", change.at, cohort.joint_names)
+
+
+def _bodies(
+    document: Document,
+    key: str,
+    change: Change,
+    cohort: Cohort,
+    study: GlobalSensitivity,
+    specimens: Sequence[str],
+) -> Iterator[Problem]:
+    """Bodies must be vertebrae that move, listed, and felt: in equilibrium only weight is."""
+    moving, place = cohort.vertebrae[1:], f"{key}.vertebrae"
+    yield from unknown_names(document, place, "moving vertebra", change.at, moving)
+    if cohort.bodies is None:
+        found = f"{change.of.value} in cohort '{cohort.name}', which has no bodies.csv"
+        allowed = "factors of bodies in a cohort that lists them"
+        yield Problem(*at(document, key), found, allowed, "delete the factor, or add bodies.csv")
+        return
+    if not cohort.gravity:
+        found = f"{change.of.value} in cohort '{cohort.name}' without gravity: it would do nothing"
+        allowed = "factors of bodies where gravity is true: in equilibrium bodies only weigh"
+        yield Problem(*at(document, key), found, allowed, "delete the factor")
+    rows = zip(cohort.bodies["specimen"], cohort.bodies["vertebra"], strict=True)
+    listed = set(rows)
+    asked = [name for name in change.at or moving if name in moving]
+    missing = [f"{v} of {s}" for s in specimens for v in asked if (s, v) not in listed]
+    if missing:
+        found = f"no body in bodies.csv for {', '.join(missing[:5])}"
+        allowed = "bodies that the cohort lists, of all chosen specimens"
+        yield Problem(*at(document, place), found, allowed, "leave them out, or add their bodies")
+
+
+def _loads(
+    document: Document,
+    key: str,
+    change: Change,
+    cohort: Cohort,
+    study: GlobalSensitivity,
+    specimens: Sequence[str],
+) -> Iterator[Problem]:
+    """Something must act: a point matters to forces, direction and size to moments as well."""
+    if cohort.loads is None:
+        return
+    columns = _FORCES if change.of is Of.LOAD_POINT else [*_FORCES, *_MOMENTS]
+    chosen = cohort.loads["test"].isin(study.chosen_tests(cohort))
+    chosen &= cohort.loads["specimen"].isin([*specimens, "*"])
+    if chosen.any() and not cohort.loads.loc[chosen, columns].any(axis=None):
+        what = "force" if change.of is Of.LOAD_POINT else "load"
+        found = f"{change.of.value}, but no {what} acts in any chosen test: it would do nothing"
+        allowed = f"{change.of.value} in tests with a {what}"
+        yield Problem(
+            *at(document, key), found, allowed, "delete the factor, or choose other tests"
+        )
+
+
+def check_landmark(
+    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
+) -> Iterator[Problem]:
+    """Problems of one factor.
+
+    Parameters
+    ----------
+    key : of the factor in the study file.
+    specimens : of the cohort, those that the study has.
+    """
+    (vertebra,) = change.at
+    if cohort.landmarks is None:
+        found = f"a landmark in cohort '{cohort.name}', which has no landmarks.csv"
+        allowed = "landmarks of a cohort that has them"
+        remedy = "use joint_centre and joint_axes, or take another cohort"
+        yield Problem(*at(document, key), found, allowed, remedy)
+        return
+    if vertebra not in cohort.vertebrae:
+        known = cohort.vertebrae
+        remedy = did_you_mean(vertebra, known, "correct its name")
+        place = at(document, f"{key}.vertebra")
+        yield Problem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
+    if change.landmark not in FRAME_LANDMARKS:
+        yield _no_frame_landmark(document, key, change, cohort)
+    elif vertebra in cohort.vertebrae:
+        yield from _of_specimens(document, key, change, cohort, specimens)
+
+
+def _no_frame_landmark(document: Document, key: str, change: Change, cohort: Cohort) -> Problem:
+    """A landmark that makes no frame may be moved as far as one likes."""
+    assert cohort.landmarks is not None
+    there = change.landmark in set(cohort.landmarks["landmark"])
+    why = "in no joint frame: it would do nothing" if there else "unknown"
+    remedy = did_you_mean(
+        change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
+    )
+    place = at(document, f"{key}.landmark")
+    return Problem(*place, f"landmark '{change.landmark}', {why}", one_of(FRAME_LANDMARKS), remedy)
+
+
+def _of_specimens(
+    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
+) -> Iterator[Problem]:
+    """Specimens without the landmark, then those in which nothing hangs on it."""
+    vertebra = cohort.vertebrae.index(change.at[0])
+    landmark = FRAME_LANDMARKS.index(change.landmark)
+    without, idle = [], []
+    for specimen in specimens:
+        _, known = frame_landmarks(cohort, specimen)
+        if not known[vertebra, landmark]:
+            without.append(specimen)
+        elif not moved_by(known, given_joints(cohort, specimen), vertebra, landmark):
+            idle.append(specimen)
+    what = f"{change.landmark} of {change.at[0]}"
+    if without:
+        found = f"{what}, which landmarks.csv does not have of {', '.join(without[:5])}"
+        allowed = "a landmark of all chosen specimens"
+        yield Problem(*at(document, f"{key}.landmark"), found, allowed, "delete the factor")
+    if idle:
+        found = f"{what}, on which no joint frame of {', '.join(idle[:5])} hangs"
+        allowed = "a landmark of a frame that joints.csv does not give: it would do nothing"
+        remedy = "delete the factor, or use joint_centre and joint_axes"
+        yield Problem(*at(document, key), found, allowed, remedy)
+
+
+_CHECKS: dict[Of, Callable[..., Iterator[Problem]]] = {
+    Of.STIFFNESS: _joints,
+    Of.JOINT_CENTRE: _joints,
+    Of.JOINT_AXES: _joints,
+    Of.MASS: _bodies,
+    Of.CENTRE_OF_MASS: _bodies,
+    Of.LOAD_POINT: _loads,
+    Of.LOAD_DIRECTION: _loads,
+    Of.LOAD_SIZE: _loads,
+}
+"""What is demanded of the cohort; damping is always there."""

@@ -1,9 +1,4 @@
-"""Factors of a global sensitivity study: what is uncertain, where, and how far it is spread.
-
-How the value of a factor is spread, as a study file says it.
-
-What every factor of a global sensitivity study has, of whatever kind.
-"""
+"""Factors of a global sensitivity study: what is uncertain, where, and how far it is spread."""
 
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, Self

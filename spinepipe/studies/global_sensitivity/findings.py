@@ -1,11 +1,4 @@
-"""What the page of a sensitivity study says first.
-
-Sentences: how many runs failed and what was done with them, and whether indices have settled.
-
-Indices as they are read in sentences.
-
-Sentences: which factors drive an output, and which of them do nothing that can be seen.
-"""
+"""Key findings of a sensitivity study as sentences: what drives an output, and how sure that is."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -37,6 +30,8 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
 )
 from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
 
+Record = dict[str, Any]
+
 LEFT_OUT = {
     "sobol": "with a failed run its whole base sample is left out",
     "morris": "with a failed run its whole trajectory is left out",
@@ -45,135 +40,9 @@ LEFT_OUT = {
 }
 """What is done with failed runs, by design."""
 
-_PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
-_LEADING = 3
-
-
-def runs(study: GlobalSensitivity, indices: pd.DataFrame) -> str:
-    """How many runs there are, how many failed, and what became of them."""
-    failed = int(indices["failed"].max()) if len(indices) else 0
-    every = count(study.n_runs, "run")
-    specimens = indices["specimen"].nunique()
-    whose = f"{every} of each of {specimens} specimens" if specimens > 1 else every
-    if not failed:
-        return f"{whose}, none failed."
-    least = int(indices["runs"].min())
-    return (
-        f"{whose}, of which at most {whole(failed)} failed: {LEFT_OUT[study.design.method]}, "
-        f"so that indices rest on {whole(least)} runs or more."
-    )
-
-
-def settled(
-    convergence: pd.DataFrame, panels: Sequence[Panel], measures: Measures, joints: Sequence[str]
-) -> str:
-    """How far the main indices of leading factors moved from the last part to all runs."""
-    rows = with_results(convergence, measures) if len(convergence) else convergence
-    if rows.empty or rows["runs"].nunique() < 2:
-        return ""
-    rows = rows[rows["index"] == measures.main]
-    before = sorted(rows["runs"].unique())[-2]
-    single = [one for panel in panels for one in by_joint(panel, joints)]
-    changes = [_change(one.of(rows).rows, leading([one], measures), measures) for one in single]
-    unit = " of the largest" if measures.in_units else ""
-    return (
-        f"From {whole(int(before))} runs to all of them, {NAME[measures.main]} of the leading "
-        f"factors changed by at most {fixed(max(changes))}{unit}."
-    )
-
-
-def _change(main: pd.DataFrame, factors: Sequence[str], measures: Measures) -> float:
-    """Largest change of the leading factors; of indices in units relative to the largest."""
-    rows = main[main["factor"].isin(list(factors[:_LEADING]))]
-    early, late = (
-        pooled(rows[rows["runs"] == runs], ["factor"]).set_index("factor")["estimate"]
-        for runs in sorted(rows["runs"].unique())[-2:]
-    )
-    scale = float(late.abs().max()) if measures.in_units else 1.0
-    return float((late - early).abs().max()) / (scale or 1.0)
-
-
-def without(indices: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    """Status and sentence of outputs that have no index."""
-    every = indices[_PLACE].drop_duplicates().shape[0]
-    lost = indices[indices["status"] != DONE]
-    for status, rows in lost.groupby("status", sort=False):
-        n = rows[_PLACE].drop_duplicates().shape[0]
-        why = listed([text for text in rows["message"].dropna().unique() if text], most=1)
-        reason = f" ({why})" if why else ""
-        meant = _STATUS.get(str(status), str(status).replace("_", " "))
-        yield str(status), f"{n} of {count(every, 'output')} {meant}{reason}."
-
-
-_STATUS = {
-    "constant": "vary with no factor and have no index",
-    "too_many_failed": "have no index, or not of every factor: too many runs failed",
-    "too_few": "have no index: too few runs are left",
-}
-
-
-def pairs(indices: pd.DataFrame, panels: Sequence[Panel]) -> str:
-    """The strongest interactions of two factors in these outputs that stand out of their noise."""
-    every = indices[(indices["index"] == "S2") & (indices["status"] == DONE)]
-    if every.empty:
-        return ""
-    rows = pd.concat([panel.of(every).rows for panel in panels])
-    clear = rows[rows["above_floor"].eq(True) | (rows["noise_floor"].isna() & (rows["ci_low"] > 0))]
-    best = clear.sort_values("estimate", ascending=False, kind="stable")
-    best = best.drop_duplicates(["factor", "other"]).head(_LEADING)
-    if best.empty:
-        return "In these outputs no interaction of two factors (S2) stands out of its noise."
-    told = [
-        f"{factor_name(row['factor'])} with {factor_name(row['other'])} {fixed(row['estimate'])} "
-        f"[{fixed(row['ci_low'])} to {fixed(row['ci_high'])}]"
-        for row in best.to_dict("records")
-    ]
-    return f"Strongest interactions of two factors in these outputs (S2): {listed(told)}."
-
-
-_SMALL = 0.01
-
-
-def value(size: float, panel: Panel, measures: Measures) -> str:
-    """A share as a percentage, an effect in its unit, any other index as a number."""
-    return _number(size, measures) + _unit(panel, measures)
-
-
-def with_ends(row: Mapping[str, Any], panel: Panel, measures: Measures) -> str:
-    """``71 % [66 to 76 %; at single places 55 to 80 %]``: a row of `pooled`."""
-    parts = [_range(row["low"], row["high"], panel, measures)]
-    if row["places"] > 1:
-        single = _range(row["lowest"], row["highest"], panel, measures)
-        parts.append(single and f"at single places {single}")
-    inside = "; ".join(part for part in parts if part)
-    size = value(row["estimate"], panel, measures)
-    return f"{size} [{inside}]" if inside else size
-
-
-def _range(low: float, high: float, panel: Panel, measures: Measures) -> str:
-    """Both ends; nothing where they are not known or read alike."""
-    if not np.isfinite([low, high]).all():
-        return ""
-    first, last = (_number(end, measures) for end in (low, high))
-    return f"{first} to {last}{_unit(panel, measures)}" if first != last else ""
-
-
-def _number(size: float, measures: Measures) -> str:
-    if measures.in_units:
-        return number(size)
-    if measures.of_variance:
-        return fixed(100.0 * size, 1 if 0.0 < abs(size) < _SMALL else 0)
-    return fixed(size)
-
-
-def _unit(panel: Panel, measures: Measures) -> str:
-    if measures.of_variance:
-        return " %"
-    unit = unit_of(panel.output, panel.coordinate) if measures.in_units else ""
-    return unit if unit in ("", "°") else f" {unit}"
-
-
+MOST_OUTPUTS = 12
 MOST_NAMED, MOST_JOINTS = 3, 6
+
 WORTH_NAMING = 0.1
 """Part of the first factor's index from which on another is named beside it."""
 
@@ -183,7 +52,76 @@ LITTLE = 0.01
 HARDLY = 0.95
 """Sum of first-order indices from which on there is hardly any interaction."""
 
-Record = dict[str, Any]
+DOUBTFUL = ("too_many_failed", "too_few")
+"""Why an output has no index, where that casts doubt on the study."""
+
+_PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
+_LEADING = 3
+_SMALL = 0.01
+
+_STATUS = {
+    "constant": "vary with no factor and have no index",
+    "too_many_failed": "have no index, or not of every factor: too many runs failed",
+    "too_few": "have no index: too few runs are left",
+}
+
+_MEANING = {
+    "ST": "share of the variance, alone and with other factors",
+    "mu_star": "mean change from a factor's lowest to its highest value",
+    "PAWN": "PAWN, how far a factor moves the distribution, 0 to 1",
+}
+
+_EXACT = {
+    "sobol": "In a sobol design S1 and ST of the dummy, and of every factor without any effect, "
+    "are exactly 0: there the intervals show the noise, and a factor is above the dummy where its "
+    "interval is above 0.",
+    "morris": "In a morris design the indices of the dummy, and of every factor without any "
+    "effect, are exactly 0: there the intervals show the noise.",
+}
+"""What the dummy can say in these designs."""
+
+
+def opening(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Headline:
+    """The leading factors in a sentence, how sure they are, and what casts doubt on them."""
+    indices = results.table("indices")
+    found, measures = _outputs(cohort, results)
+    words = most(found, measures, cohort.joint_names) if measures else ""
+    sure = [runs(study, indices)]
+    if measures:
+        grown = results.table("convergence")
+        sure.append(settled(grown, found, measures, cohort.joint_names))
+        if indices["ci_low"].notna().any():
+            sure.append(f"In brackets: {100.0 * study.confidence:g} % confidence intervals.")
+    doubts = tuple(words for status, words in without(indices) if status in DOUBTFUL)
+    return Headline(
+        words or "No output has an index.", " ".join(part for part in sure if part), doubts
+    )
+
+
+def findings(study: GlobalSensitivity, cohort: Cohort, results: Results) -> list[str]:
+    """A sentence or two for each output, then interactions and outputs without an index."""
+    indices = results.table("indices")
+    found, measures = _outputs(cohort, results)
+    shown = found[:MOST_OUTPUTS] if measures else []
+    told = [driver(panel, measures, cohort.joint_names) for panel in shown if measures]
+    if len(found) > MOST_OUTPUTS:
+        told.append(f"{count(len(found) - MOST_OUTPUTS, 'more output')}: see the tables.")
+    told.append(pairs(indices, found))
+    told += [words for status, words in without(indices) if status not in DOUBTFUL]
+    told.append(_of_the_dummy(study))
+    return [sentence for sentence in told if sentence]
+
+
+def _outputs(cohort: Cohort, results: Results) -> tuple[Sequence[Panel], Measures | None]:
+    indices = results.table("indices")
+    measures = measures_of(indices) if len(indices) else None
+    return (outputs(cohort, indices, measures) if measures else []), measures
+
+
+def _of_the_dummy(study: GlobalSensitivity) -> str:
+    if not study.dummy:
+        return "There is no dummy factor (dummy: false), so nothing tells an index from noise."
+    return _EXACT.get(study.design.method, "")
 
 
 def most(panels: Sequence[Panel], measures: Measures, joints: Sequence[str]) -> str:
@@ -213,13 +151,6 @@ def driver(panel: Panel, measures: Measures, joints: Sequence[str]) -> str:
         told.append(_each(single, measures))
     told += [_alone(panel, measures), *_nothing(panel, own, measures)]
     return capital(" ".join(part for part in told if part)).replace(" %", "\u00a0%")
-
-
-_MEANING = {
-    "ST": "share of the variance, alone and with other factors",
-    "mu_star": "mean change from a factor's lowest to its highest value",
-    "PAWN": "PAWN, how far a factor moves the distribution, 0 to 1",
-}
 
 
 def _main(panel: Panel, measures: Measures) -> pd.DataFrame:
@@ -301,59 +232,115 @@ def _nothing(panel: Panel, own: Sequence[Record], measures: Measures) -> Iterato
         yield f"{'Above it, but below' if hidden else 'Below'} 1 %: {listed(little)}."
 
 
-MOST_OUTPUTS = 12
-DOUBTFUL = ("too_many_failed", "too_few")
-"""Why an output has no index, where that casts doubt on the study."""
+def value(size: float, panel: Panel, measures: Measures) -> str:
+    """A share as a percentage, an effect in its unit, any other index as a number."""
+    return _number(size, measures) + _unit(panel, measures)
 
 
-def opening(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Headline:
-    """The leading factors in a sentence, how sure they are, and what casts doubt on them."""
-    indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
-    words = most(found, measures, cohort.joint_names) if measures else ""
-    sure = [runs(study, indices)]
-    if measures:
-        grown = results.table("convergence")
-        sure.append(settled(grown, found, measures, cohort.joint_names))
-        if indices["ci_low"].notna().any():
-            sure.append(f"In brackets: {100.0 * study.confidence:g} % confidence intervals.")
-    doubts = tuple(words for status, words in without(indices) if status in DOUBTFUL)
-    return Headline(
-        words or "No output has an index.", " ".join(part for part in sure if part), doubts
+def with_ends(row: Mapping[str, Any], panel: Panel, measures: Measures) -> str:
+    """``71 % [66 to 76 %; at single places 55 to 80 %]``: a row of `pooled`."""
+    parts = [_range(row["low"], row["high"], panel, measures)]
+    if row["places"] > 1:
+        single = _range(row["lowest"], row["highest"], panel, measures)
+        parts.append(single and f"at single places {single}")
+    inside = "; ".join(part for part in parts if part)
+    size = value(row["estimate"], panel, measures)
+    return f"{size} [{inside}]" if inside else size
+
+
+def _range(low: float, high: float, panel: Panel, measures: Measures) -> str:
+    """Both ends; nothing where they are not known or read alike."""
+    if not np.isfinite([low, high]).all():
+        return ""
+    first, last = (_number(end, measures) for end in (low, high))
+    return f"{first} to {last}{_unit(panel, measures)}" if first != last else ""
+
+
+def _number(size: float, measures: Measures) -> str:
+    if measures.in_units:
+        return number(size)
+    if measures.of_variance:
+        return fixed(100.0 * size, 1 if 0.0 < abs(size) < _SMALL else 0)
+    return fixed(size)
+
+
+def _unit(panel: Panel, measures: Measures) -> str:
+    if measures.of_variance:
+        return " %"
+    unit = unit_of(panel.output, panel.coordinate) if measures.in_units else ""
+    return unit if unit in ("", "°") else f" {unit}"
+
+
+def pairs(indices: pd.DataFrame, panels: Sequence[Panel]) -> str:
+    """The strongest interactions of two factors in these outputs that stand out of their noise."""
+    every = indices[(indices["index"] == "S2") & (indices["status"] == DONE)]
+    if every.empty:
+        return ""
+    rows = pd.concat([panel.of(every).rows for panel in panels])
+    clear = rows[rows["above_floor"].eq(True) | (rows["noise_floor"].isna() & (rows["ci_low"] > 0))]
+    best = clear.sort_values("estimate", ascending=False, kind="stable")
+    best = best.drop_duplicates(["factor", "other"]).head(_LEADING)
+    if best.empty:
+        return "In these outputs no interaction of two factors (S2) stands out of its noise."
+    told = [
+        f"{factor_name(row['factor'])} with {factor_name(row['other'])} {fixed(row['estimate'])} "
+        f"[{fixed(row['ci_low'])} to {fixed(row['ci_high'])}]"
+        for row in best.to_dict("records")
+    ]
+    return f"Strongest interactions of two factors in these outputs (S2): {listed(told)}."
+
+
+def runs(study: GlobalSensitivity, indices: pd.DataFrame) -> str:
+    """How many runs there are, how many failed, and what became of them."""
+    failed = int(indices["failed"].max()) if len(indices) else 0
+    every = count(study.n_runs, "run")
+    specimens = indices["specimen"].nunique()
+    whose = f"{every} of each of {specimens} specimens" if specimens > 1 else every
+    if not failed:
+        return f"{whose}, none failed."
+    least = int(indices["runs"].min())
+    return (
+        f"{whose}, of which at most {whole(failed)} failed: {LEFT_OUT[study.design.method]}, "
+        f"so that indices rest on {whole(least)} runs or more."
     )
 
 
-def findings(study: GlobalSensitivity, cohort: Cohort, results: Results) -> list[str]:
-    """A sentence or two for each output, then interactions and outputs without an index."""
-    indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
-    shown = found[:MOST_OUTPUTS] if measures else []
-    told = [driver(panel, measures, cohort.joint_names) for panel in shown if measures]
-    if len(found) > MOST_OUTPUTS:
-        told.append(f"{count(len(found) - MOST_OUTPUTS, 'more output')}: see the tables.")
-    told.append(pairs(indices, found))
-    told += [words for status, words in without(indices) if status not in DOUBTFUL]
-    told.append(_of_the_dummy(study))
-    return [sentence for sentence in told if sentence]
+def settled(
+    convergence: pd.DataFrame, panels: Sequence[Panel], measures: Measures, joints: Sequence[str]
+) -> str:
+    """How far the main indices of leading factors moved from the last part to all runs."""
+    rows = with_results(convergence, measures) if len(convergence) else convergence
+    if rows.empty or rows["runs"].nunique() < 2:
+        return ""
+    rows = rows[rows["index"] == measures.main]
+    before = sorted(rows["runs"].unique())[-2]
+    single = [one for panel in panels for one in by_joint(panel, joints)]
+    changes = [_change(one.of(rows).rows, leading([one], measures), measures) for one in single]
+    unit = " of the largest" if measures.in_units else ""
+    return (
+        f"From {whole(int(before))} runs to all of them, {NAME[measures.main]} of the leading "
+        f"factors changed by at most {fixed(max(changes))}{unit}."
+    )
 
 
-def _outputs(cohort: Cohort, results: Results) -> tuple[Sequence[Panel], Measures | None]:
-    indices = results.table("indices")
-    measures = measures_of(indices) if len(indices) else None
-    return (outputs(cohort, indices, measures) if measures else []), measures
+def _change(main: pd.DataFrame, factors: Sequence[str], measures: Measures) -> float:
+    """Largest change of the leading factors; of indices in units relative to the largest."""
+    rows = main[main["factor"].isin(list(factors[:_LEADING]))]
+    early, late = (
+        pooled(rows[rows["runs"] == runs], ["factor"]).set_index("factor")["estimate"]
+        for runs in sorted(rows["runs"].unique())[-2:]
+    )
+    scale = float(late.abs().max()) if measures.in_units else 1.0
+    return float((late - early).abs().max()) / (scale or 1.0)
 
 
-def _of_the_dummy(study: GlobalSensitivity) -> str:
-    if not study.dummy:
-        return "There is no dummy factor (dummy: false), so nothing tells an index from noise."
-    return _EXACT.get(study.design.method, "")
-
-
-_EXACT = {
-    "sobol": "In a sobol design S1 and ST of the dummy, and of every factor without any effect, "
-    "are exactly 0: there the intervals show the noise, and a factor is above the dummy where its "
-    "interval is above 0.",
-    "morris": "In a morris design the indices of the dummy, and of every factor without any "
-    "effect, are exactly 0: there the intervals show the noise.",
-}
-"""What the dummy can say in these designs."""
+def without(indices: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Status and sentence of outputs that have no index."""
+    every = indices[_PLACE].drop_duplicates().shape[0]
+    lost = indices[indices["status"] != DONE]
+    for status, rows in lost.groupby("status", sort=False):
+        n = rows[_PLACE].drop_duplicates().shape[0]
+        why = listed([text for text in rows["message"].dropna().unique() if text], most=1)
+        reason = f" ({why})" if why else ""
+        meant = _STATUS.get(str(status), str(status).replace("_", " "))
+        yield str(status), f"{n} of {count(every, 'output')} {meant}{reason}."

@@ -16,7 +16,7 @@ from spinepipe.studies.global_sensitivity.tables import (
     RESPONSES,
 )
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
 OF_JOBS = ("responses", "calibrated", "indices", "convergence")
 """Tables joined from job files: of batches of samples, the last two of whole specimens."""
@@ -29,8 +29,6 @@ _MADE_BY = {
     **dict.fromkeys(_BY_SPECIMEN, "analyse"),
 }
 """The job that writes the files of each of them."""
-
-_MOST_FILES_PER_BLOCK = 300
 
 
 @dataclass(frozen=True)
@@ -87,17 +85,14 @@ class SensitivityFiles(StudyFiles):
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of a table, blocks numbered `000`, `001`, ..."""
-        files = 1 if table in _BY_SPECIMEN else self.n_batches
-        count = -(-files // _MOST_FILES_PER_BLOCK)
-        return [(name, f"{block:03d}") for name in self.specimens for block in range(count)]
+        return numbered_blocks(self.specimens, 1 if table in _BY_SPECIMEN else self.n_batches)
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         if table in _BY_SPECIMEN:
             return [f"{self.folder}/analysis/specimen={specimen}/{table}.parquet"]
-        first = int(block) * _MOST_FILES_PER_BLOCK
-        last = min(first + _MOST_FILES_PER_BLOCK, self.n_batches)
-        return [self._batch_file(table, specimen, number) for number in range(first, last)]
+        numbers = files_of_block(block, self.n_batches)
+        return [self._batch_file(table, specimen, number) for number in numbers]
 
     def blocks_of(self, table: str, specimen: str) -> list[str]:
         """The blocks of a table that hold a specimen; none where there is no such table."""
@@ -131,7 +126,7 @@ KIND = Kind(
     checks_at_start=(check_size_of_design,),
     tables=(DESIGN, RESPONSES, CALIBRATED, INDICES, CONVERGENCE),
     jobs=(
-        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), specimens="none"),
+        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),
         Job(
             "respond",
             many=True,

@@ -1,7 +1,4 @@
-"""The report of a global sensitivity study.
-
-Tables that the page of a sensitivity study shows.
-"""
+"""The report of a study of global sensitivity: its tables, and what its settings leave out."""
 
 from collections.abc import Hashable, Iterator, Mapping
 from typing import Any
@@ -25,8 +22,46 @@ from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivi
 from spinepipe.studies.global_sensitivity.tables import INDICES
 from spinepipe.tables.schema import Column
 
+QUESTION = (
+    "Which uncertain inputs drive the results of this spine's simulations, how sure is that, and "
+    "which inputs need not be known better?"
+)
+
+READ = ("indices", "convergence")
+"""Tables whose rows the page needs; of the others it tells where they come from."""
+
 _PLACE = ("specimen", "output", "test", "step", "joint", "coordinate")
 _RANKS = ("first", "second", "third")
+
+
+def document(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    return Document(
+        question=QUESTION,
+        findings=findings(study, cohort, results),
+        pictures=list(results.pictures.values()),
+        tables=shown_tables(cohort, results),
+        metadata=results.metadata,
+        left_out=left_out(study),
+        headline=opening(study, cohort, results),
+    )
+
+
+def left_out(study: GlobalSensitivity) -> tuple[str, ...]:
+    """Parts that the settings leave out, each with the setting that does."""
+    parts = (
+        ("joint motion", "outputs: motion: []", bool(study.outputs.motion)),
+        ("joint loads", "outputs: joint_load: []", bool(study.outputs.joint_load)),
+        ("calibrated stiffness", "outputs: stiffness: false", study.outputs.stiffness),
+        ("noise floor", "dummy: false", study.dummy),
+        (
+            "interactions of two factors",
+            "design: second_order: false",
+            study.design.method != "sobol" or study.design.second_order,
+        ),
+        ("all load steps but the largest", "steps: peak", study.steps == "all"),
+    )
+    return tuple(f"{part} ({setting})" for part, setting, done in parts if not done)
 
 
 def shown_tables(cohort: Cohort, results: Results) -> list[Sortable]:
@@ -96,41 +131,3 @@ def _drawn(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> Sortabl
     ranked = rows.assign(rank=rows["factor"].map(order)).sort_values("rank", kind="stable")
     title = "Indices of the outputs in the figures"
     return sortable("indices", title, INDICES.about, ranked, INDICES.columns)
-
-
-QUESTION = (
-    "Which uncertain inputs drive the results of this spine's simulations, how sure is that, and "
-    "which inputs need not be known better?"
-)
-READ = ("indices", "convergence")
-"""Tables whose rows the page needs; of the others it tells where they come from."""
-
-
-def document(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Document:
-    """What the report says and shows."""
-    return Document(
-        question=QUESTION,
-        findings=findings(study, cohort, results),
-        pictures=list(results.pictures.values()),
-        tables=shown_tables(cohort, results),
-        metadata=results.metadata,
-        left_out=left_out(study),
-        headline=opening(study, cohort, results),
-    )
-
-
-def left_out(study: GlobalSensitivity) -> tuple[str, ...]:
-    """Parts that the settings leave out, each with the setting that does."""
-    parts = (
-        ("joint motion", "outputs: motion: []", bool(study.outputs.motion)),
-        ("joint loads", "outputs: joint_load: []", bool(study.outputs.joint_load)),
-        ("calibrated stiffness", "outputs: stiffness: false", study.outputs.stiffness),
-        ("noise floor", "dummy: false", study.dummy),
-        (
-            "interactions of two factors",
-            "design: second_order: false",
-            study.design.method != "sobol" or study.design.second_order,
-        ),
-        ("all load steps but the largest", "steps: peak", study.steps == "all"),
-    )
-    return tuple(f"{part} ({setting})" for part, setting, done in parts if not done)

@@ -9,9 +9,9 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.many import ManySolved, solve_many
 from spinepipe.status import Status
+from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.start import AskedTest
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, from_si, less_step_0

@@ -1,11 +1,4 @@
-"""The study kind that asks which uncertain inputs drive motion, joint loads and stiffness.
-
-How stiffness is fitted to measured motion, once per sample of a design.
-
-Distributions of the factors of a global sensitivity study.
-
-Not part of the package's front: what it imports of the analysis is no business of other kinds.
-"""
+"""What a study of global sensitivity asks: factors, design, outputs, fits of stiffness."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self

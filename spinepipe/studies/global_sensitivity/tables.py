@@ -30,6 +30,9 @@ INDEX_MEANINGS = {
 }
 """What each index says."""
 
+EVERY = "*"
+"""All tests, or all joints: of stiffness."""
+
 OUTPUTS = ("motion", "joint_load", "stiffness")
 
 INDEX_STATUS = ("done", "constant", "too_many_failed", "too_few")

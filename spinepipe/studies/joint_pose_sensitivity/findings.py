@@ -1,19 +1,6 @@
-"""Key findings of a study as sentences, their numbers computed from its tables.
+"""Key findings of a joint-pose study as sentences, their numbers computed from its tables."""
 
-Finding about bootstraps: how far fitted stiffness spreads, and how many fits were lost.
-
-Finding about ways of fitting: how many fits of the same poses each brings to an end.
-
-Finding about landmarks: how precise they must be, and what so many poses can tell of it.
-
-Finding about variance: which of joint pose and stiffness takes more, where that is known.
-
-What is to be said where motion was not simulated at rest.
-
-Findings about the fits of sampled poses: how many count, and the stiffness they gave.
-"""
-
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -22,7 +9,7 @@ from statsmodels.stats.proportion import proportion_confint
 from spinepipe.report.page.document import Results, judged
 from spinepipe.report.panels import EVERY_JOINT
 from spinepipe.report.words import AXIS, count, fixed, number, percent, tick
-from spinepipe.status import Status
+from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
 from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
     WHOSE,
@@ -36,168 +23,25 @@ FEWEST_FOR_SPREAD = 3
 
 _WHAT = {"start_bootstrap": "over start values", "damping_bootstrap": "over damping"}
 
+_COUNTS = ("fits", "solved", "near_start_any", "near_start_all", "outliers", "reduced")
 
-def bootstraps(study: JointPoseSensitivity, results: Results) -> str:
-    """Spread of the widest direction by part and loading, then the fits without a stiffness."""
-    rows, counts = results.table("summary"), results.table("counts")
-    if rows.empty:
-        return ""
-    chosen = rows[
-        rows["part"].isin(_WHAT)
-        & (rows["dataset"] == "all")
-        & (rows["quantity"] == "stiffness")
-        & rows["coordinate"].isin(study.calibration.free)
-    ].dropna(subset=["median"])
-    parts = list(_widest(chosen))
-    lead = "Middle half (IQR) of the fitted stiffness as a share of its median, widest direction"
-    told = f"{lead}: {'; '.join(parts)}." if parts else ""
-    return " ".join(words for words in (told, _lost(counts)) if words)
+_PERCENT = "\u00a0%"
+"""No line ends between a number and its percent sign."""
 
 
-def _widest(chosen: pd.DataFrame) -> Iterator[str]:
-    for part, rows in chosen.groupby("part", sort=False):
-        if (rows["n"] < FEWEST_FOR_SPREAD).all():
-            yield f"{_WHAT[str(part)]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
-            continue
-        told = [
-            f"{_spread(fits)} {LOADING_NAMES[str(loading)]}"
-            for loading, fits in rows.groupby("loading", sort=False)
-        ]
-        yield f"{_WHAT[str(part)]} {', '.join(told)}"
-
-
-def _spread(fits: pd.DataFrame) -> str:
-    enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
-    if enough.empty:
-        return f"fewer than {FEWEST_FOR_SPREAD} fits"
-    share = 100.0 * float((enough["iqr"] / enough["median"]).max())
-    return f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
-
-
-def _lost(counts: pd.DataFrame) -> str:
-    """How many of how many fits ended without a stiffness."""
-    if counts.empty:
-        return ""
-    parts = []
-    for part, what in _WHAT.items():
-        rows = counts[counts["part"] == part]
-        fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
-        if fits:
-            told = f" ({', '.join(_where(rows))})" if lost else ""
-            parts.append(f"{what} {lost} of {fits}{told}")
-    return f"Fits lost, without a stiffness: {'; '.join(parts)}." if parts else ""
-
-
-def _where(rows: pd.DataFrame) -> Iterator[str]:
-    for loading, part in rows.groupby("loading", sort=False):
-        lost = int((part["fits"] - part["solved"]).sum())
-        if lost:
-            yield f"{LOADING_NAMES[str(loading)]} {lost} of {int(part['fits'].sum())}"
-
-
-def methods(study: JointPoseSensitivity, results: Results) -> str:
-    """Successful fits of each method, or why methods were not compared."""
-    rows = results.table("success_by_method")
-    if rows.empty:
-        return ""
-    why = refused(results.table("method_fits"))
-    sums = rows.groupby("method", sort=False)[["successful", "fits", "arrived"]].sum()
-    parts = [
-        f"{str(method).replace('_', ' ')} not compared ({why[str(method)]})"
-        if method in why
-        else f"{str(method).replace('_', ' ')} {row['successful']} of {row['fits']} "
-        f"(least cost reached: {row['arrived']})"
-        for method, row in sums.iterrows()
-    ]
-    if set(sums.index) <= set(why):
-        return f"Methods of fitting were not compared: {'; '.join(dict.fromkeys(why.values()))}."
-    return f"Successful fits of the same poses by method: {'; '.join(parts)}."
-
-
-def precision(study: JointPoseSensitivity, results: Results) -> str:
-    """The largest landmark SD that will do, with each stiffness."""
-    rows = results.table("required_precision")
-    if rows.empty:
-        return ""
-    asked = study.landmark_precision
-    limits = {
-        "translation": f"{tick(asked.translation_limit_mm)} mm",
-        "rotation": f"{tick(asked.rotation_limit_deg)}°",
-    }
-    limits = {"both": " and ".join(limits.values()), **limits}
-    # where there is no row of both, one kind of motion alone was measured
-    motion = next(name for name in limits if (rows["motion"] == name).any())
-    goal = f"For {tick(100 * asked.share)} % of poses to stay below {limits[motion]}"
-    chosen = rows[rows["motion"] == motion]
-    parts = [
-        f"with {WHOSE[str(whose)]} {_required(part, asked.sd_mm)}"
-        for whose, part in chosen.groupby("stiffness")
-    ]
-    told = f"{goal}, the SD of a landmark per axis may be at most: {'; '.join(parts)}"
-    return f"{told} ({_poses(chosen)} per SD). {_too_few(chosen, asked.share)}".strip()
-
-
-def _required(part: pd.DataFrame, sampled: tuple[float, ...]) -> str:
-    if len(part) == 1:
-        return required_words(part.iloc[0], sampled)
-    known = part[np.isfinite(part["sd_mm"])]
-    others = part.drop(known.index)
-    why = [
-        f"{message} in {', '.join(rows['specimen'])}"
-        for message, rows in others.groupby("message", sort=False)
-    ]
-    if known.empty:
-        return "; ".join(why)
-    least = known.loc[known["sd_mm"].idxmin()]
-    which = f"smallest of {count(len(known), 'specimen')}, {least['specimen']}"
-    return ", but ".join([f"{fixed(least['sd_mm'])} mm ({which})", *why])
-
-
-def _poses(chosen: pd.DataFrame) -> str:
-    low, high = int(chosen["n"].min()), int(chosen["n"].max())
-    return count(high, "pose") if low == high else f"{low} to {count(high, 'pose')}"
-
-
-def _too_few(chosen: pd.DataFrame, share: float) -> str:
-    """That so few poses cannot show the share, even if all of them were below the limits."""
-    n = int(chosen["n"].min())
-    low = float(proportion_confint(n, n, method="wilson")[0]) if n else 0.0
-    if low >= share:
-        return ""
-    asked = tick(100 * share)
-    return (
-        f"{count(n, 'pose')} cannot show {asked} %: even with all of them below, the 95 % "
-        f"interval of the share begins at {fixed(100 * low, 0)} %."
-    )
-
-
-def dominant(study: JointPoseSensitivity, results: Results) -> str:
-    """In how many errors pose or stiffness takes more, their 95 % intervals apart."""
-    rows = results.table("variance_shares")
-    if rows.empty:
-        return ""
-    done = rows[rows["status"] == "done"]
-    keys = ["specimen", "joint", "coordinate"]
-    pose, stiffness = (
-        done[done["factor"] == factor].set_index(keys) for factor in ("pose", "stiffness")
-    )
-    if pose.empty:
-        return ""
-    stiffness = stiffness.reindex(pose.index)
-    by_pose = int((pose["share_low"] > stiffness["share_high"]).sum())
-    by_stiffness = int((stiffness["share_low"] > pose["share_high"]).sum())
-    unknown = len(pose) - by_pose - by_stiffness
-    overlap = "cannot be told apart: the 95 % intervals of their shares of the variance overlap."
-    errors = f"{count(len(pose), 'error')} (one per joint and direction)"
-    if unknown == len(pose):
-        return (
-            f"In none of {errors} is it clear which counts more: joint pose and stiffness {overlap}"
-        )
+def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
+    """The sentences, without those that the study has no table for."""
     told = (
-        f"Of {errors}, joint pose takes more of the variance than stiffness in {by_pose} and "
-        f"stiffness more in {by_stiffness}."
+        _fits(study, results),
+        _stiffness(study, results),
+        settling(study),
+        _dominant(results),
+        _precision(study, results),
+        _methods(results),
+        _bootstraps(study, results),
+        judged(results.table("against_gould_2024a")),
     )
-    return f"{told} In the other {unknown} they {overlap}" if unknown else told
+    return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]
 
 
 def settling(study: JointPoseSensitivity) -> str:
@@ -210,10 +54,7 @@ def settling(study: JointPoseSensitivity) -> str:
     )
 
 
-_COUNTS = ("fits", "solved", "near_start_any", "near_start_all", "outliers", "reduced")
-
-
-def fits(study: JointPoseSensitivity, results: Results) -> str:
+def _fits(study: JointPoseSensitivity, results: Results) -> str:
     """How many fits are in the reduced dataset, and why the others are not."""
     rows = results.table("counts")
     if rows.empty or not (rows["part"] == "poses").any():
@@ -232,12 +73,7 @@ def fits(study: JointPoseSensitivity, results: Results) -> str:
     return f"{kept} are in the reduced dataset: {sums['solved']} ended with a stiffness, {lost}."
 
 
-def settled(study: JointPoseSensitivity, results: Results) -> str:
-    """That motion and stiffness belong to different times after loading, where they do."""
-    return settling(study)
-
-
-def stiffness(study: JointPoseSensitivity, results: Results) -> str:
+def _stiffness(study: JointPoseSensitivity, results: Results) -> str:
     """Median stiffness, with a warning where the data do not hold it."""
     rows = results.table("summary")
     if rows.empty:
@@ -264,8 +100,7 @@ def _reduced(results: Results) -> pd.DataFrame:
     fitted, success = results.table("calibrations"), results.table("success")
     if fitted.empty:
         return fitted
-    usable = [status.value for status in Status if status.usable]
-    solved = fitted[fitted["status"].isin(usable)]
+    solved = fitted[fitted["status"].isin(USABLE)]
     if success.empty:
         return solved
     kept = success.loc[success["reduced"], ["specimen", "pose"]]
@@ -331,28 +166,164 @@ def _exact(solved: pd.DataFrame) -> str:
     return f"{which} have no more readings than unknowns: such fits are exact or undetermined."
 
 
-_PERCENT = "\u00a0%"
-"""No line ends between a number and its percent sign."""
-
-Finding = Callable[[JointPoseSensitivity, Results], str]
-
-
-def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
-    """The sentences, without those that the study has no table for."""
-    makers: tuple[Finding, ...] = (
-        fits,
-        stiffness,
-        settled,
-        dominant,
-        precision,
-        methods,
-        bootstraps,
-        paper,
+def _dominant(results: Results) -> str:
+    """In how many errors pose or stiffness takes more, their 95 % intervals apart."""
+    rows = results.table("variance_shares")
+    if rows.empty:
+        return ""
+    done = rows[rows["status"] == "done"]
+    keys = ["specimen", "joint", "coordinate"]
+    pose, stiffness = (
+        done[done["factor"] == factor].set_index(keys) for factor in ("pose", "stiffness")
     )
-    told = [make(study, results) for make in makers]
-    return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]
+    if pose.empty:
+        return ""
+    stiffness = stiffness.reindex(pose.index)
+    by_pose = int((pose["share_low"] > stiffness["share_high"]).sum())
+    by_stiffness = int((stiffness["share_low"] > pose["share_high"]).sum())
+    unknown = len(pose) - by_pose - by_stiffness
+    overlap = "cannot be told apart: the 95 % intervals of their shares of the variance overlap."
+    errors = f"{count(len(pose), 'error')} (one per joint and direction)"
+    if unknown == len(pose):
+        return (
+            f"In none of {errors} is it clear which counts more: joint pose and stiffness {overlap}"
+        )
+    told = (
+        f"Of {errors}, joint pose takes more of the variance than stiffness in {by_pose} and "
+        f"stiffness more in {by_stiffness}."
+    )
+    return f"{told} In the other {unknown} they {overlap}" if unknown else told
 
 
-def paper(study: JointPoseSensitivity, results: Results) -> str:
-    """How the published quantities were judged."""
-    return judged(results.table("against_gould_2024a"))
+def _precision(study: JointPoseSensitivity, results: Results) -> str:
+    """The largest landmark SD that will do, with each stiffness."""
+    rows = results.table("required_precision")
+    if rows.empty:
+        return ""
+    asked = study.landmark_precision
+    limits = {
+        "translation": f"{tick(asked.translation_limit_mm)} mm",
+        "rotation": f"{tick(asked.rotation_limit_deg)}°",
+    }
+    limits = {"both": " and ".join(limits.values()), **limits}
+    # where there is no row of both, one kind of motion alone was measured
+    motion = next(name for name in limits if (rows["motion"] == name).any())
+    goal = f"For {tick(100 * asked.share)} % of poses to stay below {limits[motion]}"
+    chosen = rows[rows["motion"] == motion]
+    parts = [
+        f"with {WHOSE[str(whose)]} {_required(part, asked.sd_mm)}"
+        for whose, part in chosen.groupby("stiffness")
+    ]
+    told = f"{goal}, the SD of a landmark per axis may be at most: {'; '.join(parts)}"
+    return f"{told} ({_poses(chosen)} per SD). {_too_few(chosen, asked.share)}".strip()
+
+
+def _required(part: pd.DataFrame, sampled: tuple[float, ...]) -> str:
+    if len(part) == 1:
+        return required_words(part.iloc[0], sampled)
+    known = part[np.isfinite(part["sd_mm"])]
+    others = part.drop(known.index)
+    why = [
+        f"{message} in {', '.join(rows['specimen'])}"
+        for message, rows in others.groupby("message", sort=False)
+    ]
+    if known.empty:
+        return "; ".join(why)
+    least = known.loc[known["sd_mm"].idxmin()]
+    which = f"smallest of {count(len(known), 'specimen')}, {least['specimen']}"
+    return ", but ".join([f"{fixed(least['sd_mm'])} mm ({which})", *why])
+
+
+def _poses(chosen: pd.DataFrame) -> str:
+    low, high = int(chosen["n"].min()), int(chosen["n"].max())
+    return count(high, "pose") if low == high else f"{low} to {count(high, 'pose')}"
+
+
+def _too_few(chosen: pd.DataFrame, share: float) -> str:
+    """That so few poses cannot show the share, even if all of them were below the limits."""
+    n = int(chosen["n"].min())
+    low = float(proportion_confint(n, n, method="wilson")[0]) if n else 0.0
+    if low >= share:
+        return ""
+    asked = tick(100 * share)
+    return (
+        f"{count(n, 'pose')} cannot show {asked} %: even with all of them below, the 95 % "
+        f"interval of the share begins at {fixed(100 * low, 0)} %."
+    )
+
+
+def _methods(results: Results) -> str:
+    """Successful fits of each method, or why methods were not compared."""
+    rows = results.table("success_by_method")
+    if rows.empty:
+        return ""
+    why = refused(results.table("method_fits"))
+    sums = rows.groupby("method", sort=False)[["successful", "fits", "arrived"]].sum()
+    parts = [
+        f"{str(method).replace('_', ' ')} not compared ({why[str(method)]})"
+        if method in why
+        else f"{str(method).replace('_', ' ')} {row['successful']} of {row['fits']} "
+        f"(least cost reached: {row['arrived']})"
+        for method, row in sums.iterrows()
+    ]
+    if set(sums.index) <= set(why):
+        return f"Methods of fitting were not compared: {'; '.join(dict.fromkeys(why.values()))}."
+    return f"Successful fits of the same poses by method: {'; '.join(parts)}."
+
+
+def _bootstraps(study: JointPoseSensitivity, results: Results) -> str:
+    """Spread of the widest direction by part and loading, then the fits without a stiffness."""
+    rows, counts = results.table("summary"), results.table("counts")
+    if rows.empty:
+        return ""
+    chosen = rows[
+        rows["part"].isin(_WHAT)
+        & (rows["dataset"] == "all")
+        & (rows["quantity"] == "stiffness")
+        & rows["coordinate"].isin(study.calibration.free)
+    ].dropna(subset=["median"])
+    parts = list(_widest(chosen))
+    lead = "Middle half (IQR) of the fitted stiffness as a share of its median, widest direction"
+    told = f"{lead}: {'; '.join(parts)}." if parts else ""
+    return " ".join(words for words in (told, _lost(counts)) if words)
+
+
+def _widest(chosen: pd.DataFrame) -> Iterator[str]:
+    for part, rows in chosen.groupby("part", sort=False):
+        if (rows["n"] < FEWEST_FOR_SPREAD).all():
+            yield f"{_WHAT[str(part)]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
+            continue
+        told = [
+            f"{_spread(fits)} {LOADING_NAMES[str(loading)]}"
+            for loading, fits in rows.groupby("loading", sort=False)
+        ]
+        yield f"{_WHAT[str(part)]} {', '.join(told)}"
+
+
+def _spread(fits: pd.DataFrame) -> str:
+    enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
+    if enough.empty:
+        return f"fewer than {FEWEST_FOR_SPREAD} fits"
+    share = 100.0 * float((enough["iqr"] / enough["median"]).max())
+    return f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
+
+
+def _lost(counts: pd.DataFrame) -> str:
+    """How many of how many fits ended without a stiffness."""
+    if counts.empty:
+        return ""
+    parts = []
+    for part, what in _WHAT.items():
+        rows = counts[counts["part"] == part]
+        fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
+        if fits:
+            told = f" ({', '.join(_where(rows))})" if lost else ""
+            parts.append(f"{what} {lost} of {fits}{told}")
+    return f"Fits lost, without a stiffness: {'; '.join(parts)}." if parts else ""
+
+
+def _where(rows: pd.DataFrame) -> Iterator[str]:
+    for loading, part in rows.groupby("loading", sort=False):
+        lost = int((part["fits"] - part["solved"]).sum())
+        if lost:
+            yield f"{LOADING_NAMES[str(loading)]} {lost} of {int(part['fits'].sum())}"

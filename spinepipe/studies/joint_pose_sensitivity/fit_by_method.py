@@ -17,6 +17,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel
 from spinepipe.statics import Course, moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     sampled_poses,
     start_stiffness,
@@ -24,7 +25,6 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.success import near_start
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import METHOD_FITS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS

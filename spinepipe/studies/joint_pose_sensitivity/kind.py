@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.published import OF_JOINT_POSE, stands_for
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
 
 ALWAYS = (
     *("landmarks", "poses", "calibrations", "simulations", "success", "counts", "summary"),
@@ -63,7 +63,6 @@ _MADE_BY = {
 }
 """The job that writes the files of each of them."""
 
-_MOST_FILES_PER_BLOCK = 300
 _FILES_PER_BLOCK = 100
 
 
@@ -135,7 +134,7 @@ class Layout(StudyFiles):
     @classmethod
     def of(cls, study: JointPoseSensitivity, cohort: Cohort) -> "Layout":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort.name, OF_JOINT_POSE))
+        return cls(study, cohort.specimen_names, GOULD_2024A.stands_for(cohort.name))
 
     @cached_property
     def stiffnesses(self) -> list[str]:
@@ -219,7 +218,7 @@ class Layout(StudyFiles):
         if table not in ("calibrations", "simulations"):
             return _FILES_PER_BLOCK
         files = 1 if table == "calibrations" else len(self.stiffnesses)
-        return files * min(self.study.block, max(1, _MOST_FILES_PER_BLOCK // files))
+        return files * min(self.study.block, max(1, MOST_FILES_PER_BLOCK // files))
 
     def _job_file(self, table: str, specimen: str, number: int) -> str:
         return (
@@ -269,7 +268,7 @@ _SAMPLED = (
     Job(
         "start_model",
         ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
-        specimens="none",
+        header_alone=True,
     ),
     Job(
         "sample_landmarks",
@@ -332,7 +331,7 @@ _ANALYSES = (
     _analysis("counts", "success:counts", ("success", "bootstrap")),
     _analysis("summary", "summary", (*_FITTED, "bootstrap", "best.json")),
     _analysis("statistics", "significance", (*_FITTED, "best.json")),
-    _analysis("agreement", "errors", ("simulations", "success")),
+    _analysis("agreement", "agreement", ("simulations", "success")),
     _analysis(
         "two_factor",
         "two_factor",

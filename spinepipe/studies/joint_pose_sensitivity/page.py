@@ -1,11 +1,4 @@
-"""The report of a joint-pose study.
-
-What is said below a figure on the page: its caption, without what does not hold here.
-
-Tests of significance as the page shows them: each, or folded where they are repeated.
-
-Which tables the page shows, and in what order.
-"""
+"""The report of a joint-pose study: what it asks, its captions for this study, and its tables."""
 
 import re
 from collections.abc import Iterator
@@ -15,13 +8,13 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     TREE,
     importance_by_factor,
 )
 from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
@@ -29,36 +22,48 @@ from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TA
 from spinepipe.tables.schema import Column
 from spinepipe.tables.shared import STATISTICS, against_as_shown
 
-_SENTENCE_END = re.compile(r"(?<=[.])(?<!et al[.])\s+(?=[A-Z])")
-SIMULATED = ("errors", "agreement")
+QUESTION = (
+    "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
+    "where its landmarks were palpated?"
+)
+
+SHOWN = {
+    "counts": "Fits and filters",
+    "summary": "Medians and spreads",
+    "against_gould_2024a": "Beside Gould et al. 2024",
+    "success_by_method": "Success by method",
+    "variance_shares": "Variance shares of joint pose and stiffness",
+    "importance": "Importance in the regression tree, by factor",
+    "required_precision": "Landmark precision needed",
+    "agreement": "Agreement of predicted and measured motion",
+    "statistics": "Tests of significance",
+}
+"""Tables of the page in their order, with their titles."""
+
+READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
+"""Tables whose rows the page needs; of the others it tells where they come from."""
+
+_SIMULATED = ("errors", "agreement")
 """Figures of simulated motion."""
 
+_SENTENCE_END = re.compile(r"(?<=[.])(?<!et al[.])\s+(?=[A-Z])")
 
-def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
-    """A figure's caption for this study and cohort."""
-    false = tuple(_false(cohort, results))
-    sentences = _SENTENCE_END.split(picture.caption)
-    kept = [sentence for sentence in sentences if not sentence.startswith(false)]
-    if picture.name in SIMULATED and settling(study):
-        kept.append(settling(study))
-    return " ".join(kept)
+_BY_FACTOR = tuple(
+    column
+    for column in IMPORTANCE.columns
+    if column.name in ("specimen", "joint", "coordinate", "factor", "leaves", "r2", "n")
+)
 
-
-def _false(cohort: Cohort, results: Results) -> Iterator[str]:
-    """How the sentences begin that speak of something else than this study shows."""
-    if paper_of(cohort.name, OF_JOINT_POSE) is None:
-        yield "For the cohort rebuilt from"
-    several = len(cohort.specimen_names) > 1
-    yield "With one specimen," if several else "With several specimens,"
-    agreement = results.table("agreement")
-    if not agreement.empty:
-        rows = in_rows(agreement, cohort)
-        yield "With few joints and directions," if rows else "With many joints and directions,"
-
+_IMPORTANCE = (
+    *_BY_FACTOR[:4],
+    Column("importance", "number", "share of all predictors of this factor among all splits"),
+    Column("predictors", "integer", "predictors of this factor"),
+    *_BY_FACTOR[4:],
+    Column("message", "text", "why there is no tree"),
+)
 
 _FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
 _NO_EFFECT = "no test is significant after Bonferroni's correction"
-
 FOLDED = (
     Column("specimen", "text", "name of the specimen"),
     Column("test", "text", "name of the test"),
@@ -79,6 +84,104 @@ FOLDED = (
         "effect_highest", "number", "largest effect significant after Bonferroni", "", _NO_EFFECT
     ),
 )
+
+_AGAINST = against_as_shown(AGAINST_GOULD_2024A)
+
+_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS)}
+
+
+def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    return Document(
+        question=QUESTION,
+        findings=findings(study, results),
+        pictures=[
+            replace(picture, caption=caption(picture, study, cohort, results))
+            for picture in results.pictures.values()
+        ],
+        tables=shown_tables(study, results),
+        metadata=results.metadata,
+        left_out=left_out(study),
+        poses=results.table("poses"),
+        tests=study.tests,
+        load_shift_mm=study.load_point_shift_mm.in_order(),
+    )
+
+
+def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
+    """Optional parts that the settings leave out, each with the setting that does."""
+    parts = (
+        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
+        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
+        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
+        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+    )
+    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
+
+
+def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
+    """A figure's caption for this study and cohort."""
+    false = tuple(_false(cohort, results))
+    sentences = _SENTENCE_END.split(picture.caption)
+    kept = [sentence for sentence in sentences if not sentence.startswith(false)]
+    if picture.name in _SIMULATED and settling(study):
+        kept.append(settling(study))
+    return " ".join(kept)
+
+
+def _false(cohort: Cohort, results: Results) -> Iterator[str]:
+    """How the sentences begin that speak of something else than this study shows."""
+    if not GOULD_2024A.stands_for(cohort.name):
+        yield "For the cohort rebuilt from"
+    several = len(cohort.specimen_names) > 1
+    yield "With one specimen," if several else "With several specimens,"
+    agreement = results.table("agreement")
+    if not agreement.empty:
+        rows = in_rows(agreement, cohort)
+        yield "With few joints and directions," if rows else "With many joints and directions,"
+
+
+def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
+    """Tables that the study has, as the page shows them; those without rows are left out."""
+    found = [
+        table
+        for name, title in SHOWN.items()
+        if len(results.table(name))
+        for table in _of(name, title, results.table(name), study)
+    ]
+    return [table for table in found if table.rows]
+
+
+def _of(
+    name: str, title: str, frame: pd.DataFrame, study: JointPoseSensitivity
+) -> Iterator[Sortable]:
+    about = _SHAPES[name].about
+    if name == "statistics":
+        yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
+        yield _folded(frame, study.significance)
+    elif name == "importance":
+        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
+    elif name == AGAINST_GOULD_2024A.name:
+        yield sortable(name, title, about, frame, _AGAINST)
+    else:
+        yield sortable(name, title, about, frame, _SHAPES[name].columns)
+
+
+def _trees(importance: pd.DataFrame) -> pd.DataFrame:
+    """Importance by factor, and one row with its message for each tree that could not be grown."""
+    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
+    told = none[[*TREE, "n", "message"]]
+    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
+
+
+def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:
+    about = (
+        "Tests done again and again with a stiffness set or a pose held fixed: how many are "
+        f"significant at {alpha:g}, and how large the effects of these are. One row per test, "
+        "joint, response and factor; every single test is in statistics.parquet."
+    )
+    title = "Tests of significance, two factors"
+    return sortable("statistics", title, about, folded(frame, alpha), FOLDED)
 
 
 def in_full(statistics: pd.DataFrame) -> pd.DataFrame:
@@ -116,116 +219,3 @@ def _fold(part: pd.DataFrame, alpha: float) -> dict[str, object]:
         "effect_lowest": kept.min(),
         "effect_highest": kept.max(),
     }
-
-
-SHOWN = {
-    "counts": "Fits and filters",
-    "summary": "Medians and spreads",
-    "against_gould_2024a": "Beside Gould et al. 2024",
-    "success_by_method": "Success by method",
-    "variance_shares": "Variance shares of joint pose and stiffness",
-    "importance": "Importance in the regression tree, by factor",
-    "required_precision": "Landmark precision needed",
-    "agreement": "Agreement of predicted and measured motion",
-    "statistics": "Tests of significance",
-}
-"""Tables of the page in their order, with their titles."""
-
-_BY_FACTOR = tuple(
-    column
-    for column in IMPORTANCE.columns
-    if column.name in ("specimen", "joint", "coordinate", "factor", "leaves", "r2", "n")
-)
-_IMPORTANCE = (
-    *_BY_FACTOR[:4],
-    Column("importance", "number", "share of all predictors of this factor among all splits"),
-    Column("predictors", "integer", "predictors of this factor"),
-    *_BY_FACTOR[4:],
-    Column("message", "text", "why there is no tree"),
-)
-
-
-AGAINST_COLUMNS = against_as_shown(AGAINST_GOULD_2024A)
-
-
-_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS)}
-
-
-def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
-    """Tables that the study has, as the page shows them; those without rows are left out."""
-    found = [
-        table
-        for name, title in SHOWN.items()
-        if len(results.table(name))
-        for table in _of(name, title, results.table(name), study)
-    ]
-    return [table for table in found if table.rows]
-
-
-def _of(
-    name: str, title: str, frame: pd.DataFrame, study: JointPoseSensitivity
-) -> Iterator[Sortable]:
-    about = _SHAPES[name].about
-    if name == "statistics":
-        yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
-        yield _folded(frame, study.significance)
-    elif name == "importance":
-        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
-    elif name == AGAINST_GOULD_2024A.name:
-        yield sortable(name, title, about, frame, AGAINST_COLUMNS)
-    else:
-        yield sortable(name, title, about, frame, _SHAPES[name].columns)
-
-
-def _trees(importance: pd.DataFrame) -> pd.DataFrame:
-    """Importance by factor, and one row with its message for each tree that could not be grown."""
-    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
-    told = none[[*TREE, "n", "message"]]
-    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
-
-
-def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:
-    about = (
-        "Tests done again and again with a stiffness set or a pose held fixed: how many are "
-        f"significant at {alpha:g}, and how large the effects of these are. One row per test, "
-        "joint, response and factor; every single test is in statistics.parquet."
-    )
-    title = "Tests of significance, two factors"
-    return sortable("statistics", title, about, folded(frame, alpha), FOLDED)
-
-
-QUESTION = (
-    "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
-    "where its landmarks were palpated?"
-)
-READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
-"""Tables whose rows the page needs; of the others it tells where they come from."""
-
-
-def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
-    """What the report says and shows."""
-    return Document(
-        question=QUESTION,
-        findings=findings(study, results),
-        pictures=[
-            replace(picture, caption=caption(picture, study, cohort, results))
-            for picture in results.pictures.values()
-        ],
-        tables=shown_tables(study, results),
-        metadata=results.metadata,
-        left_out=left_out(study),
-        poses=results.table("poses"),
-        tests=study.tests,
-        load_shift_mm=study.load_point_shift_mm.in_order(),
-    )
-
-
-def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
-    """Optional parts that the settings leave out, each with the setting that does."""
-    parts = (
-        ("bootstrap over start values", "start_bootstrap: sets", study.start_bootstrap.sets),
-        ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
-        ("comparison of ways of fitting", "methods: poses", study.methods.poses),
-        ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
-    )
-    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)

@@ -1,11 +1,6 @@
-"""Job: joint poses of every sampled landmark set of one specimen.
+"""Jobs: landmark sets sampled around palpated positions, and the joint poses of each set."""
 
-What describes a sampled joint pose as a factor: its angles, and how far its origins are off.
-
-Job: landmark sets of one specimen, sampled around their palpated positions.
-"""
-
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +16,43 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import LANDMARKS, POSES
 from spinepipe.tables import read_frame, to_arrow, write
-from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
+from spinepipe.units import MM_PER_M, ROTATIONS
+
+_ORIGIN = ("x_mm", "y_mm", "z_mm")
+
+_ANGLES = tuple(f"{name}_deg" for name in ROTATIONS)
+
+
+def sample(root: str, study: str, specimen: str, output: str) -> None:
+    """Write the rows of one specimen."""
+    settings, cohort = study_and_cohort(root, study)
+    assert cohort.landmarks is not None
+    own = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
+    frame = _sampled(settings, specimen, own)
+    columns = {column.name: frame[column.name].to_list() for column in LANDMARKS.columns}
+    made_by = provenance("sample_landmarks", settings, cohort, [specimen])
+    write(to_arrow(LANDMARKS, columns), output, made_by)
+
+
+def _sampled(settings: JointPoseSensitivity, specimen: str, rows: pd.DataFrame) -> pd.DataFrame:
+    """Landmark sets of one specimen, pose by pose."""
+    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float)
+    own = rows["sd_mm"].fillna(0.0).to_numpy(float)
+    sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
+    sampled, poses = sample_landmarks(points, sd, settings.poses, settings.seed, specimen)
+    flat, n = sampled.reshape(-1, 3), len(rows)
+    return pd.DataFrame(
+        {
+            "specimen": specimen,
+            "pose": np.repeat(np.asarray(poses), n),
+            "vertebra": np.tile(rows["vertebra"].to_numpy(), len(poses)),
+            "landmark": np.tile(rows["landmark"].to_numpy(), len(poses)),
+            "x_mm": flat[:, 0],
+            "y_mm": flat[:, 1],
+            "z_mm": flat[:, 2],
+            "sd_mm": np.tile(sd, len(poses)),
+        }
+    )
 
 
 def build(root: str, study: str, landmarks: str, specimen: str, output: str) -> None:
@@ -60,73 +91,3 @@ def _joints(cohort: Cohort, specimen: str, pose: int, points: Any) -> list[dict[
         ended = {"status": Status.CONVERGED.value, "message": ""}
         rows.append({**key, "joint": joint, **origin, **angles, **ended})
     return rows
-
-
-_ORIGIN = ("x_mm", "y_mm", "z_mm")
-_ANGLES = tuple(f"{name}_deg" for name in ROTATIONS)
-
-
-ORIGIN_DISTANCE = "origin_distance"
-_AXES: Mapping[str, str] = {
-    **{f"{axis}_mm": f"{name}_origin" for axis, name in zip("xyz", TRANSLATIONS, strict=True)},
-    **{f"{name}_deg": f"{name}_orientation" for name in ROTATIONS},
-}
-
-
-def pose_parameters(poses: pd.DataFrame) -> pd.DataFrame:
-    """All parameters of the poses of one specimen: a row per pose, six columns per joint.
-
-    Columns such as ``L2L3_anterior_origin`` (mm) and ``L2L3_extension_orientation`` (deg).
-    """
-    named = poses.rename(columns=dict(_AXES))
-    wide = named.pivot(index="pose", columns="joint", values=list(_AXES.values()))
-    joints = list(dict.fromkeys(poses["joint"]))
-    order = [(name, joint) for joint in joints for name in _AXES.values()]
-    found = wide[order]
-    return found.set_axis([f"{joint}_{name}" for name, joint in order], axis=1)
-
-
-def pose_factors(poses: pd.DataFrame) -> pd.DataFrame:
-    """The published description of the poses of one specimen: four columns, a row per pose.
-
-    Angles (deg) averaged over the joints, and the distance (mm) of the joint origins from their
-    mean over these poses, averaged over the joints (Gould 2024a, section 2.4.4).
-    """
-    origin = poses[["x_mm", "y_mm", "z_mm"]]
-    off = (origin - origin.groupby(poses["joint"]).transform("mean")).to_numpy(float)
-    columns = {f"{name}_orientation": poses[f"{name}_deg"].to_numpy(float) for name in ROTATIONS}
-    columns[ORIGIN_DISTANCE] = np.linalg.norm(off, axis=1)
-    found = pd.DataFrame(columns).groupby(poses["pose"].to_numpy()).mean()
-    return found.rename_axis("pose")
-
-
-def sample(root: str, study: str, specimen: str, output: str) -> None:
-    """Write the rows of one specimen."""
-    settings, cohort = study_and_cohort(root, study)
-    assert cohort.landmarks is not None
-    own = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
-    frame = _sampled(settings, specimen, own)
-    columns = {column.name: frame[column.name].to_list() for column in LANDMARKS.columns}
-    made_by = provenance("sample_landmarks", settings, cohort, [specimen])
-    write(to_arrow(LANDMARKS, columns), output, made_by)
-
-
-def _sampled(settings: JointPoseSensitivity, specimen: str, rows: pd.DataFrame) -> pd.DataFrame:
-    """Landmark sets of one specimen, pose by pose."""
-    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float)
-    own = rows["sd_mm"].fillna(0.0).to_numpy(float)
-    sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
-    sampled, poses = sample_landmarks(points, sd, settings.poses, settings.seed, specimen)
-    flat, n = sampled.reshape(-1, 3), len(rows)
-    return pd.DataFrame(
-        {
-            "specimen": specimen,
-            "pose": np.repeat(np.asarray(poses), n),
-            "vertebra": np.tile(rows["vertebra"].to_numpy(), len(poses)),
-            "landmark": np.tile(rows["landmark"].to_numpy(), len(poses)),
-            "x_mm": flat[:, 0],
-            "y_mm": flat[:, 1],
-            "z_mm": flat[:, 2],
-            "sd_mm": np.tile(sd, len(poses)),
-        }
-    )

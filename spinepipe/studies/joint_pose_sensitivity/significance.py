@@ -18,16 +18,17 @@ from spinepipe.statistics import (
     lilliefors_normality,
     spearman,
 )
-from spinepipe.studies.joint_pose_sensitivity.errors import (
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
     measured_coordinates,
+    pose_factors,
+    pose_parameters,
     readings,
 )
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS

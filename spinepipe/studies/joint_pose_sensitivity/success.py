@@ -1,53 +1,29 @@
-"""Job: which fits the study's filters keep.
-
-The published filters of fits: what has not moved, and what has moved too far.
-
-Job: how many fits each filter of the study takes.
-
-Job: what each way of fitting makes of the same poses.
-"""
+"""Jobs: which fits the study's filters keep, how many each takes, and how ways of fitting fare."""
 
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.jobs.digest import provenance
-from spinepipe.status import Status
-from spinepipe.studies.joint_pose_sensitivity.inputs import start_stiffness, study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.status import USABLE
+from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap, judge_poses
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
     COUNTS,
     SUCCESS,
     SUCCESS_BY_METHOD,
 )
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+FLAGS = ("solved", "near_start_any", "near_start_all", "outlier", "reduced")
 
-_ROUNDING = 1e-12
+ARRIVED = 1.01
+"""A fit has arrived when its cost is at most this many times the least found for its pose."""
 
-
-def near_start(values: Array, start: Array, percent: float) -> Flags:
-    """(n, k) whether values (n, k) differ from their start (k,) or (n, k) by at most that share.
-
-    Gould 2024a, section 2.5: a stiffness within 1 % of its start has not been optimised. A value
-    that is exactly that far still counts as near; NaN, no value, is not near.
-    """
-    limit = np.abs(start) * (percent / 100.0) * (1.0 + _ROUNDING)
-    return np.abs(values - start) <= limit
-
-
-def above_start(values: Array, start: Array, times: float) -> Flags:
-    """(n, k) whether values (n, k) reach that many times their start (k,) or (n, k).
-
-    Gould 2024a, section 2.5: an order of magnitude above the start is an outlier. NaN is none.
-    """
-    return values >= times * start
+NOTHING = 1e-6
+"""Cost (mm2, deg2) below which all fits are exact, and count as equal."""
 
 
 def success(root: str, study: str, tables: list[str], output: str) -> None:
@@ -56,44 +32,6 @@ def success(root: str, study: str, tables: list[str], output: str) -> None:
     judged = judge_poses(settings, read_frames(tables)["calibrations"])
     table = from_rows(SUCCESS, judged.to_dict("records"))
     write(table, output, provenance("success", settings, cohort))
-
-
-def judge_poses(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> pd.DataFrame:
-    """One row per specimen and pose with the flags of the success table."""
-    start = np.broadcast_to(start_stiffness(settings), (len(calibrations), 6))
-    return _judged(settings, calibrations, start, ["specimen", "pose"])
-
-
-def judge_bootstrap(settings: JointPoseSensitivity, bootstrap: pd.DataFrame) -> pd.DataFrame:
-    """One row per bootstrap fit with the flags of the success table."""
-    start = bootstrap[[f"start_{name}" for name in STIFFNESS_COLUMNS]].to_numpy(float)
-    return _judged(settings, bootstrap, start, ["specimen", "bootstrap", "loading", "set"])
-
-
-def _judged(
-    settings: JointPoseSensitivity,
-    fits: pd.DataFrame,
-    start: NDArray[np.float64],
-    keys: list[str],
-) -> pd.DataFrame:
-    """Flags of every fit; where stiffness is per joint, over all rows of the fit."""
-    rule = settings.success
-    free = [COORDINATES.index(name) for name in settings.calibration.free]
-    values = fits[[STIFFNESS_COLUMNS[index] for index in free]].to_numpy(float)
-    near = pd.DataFrame(near_start(values, start[:, free], rule.near_start_percent))
-    above = pd.DataFrame(above_start(values, start[:, free], rule.outlier_times_start))
-    rows = fits[keys].reset_index(drop=True)
-    rows["solved"] = fits["status"].isin([s.value for s in Status if s.usable]).to_numpy()
-    rows["near_start_any"], rows["near_start_all"] = near.any(axis=1), near.all(axis=1)
-    rows["outlier"] = above.any(axis=1)
-    how = {"solved": "all", "near_start_any": "any", "near_start_all": "all", "outlier": "any"}
-    judged = rows.groupby(keys, sort=False).agg(how).reset_index()
-    judged["failed"] = judged["solved"] & judged[f"near_start_{rule.failed_when}"]
-    judged["reduced"] = judged["solved"] & ~judged["failed"] & ~judged["outlier"]
-    return judged
-
-
-FLAGS = ("solved", "near_start_any", "near_start_all", "outlier", "reduced")
 
 
 def counts(root: str, study: str, tables: list[str], output: str) -> None:
@@ -116,13 +54,6 @@ def _counts(part: str, judged: pd.DataFrame) -> list[dict[str, Any]]:
         key = {"specimen": specimen, "part": part, "loading": loading}
         rows.append({**key, "fits": len(fits), **taken})
     return rows
-
-
-ARRIVED = 1.01
-"""A fit has arrived when its cost is at most this many times the least found for its pose."""
-
-NOTHING = 1e-6
-"""Cost (mm2, deg2) below which all fits are exact, and count as equal."""
 
 
 def success_by_method(root: str, study: str, tables: list[str], output: str) -> None:
@@ -152,7 +83,7 @@ def count_by_method(fits: pd.DataFrame, failed_when: str) -> list[dict[str, Any]
 
 
 def _counted(fits: pd.DataFrame, failed_when: str) -> dict[str, Any]:
-    solved = fits["status"].isin([status.value for status in Status if status.usable])
+    solved = fits["status"].isin(USABLE)
     near = {how: fits[f"near_start_{how}"].eq(True) & solved for how in ("any", "all")}
     successful = int((solved & ~near[failed_when]).sum())
     low, high = proportion_confint(successful, len(fits), method="wilson")

@@ -9,27 +9,26 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
-from spinepipe.studies.joint_pose_sensitivity.errors import (
-    UNITS,
+from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import SUMMARY
+from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     measured_size,
     readings,
 )
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.success import judge_bootstrap
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import SUMMARY
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import (
     COORDINATE_COLUMNS,
+    COORDINATE_UNITS,
     COORDINATES,
     ROTATIONS,
     STIFFNESS_COLUMNS,
+    STIFFNESS_UNITS,
     TRANSLATIONS,
 )
-
-STIFFNESS_UNIT = {name: "N/m" if name in TRANSLATIONS else "N m/rad" for name in COORDINATES}
 
 
 def run(root: str, study: str, tables: list[str], best: str, output: str) -> None:
@@ -131,7 +130,7 @@ def _stiffness_rows(
         for name in settings.calibration.free:
             column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
             values = rows[column].to_numpy(float)
-            yield part.row("stiffness", str(joint), name, STIFFNESS_UNIT[name], values)
+            yield part.row("stiffness", str(joint), name, STIFFNESS_UNITS[name], values)
 
 
 def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -141,7 +140,7 @@ def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Itera
         for name in COORDINATES:
             if motion[name].notna().any():
                 values, size = rows[name].to_numpy(float), motion[name].to_numpy(float)
-                yield part.row("error", str(joint), name, UNITS[name], values, size)
+                yield part.row("error", str(joint), name, COORDINATE_UNITS[name], values, size)
 
 
 def _frame_rows(part: _Part, poses: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -179,7 +178,9 @@ def _by_fit(
 
 def _named(fits: pd.DataFrame) -> pd.DataFrame:
     """Errors of bootstrap fits with columns as in `absolute_error`."""
-    return fits.rename(columns={f"{name}_error_{unit}": name for name, unit in UNITS.items()})
+    return fits.rename(
+        columns={f"{name}_error_{unit}": name for name, unit in COORDINATE_UNITS.items()}
+    )
 
 
 def _own_motion(settings: JointPoseSensitivity, cohort: Cohort) -> pd.DataFrame:

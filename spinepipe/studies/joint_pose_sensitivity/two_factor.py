@@ -11,17 +11,17 @@ from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
-from spinepipe.studies.joint_pose_sensitivity.errors import (
-    absolute_error,
-    complete_grid,
-    measured_coordinates,
-    readings,
-)
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.poses import pose_parameters
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, VARIANCE_SHARES
+from spinepipe.studies.joint_pose_sensitivity.variables import (
+    absolute_error,
+    complete_grid,
+    measured_coordinates,
+    pose_parameters,
+    readings,
+)
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES
 

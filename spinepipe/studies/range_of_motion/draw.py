@@ -1,7 +1,4 @@
-"""Job: joint frames of one specimen, the cohort's own and those sampled around them.
-
-Job: the stiffness sets that all specimens are moved with.
-"""
+"""Jobs: what is drawn, joint frames of a specimen around its own, and stiffness sets for all."""
 
 from typing import Any
 

@@ -12,7 +12,7 @@ from spinepipe.studies.range_of_motion.tables import (
     ROM_VARIANCE,
     STIFFNESS_SETS,
 )
-from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
 _JOBS = ("range_of_motion",)
 """Tables joined from job files, one for each specimen, pose and stiffness set."""
@@ -24,8 +24,6 @@ OF_JOBS = (*_JOBS, *BY_SPECIMEN)
 """Tables joined from job files."""
 
 TABLES = ("frames", "stiffness_sets", *_JOBS, "rom_summary", "rom_variance")
-
-_MOST_FILES_PER_BLOCK = 300
 
 
 @dataclass(frozen=True)
@@ -73,14 +71,12 @@ class RangeOfMotionFiles(StudyFiles):
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""
-        count = -(-self._per_specimen // _MOST_FILES_PER_BLOCK)
-        return [(name, f"{block:03d}") for name in self.specimens for block in range(count)]
+        return numbered_blocks(self.specimens, self._per_specimen)
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        first = int(block) * _MOST_FILES_PER_BLOCK
-        last = min(first + _MOST_FILES_PER_BLOCK, self._per_specimen)
-        return [self._job_file(specimen, number) for number in range(first, last)]
+        numbers = files_of_block(block, self._per_specimen)
+        return [self._job_file(specimen, number) for number in numbers]
 
     @property
     def _per_specimen(self) -> int:
@@ -109,10 +105,10 @@ KIND = Kind(
             "draw_stiffness",
             at="draw:draw_stiffness",
             ignores=ignoring(*_MOVING, *_FRAMES),
-            specimens="none",
+            header_alone=True,
         ),
         Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES)),
-        Job("rom_summary", "analyse:summary", ("range_of_motion",), ("rom_summary",)),
-        Job("rom_variance", "analyse:variance", ("range_of_motion",), ("rom_variance",)),
+        Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
+        Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),
 )

@@ -1,7 +1,4 @@
-"""The report of a range-of-motion study.
-
-Key findings of a range-of-motion study as sentences, their numbers computed from its tables.
-"""
+"""The report of a study of range of motion."""
 
 from collections.abc import Iterator
 
@@ -10,10 +7,25 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Results, Sortable, sortable
 from spinepipe.report.words import count, fixed, percent
-from spinepipe.studies.range_of_motion.figures.motion import EVERY
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
-from spinepipe.studies.range_of_motion.tables import ROM_SUMMARY, ROM_VARIANCE, STIFFNESS_SETS
+from spinepipe.studies.range_of_motion.tables import (
+    EVERY,
+    ROM_SUMMARY,
+    ROM_VARIANCE,
+    STIFFNESS_SETS,
+)
 from spinepipe.tables import Table
+
+QUESTION = (
+    "How far do the joints of these spines move in tests, and does that hang on the spine, on "
+    "where its joint frames are, or on the stiffness?"
+)
+
+READ = ("rom_summary", "rom_variance", "stiffness_sets", "frames")
+"""Tables whose rows the page needs; of the others it tells where they come from."""
+
+OWN_POSE = 0
+"""The pose with the cohort's own joint frames."""
 
 _FACTORS = {
     "specimen": "differences between specimens",
@@ -21,6 +33,47 @@ _FACTORS = {
     "stiffness": "the stiffness",
     "rest": "what these do only together",
 }
+
+
+def document(study: RangeOfMotion, cohort: Cohort, results: Results) -> Document:
+    """What the report says and shows."""
+    frames = results.table("frames")
+    return Document(
+        question=QUESTION,
+        findings=findings(study, cohort, results),
+        pictures=list(results.pictures.values()),
+        tables=[table for table in _tables(cohort, results) if table.rows],
+        metadata=results.metadata,
+        left_out=left_out(study),
+        poses=frames[frames["pose"] > OWN_POSE] if len(frames) else frames,
+        with_loads=study.virtual_tests is None,
+    )
+
+
+def left_out(study: RangeOfMotion) -> tuple[str, ...]:
+    """Draws that the settings leave out, each with the setting that does."""
+    parts = (
+        ("drawn joint frames", f"poses: {study.poses}", study.n_poses > 1),
+        ("drawn stiffness sets", "stiffness_sets: 1", study.stiffness_sets > 1),
+    )
+    return tuple(f"{part} ({setting})" for part, setting, drawn in parts if not drawn)
+
+
+def _tables(cohort: Cohort, results: Results) -> Iterator[Sortable]:
+    """Rows of the whole cohort, or of its only specimen; those of each specimen are in the file."""
+    chosen = EVERY if len(cohort.specimen_names) > 1 else cohort.specimen_names[0]
+    summary, variance = results.table("rom_summary"), results.table("rom_variance")
+    shown: tuple[tuple[Table, str, bool], ...] = (
+        (ROM_SUMMARY, "Range of motion", True),
+        (ROM_VARIANCE, "Shares of variance", True),
+        (STIFFNESS_SETS, "Stiffness sets", False),
+    )
+    rows = {ROM_SUMMARY.name: summary, ROM_VARIANCE.name: variance}
+    for table, title, by_specimen in shown:
+        frame = rows.get(table.name, results.table(table.name))
+        if by_specimen:
+            frame = frame[frame["specimen"] == chosen]
+        yield sortable(table.name, title, table.about, frame, table.columns)
 
 
 def findings(study: RangeOfMotion, cohort: Cohort, results: Results) -> list[str]:
@@ -97,55 +150,3 @@ def _where(study: RangeOfMotion, cohort: Cohort) -> str:
         "The tests are pure moments without weight: they load no translation, and only how joint "
         "frames are turned matters, not where their origins lie."
     )
-
-
-QUESTION = (
-    "How far do the joints of these spines move in tests, and does that hang on the spine, on "
-    "where its joint frames are, or on the stiffness?"
-)
-READ = ("rom_summary", "rom_variance", "stiffness_sets", "frames")
-"""Tables whose rows the page needs; of the others it tells where they come from."""
-
-OWN_POSE = 0
-"""The pose with the cohort's own joint frames."""
-
-
-def document(study: RangeOfMotion, cohort: Cohort, results: Results) -> Document:
-    """What the report says and shows."""
-    frames = results.table("frames")
-    return Document(
-        question=QUESTION,
-        findings=findings(study, cohort, results),
-        pictures=list(results.pictures.values()),
-        tables=[table for table in _tables(cohort, results) if table.rows],
-        metadata=results.metadata,
-        left_out=left_out(study),
-        poses=frames[frames["pose"] > OWN_POSE] if len(frames) else frames,
-        with_loads=study.virtual_tests is None,
-    )
-
-
-def left_out(study: RangeOfMotion) -> tuple[str, ...]:
-    """Draws that the settings leave out, each with the setting that does."""
-    parts = (
-        ("drawn joint frames", f"poses: {study.poses}", study.n_poses > 1),
-        ("drawn stiffness sets", "stiffness_sets: 1", study.stiffness_sets > 1),
-    )
-    return tuple(f"{part} ({setting})" for part, setting, drawn in parts if not drawn)
-
-
-def _tables(cohort: Cohort, results: Results) -> Iterator[Sortable]:
-    """Rows of the whole cohort, or of its only specimen; those of each specimen are in the file."""
-    chosen = EVERY if len(cohort.specimen_names) > 1 else cohort.specimen_names[0]
-    summary, variance = results.table("rom_summary"), results.table("rom_variance")
-    shown: tuple[tuple[Table, str, bool], ...] = (
-        (ROM_SUMMARY, "Range of motion", True),
-        (ROM_VARIANCE, "Shares of variance", True),
-        (STIFFNESS_SETS, "Stiffness sets", False),
-    )
-    rows = {ROM_SUMMARY.name: summary, ROM_VARIANCE.name: variance}
-    for table, title, by_specimen in shown:
-        frame = rows.get(table.name, results.table(table.name))
-        if by_specimen:
-            frame = frame[frame["specimen"] == chosen]
-        yield sortable(table.name, title, table.about, frame, table.columns)

@@ -1,7 +1,4 @@
-"""The study kind that asks how far spines of known geometry move in tests that nobody did.
-
-What a study of range of motion demands of its cohort.
-"""
+"""What a study of range of motion asks, and what it demands of its cohort."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal
@@ -10,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem
 from spinepipe.studies.parts import (
     FORM,
     Damping,
@@ -19,7 +16,7 @@ from spinepipe.studies.parts import (
     PublishedStiffness,
     Tests,
 )
-from spinepipe.studies.places import at, unknown_tests
+from spinepipe.studies.places import at, unknown_levels, unknown_tests
 from spinepipe.studies.study import Study
 
 VirtualTest = Literal[
@@ -133,7 +130,7 @@ def check_range_of_motion(
     """
     yield from _poses(document, study, cohort)
     yield from _tests(document, study, cohort)
-    yield from _levels(document, study, cohort)
+    yield from unknown_levels(document, study.level_stiffness, cohort.joint_names)
 
 
 def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
@@ -167,11 +164,3 @@ def _tests(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator
         yield Problem(*at(document, "virtual_tests"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
-
-
-def _levels(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
-    for name in study.level_stiffness:
-        if name not in cohort.joint_names:
-            remedy = did_you_mean(name, cohort.joint_names, "delete it")
-            place = at(document, f"level_stiffness.{name}")
-            yield Problem(*place, f"unknown joint '{name}'", one_of(cohort.joint_names), remedy)

@@ -1,7 +1,4 @@
-"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests.
-
-Drawn frames and stiffness sets, read once per worker and state of their files.
-"""
+"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,15 +17,91 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
 from spinepipe.statics import System, follow
 from spinepipe.status import Status
-from spinepipe.studies.range_of_motion.load_steps import AskedTest, asked_tests
+from spinepipe.studies.asked_tests import AskedTest
+from spinepipe.studies.range_of_motion.load_steps import asked_tests
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
 
+TABLE = RANGE_OF_MOTION.without("specimen", "pose")
+"""A job file: specimen and pose are in its folders' names."""
+
+Ends = list[tuple[Array, Status, str]]
+"""End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
+
 _SPECIMENS = 128
 """Whose frames are kept: jobs of different specimens come in any order."""
+
+
+def run(
+    root: str,
+    study: str,
+    frames: str,
+    stiffness_sets: str,
+    specimen: str,
+    pose: str,
+    stiffness: str,
+    output: str,
+) -> None:
+    """Write the rows of one specimen, pose and stiffness set."""
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    tests = asked_tests(root, study, specimen, cohort.digest)
+    placed = drawn_frames(frames).of(specimen, int(pose))
+    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
+    damping = np.array(settings.damping.in_order())
+    try:
+        chain = Chain(on_bushings(cohort, specimen, placed, values, damping))
+        ends = [_motion(chain, test) for test in tests]
+    except RefusedModel as error:
+        nowhere = np.full(values.shape, np.nan)
+        ends = [
+            [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
+            for test in tests
+        ]
+    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
+    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
+    made_by = provenance("simulate", settings, cohort, [specimen])
+    write(to_arrow(TABLE, columns), output, made_by)
+
+
+def _motion(chain: Chain, test: AskedTest) -> Ends:
+    """Ends of the steps of a test that are stored.
+
+    Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
+    """
+    solved = follow(System(chain, chain.model, test.case))
+    start = solved[0].equilibrium.q if test.from_first else np.zeros(chain.n)
+    ends = []
+    for step in solved[test.stored]:
+        moved = step.equilibrium.q - start if step.usable else np.full(chain.n, np.nan)
+        ended = step.equilibrium
+        ends.append((from_si(moved.reshape(-1, 6)), ended.status, ended.message))
+    return ends
+
+
+def _columns(
+    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
+) -> dict[str, list[Any]]:
+    """Columns of a job file; rows step by step, joint by joint."""
+    names = ("test", "step", "largest_load", "joint", "status", "message")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    motions = []
+    for test, ends in tests:
+        for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
+            same = (test.case.test, step.step, step.step == test.largest)
+            for name, value in zip(names[:3], same, strict=True):
+                columns[name] += [value] * len(joints)
+            columns["joint"] += joints
+            columns["status"] += [status.value] * len(joints)
+            columns["message"] += [message] * len(joints)
+            motions.append(motion)
+    predicted = np.concatenate(motions).T
+    return {
+        **columns,
+        **dict(zip([f"predicted_{c}" for c in COORDINATE_COLUMNS], predicted, strict=True)),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,79 +156,3 @@ def _stiffness(where: Stamp) -> Array:
     table = read_frame(where[0])
     values: Array = table[list(STIFFNESS_COLUMNS)].to_numpy(float)
     return values.reshape(table["stiffness"].nunique(), -1, 6)
-
-
-TABLE = RANGE_OF_MOTION.without("specimen", "pose")
-"""A job file: specimen and pose are in its folders' names."""
-
-Ends = list[tuple[Array, Status, str]]
-"""End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
-
-
-def run(
-    root: str,
-    study: str,
-    frames: str,
-    stiffness_sets: str,
-    specimen: str,
-    pose: str,
-    stiffness: str,
-    output: str,
-) -> None:
-    """Write the rows of one specimen, pose and stiffness set."""
-    settings, cohort = study_of_kind(RangeOfMotion, root, study)
-    tests = asked_tests(root, study, specimen, cohort.digest)
-    placed = drawn_frames(frames).of(specimen, int(pose))
-    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
-    damping = np.array(settings.damping.in_order())
-    try:
-        chain = Chain(on_bushings(cohort, specimen, placed, values, damping))
-        ends = [_motion(chain, test) for test in tests]
-    except RefusedModel as error:
-        nowhere = np.full(values.shape, np.nan)
-        ends = [
-            [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
-            for test in tests
-        ]
-    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
-    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
-    made_by = provenance("simulate", settings, cohort, [specimen])
-    write(to_arrow(TABLE, columns), output, made_by)
-
-
-def _motion(chain: Chain, test: AskedTest) -> Ends:
-    """Ends of the steps of a test that are stored.
-
-    Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
-    """
-    solved = follow(System(chain, chain.model, test.case))
-    start = np.zeros(chain.n) if test.from_neutral else solved[0].equilibrium.q
-    ends = []
-    for step in solved[test.stored]:
-        moved = step.equilibrium.q - start if step.usable else np.full(chain.n, np.nan)
-        ended = step.equilibrium
-        ends.append((from_si(moved.reshape(-1, 6)), ended.status, ended.message))
-    return ends
-
-
-def _columns(
-    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
-) -> dict[str, list[Any]]:
-    """Columns of a job file; rows step by step, joint by joint."""
-    names = ("test", "step", "largest_load", "joint", "status", "message")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
-    motions = []
-    for test, ends in tests:
-        for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
-            same = (test.case.test, step.step, step.step == test.largest)
-            for name, value in zip(names[:3], same, strict=True):
-                columns[name] += [value] * len(joints)
-            columns["joint"] += joints
-            columns["status"] += [status.value] * len(joints)
-            columns["message"] += [message] * len(joints)
-            motions.append(motion)
-    predicted = np.concatenate(motions).T
-    return {
-        **columns,
-        **dict(zip([f"predicted_{c}" for c in COORDINATE_COLUMNS], predicted, strict=True)),
-    }

@@ -18,7 +18,10 @@ STIFFNESS_SET = Column(
     "stiffness", "integer", "number of the stiffness set; 0 is the study's own", low=0
 )
 _TEST = Column("test", "text", "test")
-_SPECIMEN_OR_ALL = Column("specimen", "text", "name of the specimen, or * for all of them")
+EVERY = "*"
+"""Stands for all specimens."""
+
+_SPECIMEN_OR_ALL = Column("specimen", "text", f"name of the specimen, or {EVERY} for all of them")
 
 FRAMES = Table(
     "frames",

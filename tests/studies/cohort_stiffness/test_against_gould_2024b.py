@@ -25,11 +25,12 @@ from spinepipe.studies.cohort_stiffness.gould_2024b.stiffness import (
     median_of,
     smallest_of,
 )
+from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B
-from spinepipe.tables import TABLES, from_rows, read, read_frame
+from spinepipe.tables import from_rows, read, read_frame
 
 ROOT = Path(__file__).parents[3]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
@@ -54,7 +55,7 @@ EMPTY_RUN = Run({})
 
 def frame(table: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Rows with all columns of a table, read as from a file; what is not given is empty."""
-    columns = TABLES[table].columns
+    columns = KIND.table(table).columns
     whole = [dict.fromkeys(c.name for c in columns) | row for row in rows]
     kinds = {c.name: "float" for c in columns if c.kind == "number"}
     return pd.DataFrame(whole, columns=[c.name for c in columns]).astype(kinds)

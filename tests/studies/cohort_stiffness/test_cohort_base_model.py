@@ -20,11 +20,12 @@ from spinepipe.effects import register, registry
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import write_marked
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import Picture, Results
 from spinepipe.studies import read as studies
-from spinepipe.studies.cohort_stiffness.problem import NOT_HELD_OUT, SEEN
-from spinepipe.studies.cohort_stiffness.report import HELD_OUT, _with_base
+from spinepipe.studies.cohort_stiffness.page import HELD_OUT_ERROR, NOT_HELD_OUT, document
+from spinepipe.studies.cohort_stiffness.problem import SEEN
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.tables import Tables
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
@@ -272,12 +273,15 @@ def test_a_file_of_bushings_alone_changes_nothing(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(plain, bushings)
 
 
-def test_the_report_says_what_was_not_held_out() -> None:
-    results = Results({}, {}, {}, {HELD_OUT: "Errors.", "error_map": "Map."})
-    study = CohortStiffness(
-        study=STUDY, kind="cohort_stiffness", cohort="chains", base={"model": "m.yaml"}
-    )
-    told = _with_base(study, results).captions
-    assert told == {HELD_OUT: f"Errors. {NOT_HELD_OUT.format(file='m.yaml')}", "error_map": "Map."}
-    plain = CohortStiffness(study=STUDY, kind="cohort_stiffness", cohort="chains")
-    assert _with_base(plain, results) is results
+def test_the_report_says_what_was_not_held_out(tmp_path: Path) -> None:
+    def captions(**more: object) -> dict[str, str]:
+        study, cohort = studies.check(tmp_path, STUDY)
+        found = document(study.model_copy(update=more), cohort, Results(Tables({}), {}, pictures))
+        return {picture.name: picture.caption for picture in found.pictures}
+
+    stiffening(tmp_path, FOR_ALL)
+    told = {HELD_OUT_ERROR: "Errors.", "error_map": "Map."}
+    pictures = {name: Picture(name, "title", "address", words) for name, words in told.items()}
+    beside = NOT_HELD_OUT.format(file="model.yaml")
+    assert captions() == told | {HELD_OUT_ERROR: f"Errors. {beside}"}
+    assert captions(base=None) == told

@@ -1,12 +1,12 @@
 """Figures of cohort studies: drawn for any cohort, and true to the tables they are drawn from."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from cohort_study_cases import PUBLISHED, Size, cohort_of, frame, study_of, tables_of
+from drawn import caption, drawings
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -14,13 +14,13 @@ from matplotlib.text import Text
 
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.report.words import short
-from spinepipe.studies.cohort_stiffness.draw import DRAW
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
 from spinepipe.studies.cohort_stiffness.figures.held_out_error import rotation_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
-from spinepipe.studies.cohort_stiffness.kind import COHORT_ANALYSES, COHORT_FIGURES, OF_JOBS
+from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
+from spinepipe.tables import Tables
 
-CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
+DRAW = drawings("cohort_stiffness")
 LONG = tuple(f"vertebra_number_{n}" for n in range(6))
 SPINE = ("S1", "L5", "L4", "L3", "L2", "L1", *(f"T{n}" for n in range(12, 0, -1)))
 SIZES = {
@@ -39,7 +39,7 @@ SIZES = {
 def draw(name: str, size: Size, **changed: pd.DataFrame) -> Figure:
     """A figure of made-up tables, laid out."""
     with style():
-        figure = DRAW[name](study_of(size), cohort_of(size), tables_of(size) | changed)
+        figure = DRAW[name](study_of(size), cohort_of(size), tables_of(size, **changed))
         figure.draw_without_rendering()
     return figure
 
@@ -57,10 +57,11 @@ def ticks(axis: Axis) -> list[Text]:
 
 
 def test_every_figure_has_a_caption_and_tables_that_studies_have() -> None:
-    assert set(DRAW) == set(COHORT_FIGURES)
-    for name, tables in COHORT_FIGURES.items():
-        assert len((CAPTIONS / f"{name}.rst").read_text(encoding="utf-8")) > 200, name
-        assert set(tables) <= {*OF_JOBS, *COHORT_ANALYSES}, name
+    analysed = {table for job in KIND.analyses for table in job.writes}
+    for figure in KIND.figures:
+        told = caption("cohort_stiffness", figure.name).read_text(encoding="utf-8")
+        assert len(told) > 200, figure.name
+        assert set(figure.reads) <= {*OF_JOBS, *analysed}, figure.name
 
 
 @pytest.mark.parametrize("name", DRAW)
@@ -142,7 +143,7 @@ def test_what_the_data_do_not_hold_is_hollow_and_what_is_missing_crossed() -> No
     assert "no stiffness" in words(figure)
 
 
-def map_of(size: Size, tables: dict[str, pd.DataFrame]) -> Figure:
+def map_of(size: Size, tables: Tables) -> Figure:
     """The map of errors."""
     with style():
         return error_map_figure(study_of(size), cohort_of(size), tables)

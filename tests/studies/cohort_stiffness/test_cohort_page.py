@@ -6,25 +6,18 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
+from drawn import caption
 from study_cases import STUDY, project
 from study_cases import Size as OtherSize
 
-from spinepipe.report.page.document import Results
-from spinepipe.studies.cohort_stiffness import draw as figures
-from spinepipe.studies.cohort_stiffness import report
-from spinepipe.studies.cohort_stiffness.kind import COHORT_FIGURES
-from spinepipe.studies.cohort_stiffness.page import (
-    READ,
-    TITLES,
-    cohort_page,
-    left_out,
-    shown_tables,
-)
+from spinepipe.jobs import draw, report
+from spinepipe.report.page.document import Picture, Results
+from spinepipe.studies.cohort_stiffness.kind import KIND
+from spinepipe.studies.cohort_stiffness.page import READ, document, left_out, shown_tables
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.settings import CrossValidation
-from spinepipe.tables import TABLES, to_arrow, write
+from spinepipe.tables import to_arrow, write
 
-CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SIZES = {
     "three specimens": Size(),
@@ -38,9 +31,17 @@ SIZES = {
 
 def results(size: Size, **changed: pd.DataFrame) -> Results:
     """Made-up results with a picture."""
-    tables = tables_of(size) | changed
+    tables = tables_of(size, **changed)
     metadata = {name: {"seed": "7", "code_digest": name} for name in tables}
-    return Results(tables, metadata, {"error_map": PICTURE}, {"error_map": "What\nit shows."})
+    title = KIND.figure("error_map").title
+    picture = Picture.of("error_map", title, PICTURE, "What it shows.")
+    return Results(tables, metadata, {"error_map": picture})
+
+
+def page_of(size: Size) -> str:
+    """The page of made-up results."""
+    study, cohort = study_of(size), cohort_of(size)
+    return document(study, cohort, results(size)).html(study, cohort)
 
 
 def told(size: Size, **changed: pd.DataFrame) -> list[str]:
@@ -51,7 +52,7 @@ def told(size: Size, **changed: pd.DataFrame) -> list[str]:
 
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
 def test_page_of_any_cohort_fetches_nothing(size: Size) -> None:
-    page = cohort_page(study_of(size), cohort_of(size), results(size))
+    page = page_of(size)
     before_scripts = page.split("<script")[0]
     for address in re.findall(r' (?:src|href)="([^"]*)"', before_scripts):
         assert address.startswith(("#", "data:image/svg+xml;base64,")), address
@@ -64,13 +65,13 @@ def test_page_of_any_cohort_fetches_nothing(size: Size) -> None:
 
 
 def test_page_has_the_same_bytes_twice() -> None:
-    pages = {cohort_page(study_of(Size()), cohort_of(Size()), results(Size())) for _ in range(2)}
+    pages = {page_of(Size()) for _ in range(2)}
     assert len(pages) == 1
 
 
 def test_every_figure_has_a_title_and_every_table_read_a_shape() -> None:
-    assert set(TITLES) == set(COHORT_FIGURES)
-    assert set(READ) <= set(TABLES)
+    assert all(figure.title for figure in KIND.figures)
+    assert set(READ) <= {table.name for table in KIND.tables}
 
 
 def test_a_flipped_sign_is_told_before_all_else() -> None:
@@ -221,22 +222,22 @@ def made(tmp_path: Path) -> Path:
             column: [None if pd.isna(v) else v for v in values]
             for column, values in columns.items()
         }
-        write(to_arrow(TABLES[name], clean), str(folder / f"{name}.parquet"), {"seed": "7"})
+        write(to_arrow(KIND.table(name), clean), str(folder / f"{name}.parquet"), {"seed": "7"})
     return tmp_path
 
 
 def test_jobs_draw_all_figures_and_write_the_page(made: Path) -> None:
     folder = made / "results" / STUDY
-    pictures = [str(folder / f"{name}.svg") for name in COHORT_FIGURES]
-    for name, path in zip(COHORT_FIGURES, pictures, strict=True):
-        tables = [str(folder / f"{table}.parquet") for table in COHORT_FIGURES[name]]
-        figures.run(str(made), STUDY, name, tables, path, path.replace(".svg", ".png"))
+    pictures = [str(folder / f"{figure.name}.svg") for figure in KIND.figures]
+    for figure, path in zip(KIND.figures, pictures, strict=True):
+        tables = [str(folder / f"{table}.parquet") for table in figure.tables]
+        draw.run(str(made), STUDY, figure.name, tables, path, path.replace(".svg", ".png"))
     files = sorted(str(path) for path in folder.glob("*.parquet"))
-    captions = [str(CAPTIONS / f"{name}.rst") for name in COHORT_FIGURES]
+    captions = [str(caption("cohort_stiffness", figure.name)) for figure in KIND.figures]
     report.run(str(made), STUDY, files, pictures, captions, str(folder / "report.html"))
     page = (folder / "report.html").read_text(encoding="utf-8")
-    for number, title in enumerate(TITLES.values(), start=1):
-        assert f"Figure {number}. {title}." in page
+    for number, figure in enumerate(KIND.figures, start=1):
+        assert f"Figure {number}. {figure.title}." in page
     assert "<td>errors</td>" in page, "tables that are not shown are among the digests"
     assert "the cohort&#39;s own joint frames" in page
     assert "4 of 4 measured joint motions go with the load." in page

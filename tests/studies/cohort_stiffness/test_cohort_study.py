@@ -1,15 +1,14 @@
 """A small cohort study run by Snakemake: all of its results, and what is computed again."""
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from small_project import SKIPPED, Project, copy_project, written
+from small_project import Project, Shared, copy_project
 
-from spinepipe.tables import TABLES
+from spinepipe.studies.cohort_stiffness.kind import KIND
 
 pytestmark = pytest.mark.slow
 
@@ -58,27 +57,24 @@ def write_cohort(folder: Path) -> None:
         pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
 
 
-def build(project: Project) -> set[str]:
-    """Build all results; returns the files that were computed."""
-    before = project.files() if project.path("results").exists() else {}
-    project.run_all()
-    return written(before, project.files())
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Project:
-    project = copy_project(tmp_path_factory.mktemp("cohort") / "project")
+def build(folder: Path) -> Project:
+    project = copy_project(folder)
     write_cohort(project.path("config/cohorts/chains"))
     project.path("config/studies/small.yaml").write_text(STUDY)
-    build(project)
+    project.run()
     return project
 
 
 @pytest.fixture
+def built(shared: Shared) -> Project:
+    """A project whose study has been computed; built once and not to be changed."""
+    return shared.project("cohort", build)
+
+
+@pytest.fixture
 def cohort_project(built: Project, tmp_path: Path) -> Project:
-    """A project whose joined tables have been computed; each test has its own."""
-    shutil.copytree(built.folder, tmp_path / "project", ignore=SKIPPED)
-    return Project(tmp_path / "project")
+    """The same, for one test to change."""
+    return built.copy(tmp_path / "project")
 
 
 def table(project: Project, name: str) -> pd.DataFrame:
@@ -88,7 +84,7 @@ def table(project: Project, name: str) -> pd.DataFrame:
 def test_every_table_is_made_and_keeps_its_schema(built: Project) -> None:
     for name in JOINED:
         found = pq.read_table(built.path(f"results/small/{name}.parquet"))
-        assert found.schema.remove_metadata() == TABLES[name].schema, name
+        assert found.schema.remove_metadata() == KIND.table(name).schema, name
         told = set(found.schema.metadata)
         assert b"seed" in told, name
         assert told & {b"cohort_digest", b"specimens_digest"}, name
@@ -128,11 +124,9 @@ def test_specimens_keep_their_stiffness_through_the_joins(built: Project) -> Non
 
 def test_a_deleted_fit_reruns_what_hangs_on_it(cohort_project: Project) -> None:
     content = cohort_project.contents()
-    lost = cohort_project.path(f"results/{FIT}/stiffness.parquet")
-    lost.unlink()
-    before = cohort_project.files()
-    cohort_project.run_all()
-    again = written(before, cohort_project.files())
+    assert cohort_project.planned() == set()
+    cohort_project.path(f"results/{FIT}/stiffness.parquet").unlink()
+    again = cohort_project.rerun()
     jobs = {name for name in again if "specimen=" in name and "blocks" not in name}
     fitted = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors")}
     medians = {
@@ -144,13 +138,9 @@ def test_a_deleted_fit_reruns_what_hangs_on_it(cohort_project: Project) -> None:
     assert cohort_project.contents() == content
 
 
-def test_a_second_run_computes_nothing(cohort_project: Project) -> None:
-    assert build(cohort_project) == set()
-
-
 def test_another_significance_computes_no_fit_again(cohort_project: Project) -> None:
     cohort_project.edit("config/studies/small.yaml", "significance: 0.05", "significance: 0.01")
-    again = build(cohort_project)
+    again = cohort_project.planned()
     assert "small/findings.parquet" in again
     assert not {name for name in again if "=" in name}
 
@@ -161,8 +151,7 @@ def test_a_changed_reading_reruns_a_fit(cohort_project: Project) -> None:
     here = (motion["specimen"] == "b") & (motion["test"] == "flexion") & (motion["step"] == 2)
     motion.loc[here, "extension_deg"] *= 0.5
     motion.to_csv(path, index=False)
-    done = cohort_project.snakemake("-j1", f"results/{FIT}/stiffness.parquet")
-    assert done.returncode == 0, done.stdout
+    cohort_project.run(f"results/{FIT}/stiffness.parquet")
     rows = pd.read_parquet(cohort_project.path(f"results/{FIT}/stiffness.parquet"))
     found = rows.loc[rows["coordinate"] == "extension", "stiffness"]
     # least squares of 1 / k on 1 and 2 N m: (1 * 1 + 2 * 1) / (1 + 4) of what it was

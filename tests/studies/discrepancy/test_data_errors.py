@@ -12,13 +12,13 @@ from spring_chain_cases import JOINTS, SD, THERE_AND_BACK, Array, Yield, changed
 from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
 from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import ROTATIONS
 
 SDS = np.array([np.nan] * 3 + [SD] * 3)

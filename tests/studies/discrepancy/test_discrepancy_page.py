@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Mapping
+from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -10,38 +11,71 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from discrepancy_cases import EFFECTS, HIDDEN, STUDY, VERDICTS, frames, project, results
+from discrepancy_cases import (
+    EFFECTS,
+    HIDDEN,
+    STUDY,
+    VERDICTS,
+    frames,
+    project,
+    results,
+    tables,
+)
 from matplotlib.figure import Figure
 
-from spinepipe.cohort import Cohort
-from spinepipe.report.discrepancy import DRAW
-from spinepipe.report.page.document import Results
+from spinepipe.jobs import draw, report
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
 from spinepipe.report.words import plain
-from spinepipe.studies.discrepancy import draw as figures_job
-from spinepipe.studies.discrepancy import report as report_job
 from spinepipe.studies.discrepancy.figures.effects import evidence_by_round, looks
 from spinepipe.studies.discrepancy.figures.gap_map import worst_places
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
-from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, TABLES
-from spinepipe.studies.discrepancy.page import TITLES, discrepancy_page, left_out, shown_tables
+from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
+from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import Answer, Estimate, verdict_of
+from spinepipe.studies.discrepancy.verdict import (
+    Answer,
+    Estimate,
+    Reason,
+    Verdict,
+    plain_data,
+    verdict_of,
+)
 from spinepipe.studies.discrepancy.words import estimate_of, readable, value_of
 from spinepipe.studies.read import check
+from spinepipe.tables import Tables
 
 ROOT = Path(__file__).resolve().parents[3]
-CAPTIONS = {name: (ROOT / "workflow" / "report" / f"{name}.rst").read_text() for name in DRAW}
+NOWHERE = pd.DataFrame()
+FIGURES = [figure.name for figure in KIND.figures]
 
 
 def study_of(root: Path, text: str = "base: {stiffness: per_specimen}\n") -> Any:
-    return check(project(root, text), STUDY)
+    if not (root / "config").exists():
+        project(root, text)
+    return check(root, STUDY)
 
 
-def drawn(name: str, cohort: Cohort, answer: str, **changed: pd.DataFrame) -> Figure:
+def rows_of(made: Mapping[str, pd.DataFrame]) -> Results:
+    """Results of these tables alone."""
+    return Results(Tables(made), {}, {})
+
+
+def drawn(name: str, root: Path, answer: str, **changed: pd.DataFrame) -> Figure:
     """A figure of a made-up outcome, some of its tables changed."""
+    return drawn_of(name, root, VERDICTS[answer], frames(answer) | changed)
+
+
+def drawn_of(
+    name: str, root: Path, verdict: Mapping[str, Any], made: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A figure of these tables and this verdict."""
+    study, cohort = study_of(root)
+    module, _, function = KIND.figure(name).at.partition(":")
+    figure_of = getattr(import_module(f"spinepipe.studies.discrepancy.{module}"), function)
     with style():
-        figure = DRAW[name](cohort, verdict_of(VERDICTS[answer]), frames(answer) | changed)
+        figure: Figure = figure_of(study, cohort, tables(verdict, made, root))
         assert picture(figure, "svg")
     return figure
 
@@ -57,28 +91,25 @@ def said(figure: Figure) -> str:
     return " ".join(" ".join(text.get_text() for text in texts).split())
 
 
-@pytest.mark.parametrize(("answer", "name"), list(product(VERDICTS, DRAW)))
+@pytest.mark.parametrize(("answer", "name"), list(product(VERDICTS, FIGURES)))
 def test_every_figure_is_drawn_whatever_the_verdict(answer: str, name: str, tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
-    assert len(said(drawn(name, cohort, answer))) > 40
+    assert len(said(drawn(name, tmp_path, answer))) > 40
 
 
 def test_the_map_shows_each_test_before_and_after(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
-    figure = drawn("gap_map", cohort, "NAMED")
+    figure = drawn("gap_map", tmp_path, "NAMED")
     titles = [axis.get_title("left").strip() for axis in figure.axes]
     assert titles.count("base") == titles.count("with effects") == 3
     assert "9.3" in said(figure)
-    alone = [axis.get_title("left").strip() for axis in drawn("gap_map", cohort, "NULL").axes]
+    alone = [axis.get_title("left").strip() for axis in drawn("gap_map", tmp_path, "NULL").axes]
     assert (alone.count("base"), alone.count("with effects")) == (3, 0)
 
 
 def test_the_map_takes_six_joints_six_coordinates_and_many_tests(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
     one = frames("NAMED")["where"]
     one = one[one["by"] == "joint x coordinate x test"]
     every = [one.assign(coordinate=name) for name in ("anterior", "superior", "right")]
-    figure = drawn("gap_map", cohort, "NAMED", where=pd.concat([one, *every]))
+    figure = drawn("gap_map", tmp_path, "NAMED", where=pd.concat([one, *every]))
     assert "ant." in said(figure)
 
 
@@ -96,16 +127,17 @@ def test_places_of_the_largest_gap_come_first_and_once() -> None:
 
 
 def test_a_model_without_poses_is_said_to_have_none(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
-    tables = frames("NAMED")
-    gap = tables["gap"].assign(base=np.nan, with_effects=np.nan)
-    assert "no pose" in said(drawn("gap_by_step", cohort, "NAMED", gap=gap))
-    where = tables["where"].assign(gap=np.nan)
-    assert "no model has a pose" in said(drawn("gap_map", cohort, "NAMED", where=where))
-    nothing = tables["held_out"].iloc[:0]
-    assert "nothing was left out" in said(drawn("gap_held_out", cohort, "NAMED", held_out=nothing))
-    empty = {name: tables[name].iloc[:0] for name in ("candidates", "confusions")}
-    assert "no effect was tried" in said(drawn("effect_evidence", cohort, "NULL", **empty))
+    made = frames("NAMED")
+    gap = made["gap"].assign(base=np.nan, with_effects=np.nan)
+    assert "no pose" in said(drawn("gap_by_step", tmp_path, "NAMED", gap=gap))
+    where = made["where"].assign(gap=np.nan)
+    assert "no model has a pose" in said(drawn("gap_map", tmp_path, "NAMED", where=where))
+    nothing = made["held_out"].iloc[:0]
+    assert "nothing was left out" in said(
+        drawn("gap_held_out", tmp_path, "NAMED", held_out=nothing)
+    )
+    empty = {name: made[name].iloc[:0] for name in ("candidates", "confusions")}
+    assert "no effect was tried" in said(drawn("effect_evidence", tmp_path, "NULL", **empty))
 
 
 def test_the_best_form_of_an_effect_stands_for_it() -> None:
@@ -131,44 +163,44 @@ def test_a_look_in_the_place_of_an_effect_is_no_further_panel() -> None:
 
 
 def test_names_values_and_units_read_as_words() -> None:
-    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", 16.26, 19.1)
+    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", (16.26, 19.1))
     assert estimate_of(growth) == "growth (L4L5, s01) 17.7 1/rad² (95 % interval 16.3 to 19.1)"
     assert value_of(growth) == "17.7 [16.3, 19.1]"
-    assert value_of(Estimate("gap", 0.0, "deg", 0.0, 0.1, at_bound=True)) == "0, at its bound"
+    assert value_of(Estimate("gap", 0.0, "deg", (0.0, 0.1), at_bound=True)) == "0, at its bound"
     assert plain("flexion_extension_asymmetry") == "flexion–extension asymmetry"
     assert readable("marker_bias: try base per_joint") == "marker bias: try base per_joint"
 
 
 def test_what_cannot_be_tested_stands_beside_what_can(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
-    words = said(drawn("effect_confusions", cohort, "NULL"))
+    words = said(drawn("effect_confusions", tmp_path, "NULL"))
     assert words.count("not testable here") == len(HIDDEN) + 1  # and in the key
     assert all(plain(name) in words for name in [*EFFECTS, *HIDDEN])
 
 
 def test_a_fold_without_a_result_tells_why(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
     held = frames("NAMED")["held_out"]
     rms = ["rms_base", "rms_with_effects", "rms_surrogate"]
     held.loc[0, [*rms, "closed"]] = np.nan
     held.loc[0, ["status", "message"]] = ["unstable", "it tips over"]
-    assert "no result: it tips over" in said(drawn("gap_held_out", cohort, "NAMED", held_out=held))
+    assert "no result: it tips over" in said(
+        drawn("gap_held_out", tmp_path, "NAMED", held_out=held)
+    )
 
 
 HEADLINES = {
     "NAMED": "The model lacks a neutral zone at L4L5, in flexion–extension.",
     "NULL": "Nothing is missing above the noise. An effect would have been named from a gap of "
     "0.19 noise SD (the easiest to see) to 0.35 (the hardest).",
-    "SET": "One of these is missing, at L4L5, in flexion–extension, and these tests cannot tell "
-    "which: a neutral zone or nonlinear stiffening.",
+    "SET": "One of these is missing, and these tests cannot tell which: a neutral zone or "
+    "nonlinear stiffening.",
     "UNKNOWN": "Something is missing that is none of the known effects. It shows most at L4L5, "
-    "flexion-extension, in flexion above 5 N m.",
+    "flexion–extension, test flexion.",
 }
 
 
 @pytest.mark.parametrize(("answer", "words"), HEADLINES.items())
 def test_the_verdict_is_one_sentence(answer: str, words: str) -> None:
-    assert headline(verdict_of(VERDICTS[answer])) == words
+    assert headline(verdict_of(VERDICTS[answer]), frames(answer)["where"]) == words
 
 
 def test_how_sure_a_name_is() -> None:
@@ -181,12 +213,14 @@ def test_how_sure_a_name_is() -> None:
 
 
 def test_two_effects_and_a_set_beside_a_name() -> None:
-    second = {"name": "hysteresis", "scope": {"joints": ["*"], "specimens": ["a", "b"]}}
-    both = VERDICTS["NAMED"] | {"effects": [*VERDICTS["NAMED"]["effects"], second]}
-    told = headline(verdict_of(both))
+    (first,) = VERDICTS["NAMED"]["effects"]
+    scope = {"joints": ["*"], "specimens": ["a", "b"]}
+    second = first | {"name": "hysteresis", "scope": scope}
+    both = VERDICTS["NAMED"] | {"effects": [first, second]}
+    told = headline(verdict_of(both), NOWHERE)
     assert told.endswith("; and hysteresis at all joints, in specimens a and b.")
     beside = VERDICTS["SET"] | {"effects": [second], "candidates_in_set": ["creep", "marker_bias"]}
-    assert headline(verdict_of(beside)) == (
+    assert headline(verdict_of(beside), NOWHERE) == (
         "The model lacks hysteresis at all joints, in specimens a and b. Besides, one of these is "
         "missing, and these tests cannot tell which: creep or a marker bias."
     )
@@ -195,10 +229,10 @@ def test_two_effects_and_a_set_beside_a_name() -> None:
 def test_keys_that_are_not_there_are_not_needed() -> None:
     for answer in Answer:
         bare = verdict_of({"cohort": "c", "verdict": answer.value})
-        assert headline(bare)
+        assert headline(bare, NOWHERE)
         assert how_sure(bare) == ""
-        assert findings(bare, Results({}, {}, {}, {})) == []
-        assert shown_tables(bare, Results({}, {}, {}, {})) == []
+        assert findings(bare, rows_of({})) == []
+        assert shown_tables(bare, rows_of({})) == []
     with pytest.raises(ValueError, match="PERHAPS"):
         verdict_of({"cohort": "c", "verdict": "PERHAPS"})
 
@@ -213,7 +247,7 @@ def test_errors_of_the_data_come_first() -> None:
 
 def told(answer: str, **changes: Any) -> str:
     data: Mapping[str, Any] = VERDICTS[answer] | changes
-    return " ".join(findings(verdict_of(data), Results(frames(answer), {}, {}, {})))
+    return " ".join(findings(verdict_of(data), rows_of(frames(answer))))
 
 
 def test_findings_have_sizes_places_and_noise() -> None:
@@ -225,7 +259,6 @@ def test_findings_have_sizes_places_and_noise() -> None:
     assert (
         "SD of one reading 0.10°, from repeated cycles, correlation from step to step 0.30" in words
     )
-    assert "Detected from: flexion." in words
     assert "What would show them: joint centre offset: measured translations" in words
     assert "agree within the noise" in told("NULL")
     assert "facet contact 0.20" in told("NULL")  # 0.15 + 0.3 * 0.18, rounded
@@ -236,10 +269,11 @@ def test_findings_have_sizes_places_and_noise() -> None:
 @pytest.mark.parametrize("answer", VERDICTS)
 def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
     study, cohort = study_of(tmp_path)
-    pictures = dict.fromkeys(DRAW, "<svg xmlns='http://www.w3.org/2000/svg'/>")
-    found = Results(frames(answer), {}, pictures, CAPTIONS)
-    page = discrepancy_page(study, cohort, found, verdict_of(VERDICTS[answer]))
-    assert page == discrepancy_page(study, cohort, found, verdict_of(VERDICTS[answer]))
+    svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    pictures = {one.name: Picture.of(one.name, one.title, svg, "Words.") for one in KIND.figures}
+    found = Results(tables(VERDICTS[answer], frames(answer), tmp_path), {}, pictures)
+    page = document(study, cohort, found).html(study, cohort)
+    assert page == document(study, cohort, found).html(study, cohort)
     assert f'<p class="headline">{HEADLINES[answer]}</p>' in page
     places = [page.index(f'<section id="{name}"') for name in ("findings", "figures", "segment")]
     assert places == sorted(places)
@@ -251,7 +285,7 @@ def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
 
 
 def test_tables_of_the_page_hold_the_verdict() -> None:
-    found = Results(frames("NAMED"), {}, {}, {})
+    found = rows_of(frames("NAMED"))
     titles = [table.title for table in shown_tables(verdict_of(VERDICTS["NAMED"]), found)]
     assert titles[:3] == [
         "What is missing, and how large it is",
@@ -267,49 +301,65 @@ def test_tables_of_the_page_hold_the_verdict() -> None:
 
 
 def test_the_nearest_effect_of_something_unknown_is_told_but_not_named() -> None:
-    shape = VERDICTS["UNKNOWN"]["unknown"]["shape"]
-    words = told("UNKNOWN", why=f"a discrepancy that no known effect explains: {shape}")
-    assert "Nearest known effect: neutral zone, log evidence 88.0." in words
-    assert "Nearest" not in told("UNKNOWN", why="the data look wrong")
-    place = {"where": "L5S1, right bending, test flexion_extension (gap 4.5); L4L5", "shape": ""}
-    unknown = verdict_of(VERDICTS["UNKNOWN"] | {"unknown": place})
-    assert headline(unknown).endswith("at L5S1, lateral bending, test flexion–extension.")
+    unknown = VERDICTS["UNKNOWN"]["unknown"]
+    assert "Nearest known effect: neutral zone, log evidence 88.0." in told("UNKNOWN")
+    for reason in set(Reason) - {Reason.NO_KNOWN_EFFECT}:
+        assert "Nearest" not in told("UNKNOWN", unknown=unknown | {"reason": reason.value})
+
+
+def test_what_is_unknown_shows_most_where_the_gap_is_largest() -> None:
+    where = frames("UNKNOWN")["where"]
+    moved = {"L4L5": "L5S1", "extension": "right_bending", "flexion": "flexion_extension"}
+    told = headline(verdict_of(VERDICTS["UNKNOWN"]), where.replace(moved))
+    assert told.endswith("at L5S1, lateral bending, test flexion–extension.")
+    within = where.assign(gap_low=0.0)
+    assert "most" not in headline(verdict_of(VERDICTS["UNKNOWN"]), within)
 
 
 def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
-    _, cohort = study_of(tmp_path)
     why = "the base model cannot be fitted: no start has a pose"
     data = {
         "cohort": "c",
         "verdict": "UNKNOWN",
         "why": why,
-        "unknown": {"where": "no start has a pose", "shape": "not known"},
+        "unknown": {"where": "no start has a pose", "shape": "not known", "reason": "no_base"},
     }
     verdict = verdict_of(data)
-    assert headline(verdict).startswith("Nothing can be said of what is missing")
+    assert headline(verdict, NOWHERE).startswith("Nothing can be said of what is missing")
     assert why in how_sure(verdict)
     empty = {name: rows.iloc[:0] for name, rows in frames("NULL").items()}
-    assert findings(verdict, Results(empty, {}, {}, {})) == []
-    with style():
-        for draw in DRAW.values():
-            assert re.search("No|not", said(draw(cohort, verdict, empty)))
+    assert findings(verdict, rows_of(empty)) == []
+    for name in FIGURES:
+        assert re.search("No|not", said(drawn_of(name, tmp_path, data, empty)))
 
 
 def test_no_name_is_not_always_an_unknown_effect() -> None:
-    shape = {"unknown": {"where": "no single place stands out", "shape": "load over bending"}}
-    stiffness = verdict_of(
-        VERDICTS["UNKNOWN"] | shape | {"why": "level_dependence is no more: try base per_joint"}
-    )
-    assert headline(stiffness) == "Something is missing, but no name is believed."
+    def of(reason: str, **more: Any) -> Verdict:
+        unknown = {"where": "anywhere", "shape": "load over bending", "reason": reason}
+        return verdict_of(VERDICTS["UNKNOWN"] | {"unknown": unknown} | more)
+
+    why = "level_dependence is no more: try base per_joint"
+    stiffness = of("stiffness_of_each_joint", why=why)
+    assert headline(stiffness, NOWHERE) == "Something is missing, but no name is believed."
     assert "Why no name: level dependence is no more: try base per_joint." in how_sure(stiffness)
     assert "load over bending" not in how_sure(stiffness)
-    wrong = {
-        "why": "the data look wrong, so nothing is named: a sign (L4L5)",
-        "suspected_data_errors": [{"where": "L4L5", "what": "a sign", "evidence": ""}],
-    }
-    suspected = verdict_of(VERDICTS["UNKNOWN"] | shape | wrong)
-    assert headline(suspected) == "The data look wrong, so nothing is named: a sign (L4L5)."
+    errors = [{"where": "L4L5", "what": "a sign", "evidence": ""}]
+    why = "the data look wrong, so nothing is named: a sign (L4L5)"
+    suspected = of("data_errors", why=why, suspected_data_errors=errors)
+    assert headline(suspected, NOWHERE) == (
+        "The data look wrong, so nothing is named: a sign (L4L5)."
+    )
     assert "load over bending" not in how_sure(suspected)
+    for reason in ("a_part_stays", "most_stays"):
+        stays = of(reason, why="much stays")
+        assert headline(stays, NOWHERE).endswith("none of the known effects.")
+        assert "Why no name: much stays. Its shape: load over bending." in how_sure(stays)
+
+
+@pytest.mark.parametrize("answer", VERDICTS)
+def test_what_is_written_is_read(answer: str) -> None:
+    verdict = verdict_of(VERDICTS[answer])
+    assert verdict_of(json.loads(json.dumps(plain_data(verdict)))) == verdict
 
 
 def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:
@@ -327,26 +377,29 @@ def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:
 
 
 def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
-    folder = results(project(tmp_path), "NAMED")
-    verdict = str(folder / "verdict.json")
-    name = "gap_held_out"
-    made = {kind: str(folder / f"{name}.{kind}") for kind in ("svg", "png")}
-    tables = [str(folder / f"{table}.parquet") for table in DISCREPANCY_FIGURES[name]]
-    figures_job.run(str(tmp_path), STUDY, name, tables, verdict, **made)
+    root, folder = str(tmp_path), results(project(tmp_path), "NAMED")
+    verdict, figure = str(folder / "verdict.json"), KIND.figure("effect_evidence")
+    made = {kind: str(folder / f"{figure.name}.{kind}") for kind in ("svg", "png")}
+    paths = [str(folder / f"{name}.parquet") for name in figure.tables]
+    draw.run(root, STUDY, figure.name, paths, **made, verdict=verdict)
     assert Path(made["png"]).read_bytes().startswith(b"\x89PNG")
-    report_job.run(
-        str(tmp_path),
+    files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
+    page = folder / "report.html"
+    report.run(
+        root,
         STUDY,
-        [str(folder / f"{table}.parquet") for table in TABLES],
+        [str(folder / f"{table.name}.parquet") for table in TABLES],
         [made["svg"]],
-        [str(ROOT / "workflow" / "report" / f"{name}.rst")],
-        verdict,
-        str(folder / "report.html"),
+        [str(ROOT / files.caption(figure.name))],
+        str(page),
+        verdict=verdict,
     )
-    assert TITLES[name] in (folder / "report.html").read_text()
+    assert figure.title in page.read_text()
     assert json.loads((folder / "verdict.json").read_text())["verdict"] == "NAMED"
 
 
-def test_every_figure_has_a_caption_and_a_title() -> None:
-    assert set(DRAW) == set(DISCREPANCY_FIGURES) == set(TITLES)
-    assert all(text.strip() for text in CAPTIONS.values())
+def test_every_figure_has_a_caption_and_a_title(tmp_path: Path) -> None:
+    files = DiscrepancyFiles.of(*study_of(tmp_path))
+    assert list(files.figures) == FIGURES
+    assert all((ROOT / path).read_text().strip() for path in files.captions())
+    assert all(figure.title for figure in KIND.figures)

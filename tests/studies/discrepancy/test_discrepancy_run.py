@@ -3,13 +3,12 @@
 The search itself is replaced by one that hands over made-up results: these are tests of the rules.
 """
 
-import importlib
 import shutil
 from pathlib import Path
-from types import ModuleType
 
+import discrepancy_cases as cases
 import pytest
-from small_project import Project, copy_project, written
+from small_project import Project, Shared, copy_project
 
 pytestmark = pytest.mark.slow
 
@@ -17,34 +16,39 @@ STUDY = "probe"
 FOLDER = f"results/{STUDY}/discrepancy"
 HANDING_OVER = '''"""Job: made-up results instead of a search."""
 
-import shutil
+import json
 from pathlib import Path
+
+import pyarrow.parquet as pq
+
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of
+from spinepipe.jobs.model_mark import base_marks
+from spinepipe.marks import KEY, with_mark, write_marked
 
 
 def run(root: str, study: str, **files: str) -> None:
-    """Copy each result from the folder ``made_up``."""
+    """Each result from the folder ``made_up``, with the mark that it must have."""
     assert study == "probe"
-    for path in files.values():
-        shutil.copy(Path(root, "made_up", Path(path).name), path)
+    settings, cohort = study_of(root, study)
+    known = provenance("search", settings, cohort, None, base_marks(root, settings.base.model))
+    for path in map(Path, files.values()):
+        made = Path(root, "made_up", path.name)
+        if path.suffix == ".parquet":
+            pq.write_table(pq.read_table(made).replace_schema_metadata(known), path)
+        elif path.suffix == ".json":
+            path.write_text(json.dumps(with_mark(json.loads(made.read_text()), known[KEY])))
+        else:
+            write_marked(made.read_text(), path, known[KEY])
 '''
 
 
-def made_up_cases() -> ModuleType:
-    """The made-up results of the unit tests, whose folder pytest knows only when it runs them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(Path(__file__).parents[1] / "unit")
-        return importlib.import_module("discrepancy_cases")
-
-
-@pytest.fixture(scope="module")
-def searched(tmp_path_factory: pytest.TempPathFactory) -> Project:
+def build(folder: Path) -> Project:
     """A project with a study whose results were all made by Snakemake."""
-    cases = made_up_cases()
-    project = copy_project(tmp_path_factory.mktemp("searched") / "project")
+    project = copy_project(folder)
     shutil.rmtree(project.path("config"))
     cases.project(project.folder, "base: {model: base.yaml}\n")
-    search = project.path("spinepipe/jobs/discrepancy/search.py")
-    search.write_text(HANDING_OVER)
+    project.job("discrepancy", "search").write_text(HANDING_OVER)
     model = "model: m\ncohort: chains\neffects: [{effect: linear_bushing}]\n"
     made = cases.results(project.folder, "NAMED")
     for name in ("model_base.yaml", "model_with_effects.yaml"):
@@ -52,8 +56,14 @@ def searched(tmp_path_factory: pytest.TempPathFactory) -> Project:
     made.rename(project.path("made_up"))
     shutil.rmtree(project.path("results"))
     project.path("base.yaml").write_text(model)
-    project.run_all()
+    project.run()
     return project
+
+
+@pytest.fixture
+def searched(shared: Shared) -> Project:
+    """The same, built once and not to be changed."""
+    return shared.project("made_up_search", build)
 
 
 def test_the_verdict_and_all_around_it_are_made(searched: Project) -> None:
@@ -63,29 +73,19 @@ def test_the_verdict_and_all_around_it_are_made(searched: Project) -> None:
     assert made >= {"model_base.yaml", "model_with_effects.yaml", "figures/gap_map.png"}
     report = searched.path(f"{FOLDER}/report.html").read_text()
     assert "The model lacks a neutral zone" in report
-    before = searched.files()
-    searched.run_all()
-    assert written(before, searched.files()) == set()
 
 
 def test_the_verdict_alone_needs_no_picture(searched: Project, tmp_path: Path) -> None:
-    project = Project(tmp_path / "project")
-    shutil.copytree(searched.folder, project.folder)
+    project = searched.copy(tmp_path / "project")
+    assert project.planned() == set()
     shutil.rmtree(project.path("results"))
-    done = project.snakemake("-j2", f"{FOLDER}/verdict.json")
-    assert done.returncode == 0, done.stdout
-    assert not [name for name in project.files() if "figures" in name or name.endswith(".html")]
+    planned = project.planned(f"{FOLDER}/verdict.json")
+    assert f"{STUDY}/discrepancy/verdict.json" in planned
+    assert not [name for name in planned if "figures" in name or name.endswith(".html")]
 
 
 def test_another_base_is_another_search(searched: Project, tmp_path: Path) -> None:
-    project = Project(tmp_path / "project")
-    shutil.copytree(searched.folder, project.folder)
-    before = project.files()
+    project = searched.copy(tmp_path / "project")
     project.edit("base.yaml", "model: m", "model: other")
-    project.run_all()
-    assert f"{STUDY}/discrepancy/verdict.json" in written(before, project.files())
-
-
-def test_lint_finds_nothing_in_the_rules_of_a_search(searched: Project) -> None:
-    done = searched.snakemake("--lint")
-    assert done.returncode == 0, done.stdout
+    assert f"{STUDY}/discrepancy/verdict.json" in project.rerun(f"{FOLDER}/verdict.json")
+    assert project.planned(f"{FOLDER}/verdict.json") == set()

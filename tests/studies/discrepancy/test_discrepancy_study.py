@@ -9,12 +9,12 @@ import pytest
 from chain_cases import DEGREES, STUDY, Chains
 
 from spinepipe.effects import Spread, Trial, registry
-from spinepipe.jobs.layouts import files_of
-from spinepipe.jobs.settings import relevant_settings
+from spinepipe.jobs.digest import settings_of
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import effects_to_try
+from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
 from spinepipe.studies.discrepancy.settings import Discrepancy
 
 A = np.array([[50.0, 60.0, 200.0]] * 3)
@@ -194,11 +194,10 @@ def test_cycles_of_other_tests_are_no_repeats(tmp_path: Path) -> None:
 def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
     study = model(tmp_path, name="results/other/model_with_effects.yaml")
     written(tmp_path, study)
-    found, cohort = studies.check(tmp_path, STUDY)
+    found, _ = studies.check(tmp_path, STUDY)
     assert isinstance(found, Discrepancy)
     assert found.base.model == "results/other/model_with_effects.yaml"
-    files = files_of(found, cohort)
-    assert files.base_model() == [found.base.model]  # type: ignore[attr-defined]
+    assert KIND.job("search").reads_base
 
 
 @pytest.mark.parametrize(
@@ -265,20 +264,24 @@ def test_effects_that_say_how_are_tried_and_no_others() -> None:
 
 def test_all_results_lie_in_one_folder(tmp_path: Path) -> None:
     written(tmp_path)
-    results = set(files_of(*studies.check(tmp_path, STUDY)).results())
+    study, cohort = studies.check(tmp_path, STUDY)
+    assert isinstance(study, Discrepancy)
+    files = DiscrepancyFiles.of(study, cohort)
+    results = set(files.results())
     tables = {"gap", "candidates", "where", "confusions", "held_out"}
     named = {f"{name}.parquet" for name in tables}
     named |= {"verdict.json", "model_base.yaml", "model_with_effects.yaml", "report.html"}
     folder = f"results/{STUDY}/discrepancy"
     assert {f"{folder}/{name}" for name in named} <= results
     assert all(file.startswith(f"{folder}/") for file in results)
-    assert files_of(*studies.check(tmp_path, STUDY)).lost() == []
+    assert files.lost() == []
 
 
 def test_every_setting_counts_for_the_search(tmp_path: Path) -> None:
     written(tmp_path)
     study, _ = studies.check(tmp_path, STUDY)
-    assert set(relevant_settings("discrepancy.search", study)) == set(Discrepancy.model_fields)
+    counted = settings_of(study, KIND.job("search").ignores)
+    assert set(counted) == set(Discrepancy.model_fields)
 
 
 def test_every_field_is_described() -> None:

@@ -14,10 +14,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from chain_cases import DEGREES, JOINTS, MILLIMETRES, STUDY, Chains
+from discrepancy_cases import files_of_a_search
 
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
+from spinepipe.studies.discrepancy.kind import TABLES
 from spinepipe.units import STIFFNESS_COLUMNS
 
 pytestmark = pytest.mark.slow
@@ -87,10 +88,9 @@ def searched(made: Chains, root: Path, study: str = PER_SPECIMEN) -> dict[str, A
     (root / f"config/studies/{STUDY}.yaml").write_text(head + study + FEW)
     folder = root / "results" / STUDY / "discrepancy"
     folder.mkdir(parents=True)
-    names = [*(f"{name}.parquet" for name in TABLES), *OTHERS]
-    search.run(str(root), STUDY, **{name.split(".")[0]: str(folder / name) for name in names})
-    for name in TABLES:
-        assert_no_nan(folder / f"{name}.parquet")
+    search.run(str(root), STUDY, **files_of_a_search(folder))
+    for table in TABLES:
+        assert_no_nan(folder / f"{table.name}.parquet")
     for name in ("model_base", "model_with_effects"):
         read_model(folder / f"{name}.yaml")
     text = (folder / "verdict.json").read_text()

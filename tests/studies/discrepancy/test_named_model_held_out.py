@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from discrepancy_cases import files_of_a_search
 
 from spinepipe.studies.cohort_stiffness import fit
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
@@ -67,8 +67,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     studies_of(root)
     folder = root / "results" / "lack" / "discrepancy"
     folder.mkdir(parents=True)
-    names = [*(f"{name}.parquet" for name in TABLES), *OTHERS]
-    search.run(str(root), "lack", **{name.split(".")[0]: str(folder / name) for name in names})
+    search.run(str(root), "lack", **files_of_a_search(folder))
     return root
 
 

@@ -9,17 +9,16 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from chain_cases import JOINTS, STUDY
-from discrepancy_cases import project
+from discrepancy_cases import files_of_a_search, project
 
+from spinepipe.jobs import draw, report
+from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model.file import effects_for, read_model
-from spinepipe.studies.discrepancy import draw as figures
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy import report
-from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES, OTHERS, TABLES
-from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
+from spinepipe.studies.discrepancy.settings import Discrepancy
 
 ROOT = Path(__file__).resolve().parents[3]
-SCHEMAS = {table.name: table for table in (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)}
 START = [149000.0, 1890000.0, 135000.0, 51.0, 68.8, 291.0]
 """Default stiffness of studies (docs/studies/discrepancy.md): N/m, then N m/rad."""
 
@@ -33,8 +32,7 @@ def searched(root: Path, study: str = "base: {stiffness: per_specimen}\n") -> Pa
     loads.to_csv(path, index=False)
     folder = root / "results" / STUDY / "discrepancy"
     folder.mkdir(parents=True)
-    names = [*(f"{name}.parquet" for name in TABLES), *OTHERS]
-    search.run(str(root), STUDY, **{name.split(".")[0]: str(folder / name) for name in names})
+    search.run(str(root), STUDY, **files_of_a_search(folder))
     return folder
 
 
@@ -53,7 +51,7 @@ def test_the_verdict_says_that_nothing_is_known_and_why(verdict: Mapping[str, An
     assert verdict["verdict"] == "UNKNOWN"
     assert verdict["why"].startswith("the base model cannot be fitted: a, test flexion, step 2")
     assert verdict["effects"] == verdict["candidates_in_set"] == []
-    assert set(verdict["unknown"]) == {"where", "shape"}
+    assert set(verdict["unknown"]) == {"where", "shape", "reason"}
     assert "flexion" in verdict["unknown"]["where"]
     sizes = [v for key in ("gap", "rms_residual") for k, v in verdict[key].items() if k != "unit"]
     assert sizes == [None] * 9
@@ -66,8 +64,8 @@ def test_the_mistake_is_pointed_to(verdict: Mapping[str, Any]) -> None:
 
 
 def test_tables_hold_their_schemas_and_no_rows(folder: Path) -> None:
-    for name, schema in SCHEMAS.items():
-        table = pq.read_table(folder / f"{name}.parquet")
+    for schema in TABLES:
+        table = pq.read_table(folder / f"{schema.name}.parquet")
         assert table.num_rows == 0
         assert table.column_names == [column.name for column in schema.columns]
 
@@ -93,17 +91,19 @@ def test_a_model_file_stays_the_start_that_it_was(tmp_path: Path) -> None:
 
 
 def test_figures_and_report_cope(folder: Path) -> None:
-    verdict, drawn = str(folder / "verdict.json"), []
-    for name, tables in DISCREPANCY_FIGURES.items():
-        paths = [str(folder / f"{table}.parquet") for table in tables]
-        svg, png = str(folder / f"{name}.svg"), str(folder / f"{name}.png")
-        figures.run(str(folder.parents[2]), STUDY, name, paths, verdict, svg, png)
+    root, verdict, drawn = str(folder.parents[2]), str(folder / "verdict.json"), []
+    for figure in KIND.figures:
+        paths = [str(folder / f"{table}.parquet") for table in figure.tables]
+        svg, png = str(folder / f"{figure.name}.svg"), str(folder / f"{figure.name}.png")
+        others = {"verdict": verdict} if "verdict.json" in figure.reads else {}
+        draw.run(root, STUDY, figure.name, paths, svg, png, **others)
         drawn.append(svg)
         assert "can be shown" in Path(svg).read_text()
-    captions = [str(ROOT / f"workflow/report/{name}.rst") for name in DISCREPANCY_FIGURES]
-    paths = [str(folder / f"{table}.parquet") for table in TABLES]
+    files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
+    paths = [str(folder / f"{table.name}.parquet") for table in TABLES]
+    captions = [str(ROOT / path) for path in files.captions()]
     output = folder / "report.html"
-    report.run(str(folder.parents[2]), STUDY, paths, drawn, captions, verdict, str(output))
+    report.run(root, STUDY, paths, drawn, captions, str(output), verdict=verdict)
     page = output.read_text()
     assert "he base model cannot be fitted: a, test flexion" in page
     assert "Look at the data first: all specimens" in page

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from spinepipe.effects import Spread
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
-from spinepipe.studies.discrepancy.search.outcome import Outcome, Verdict, outcome
+from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
+from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
 
 MARGIN = 3.0
 SHAPE = "load over the joint's own extension, shared"
@@ -64,7 +64,7 @@ def says(found: Found, **more: Any) -> tuple[str, str]:
 
 
 def assert_unknown(result: Outcome, *words: str) -> None:
-    assert (result.verdict, result.named, result.tied) == (Verdict.UNKNOWN, (), ())
+    assert (result.verdict, result.named, result.tied) == (Answer.UNKNOWN, (), ())
     for word in words:
         assert word in result.why
 
@@ -220,7 +220,7 @@ def test_ties_come_after_what_is_unexplained_or_unproven() -> None:
 def test_rivals_within_the_margin_make_a_set() -> None:
     rivals = [("hysteresis", -0.5), ("load_offset", 2.9), ("marker_bias", 3.0)]
     result = outcome(ended(stands(rivals=rivals)), MARGIN)
-    assert (result.verdict, result.named) == (Verdict.SET, ())
+    assert (result.verdict, result.named) == (Answer.SET, ())
     assert result.tied == ("creep", "hysteresis", "load_offset")
     assert "creep, hysteresis or load_offset" in result.why
 
@@ -228,7 +228,7 @@ def test_rivals_within_the_margin_make_a_set() -> None:
 def test_beside_a_tie_what_is_sure_is_named() -> None:
     sure = stands("local_laxity")
     result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)
-    assert (result.verdict, result.named) == (Verdict.SET, (sure,))
+    assert (result.verdict, result.named) == (Answer.SET, (sure,))
     assert result.tied == ("creep", "hysteresis")
 
 
@@ -236,7 +236,7 @@ def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
     one = stands("creep", rivals=[("hysteresis", 1.0), ("load_offset", 9.0)])
     other = stands("hysteresis", rivals=[("creep", 0.5)])
     result = outcome(ended(one, other), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (Verdict.NAMED, (one, other), ())
+    assert (result.verdict, result.named, result.tied) == (Answer.NAMED, (one, other), ())
     assert result.why.startswith("creep and hysteresis: ")
 
 
@@ -248,5 +248,27 @@ def test_an_effect_in_two_coordinates_has_one_name() -> None:
 
 def test_without_evidence_for_anything_nothing_is_missing() -> None:
     result = outcome(ended(), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (Verdict.NULL, (), ())
+    assert (result.verdict, result.named, result.tied) == (Answer.NULL, (), ())
     assert "no effect" in result.why
+
+
+@pytest.mark.parametrize(
+    ("found", "more", "reason"),
+    [
+        (ended(), {"errors": [ERROR]}, Reason.DATA_ERRORS),
+        (ended(lack=50.0), {}, Reason.NO_KNOWN_EFFECT),
+        (ended(stands(), lack=10.0), {}, Reason.A_PART_STAYS),
+        (ended(stands(), left=Gap(1900.0, 1000.0, 1000)), {}, Reason.MOST_STAYS),
+        (ended(stands(), stands("load_offset", alone=1.0)), {}, Reason.IMITATED_TOGETHER),
+        (ended(stands(over_stiffness=0.0)), {}, Reason.STIFFNESS_OF_EACH_JOINT),
+        (ended(stands()), {"proof": proof(-5.0)}, Reason.NOT_PROVEN),
+        (ended(stands()), {}, None),
+        (ended(), {}, None),
+    ],
+)
+def test_why_there_is_no_name_is_told_to_programs_too(
+    found: Found, more: dict[str, Any], reason: Reason | None
+) -> None:
+    result = outcome(found, MARGIN, **more)
+    assert result.reason is reason
+    assert (result.verdict is Answer.UNKNOWN) == (reason is not None)

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 from chain_cases import JOINTS, STUDY
-from discrepancy_cases import SPECIMENS, project
+from discrepancy_cases import SPECIMENS, files_of_a_search, project
 
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 
 MODEL = """\
 model: given
@@ -35,8 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = f"base: {{model: {root / 'given.yaml'}}}\neffects: [hysteresis]\nbootstrap: 100\n"
     made = project(root, lines) / "results" / STUDY / "discrepancy"
     made.mkdir(parents=True)
-    names = [*(f"{name}.parquet" for name in TABLES), *OTHERS]
-    search.run(str(root), STUDY, **{name.split(".")[0]: str(made / name) for name in names})
+    search.run(str(root), STUDY, **files_of_a_search(made))
     return made
 
 

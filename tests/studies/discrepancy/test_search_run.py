@@ -4,20 +4,21 @@ A straight chain turns joint by joint, so its flexion under a law k q + r q^3 is
 cubic, solved here by numpy: the hidden truth is stiffening, and nothing of spinepipe makes it.
 """
 
-import importlib
 import json
 import re
 import shutil
 from pathlib import Path
 
+import chain_cases as cases
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from small_project import Project, copy_project, written
+from small_project import Project, Shared, copy_project, written
+
+from spinepipe.studies.registry import kind_of
 
 pytestmark = pytest.mark.slow
 
-UNIT = Path(__file__).parents[1] / "unit"
 STUDY = "probe"
 FOLDER = f"results/{STUDY}/discrepancy"
 SETTINGS = """\
@@ -46,8 +47,6 @@ def chains(root: Path) -> None:
     """A project with that cohort, read in two cycles with noise of 0.05 deg, and its study."""
     linear = {name: np.array([[k, 60.0, 200.0]] * 3) for name, k in STIFFNESS.items()}
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(UNIT)
-        cases = importlib.import_module("chain_cases")
         patch.setitem(cases.MOMENT_OF, "extension", ("mz_nm", 1.0, "extension"))
         made = cases.Chains(linear, tuple(SIGN), steps=6, step_nm=1.5, cycles=2, noise_deg=0.05)
     for row in made.motion.itertuples():
@@ -57,14 +56,19 @@ def chains(root: Path) -> None:
     (root / f"config/studies/{STUDY}.yaml").write_text(SETTINGS)
 
 
-@pytest.fixture(scope="module")
-def searched(tmp_path_factory: pytest.TempPathFactory) -> Project:
+def build(folder: Path) -> Project:
     """The project after one run of everything."""
-    project = copy_project(tmp_path_factory.mktemp("really_searched") / "project")
+    project = copy_project(folder)
     shutil.rmtree(project.path("config"))
     chains(project.folder)
-    project.run_all()
+    project.run()
     return project
+
+
+@pytest.fixture
+def searched(shared: Shared) -> Project:
+    """The same, built once and not to be changed."""
+    return shared.project("search", build)
 
 
 def test_the_search_finds_what_the_chains_hide(searched: Project) -> None:
@@ -79,7 +83,7 @@ def test_every_result_is_there_and_holds_its_schema(searched: Project) -> None:
     rows = {}
     for name in TABLES:
         table = pq.read_table(searched.path(f"{FOLDER}/{name}.parquet"))
-        schema = getattr(importlib.import_module("spinepipe.tables"), name.upper())
+        schema = kind_of("discrepancy").table(name)
         assert table.column_names == [column.name for column in schema.columns]
         rows[name] = table.num_rows
     assert rows["gap"] == 2 * 2 * 6 * 3 * 3  # specimens, tests, steps, joints, rotations
@@ -96,18 +100,11 @@ def test_the_report_opens_alone(searched: Project) -> None:
     assert not re.search(r"""<(script|link|img|iframe)[^>]+(src|href)=["'](https?:)?//""", page)
 
 
-def test_a_second_run_makes_nothing(searched: Project) -> None:
-    before = searched.files()
-    searched.run_all()
-    assert written(before, searched.files()) == set()
-
-
 def test_a_search_made_again_finds_its_pieces(searched: Project, tmp_path: Path) -> None:
-    project = Project(tmp_path / "project")
-    shutil.copytree(searched.folder, project.folder)
+    project = searched.copy(tmp_path / "project")
+    assert project.planned() == set()
     before, contents = project.files(), project.contents()
-    done = project.snakemake("-j2", "--force", f"{FOLDER}/verdict.json")
-    assert done.returncode == 0, done.stdout
+    project.run("--force", f"{FOLDER}/verdict.json")
     made = written(before, project.files())
     assert f"{STUDY}/discrepancy/verdict.json" in made
     assert not [name for name in made if "/store/" in name]

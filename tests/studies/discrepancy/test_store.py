@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.kept import MARK, SUFFIX
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.store import Store, content_digest
 
-MODULE = "spinepipe.jobs.discrepancy.search"
+MODULE = "spinepipe.studies.discrepancy.job"
 
 CALLS: list[Any] = []
 """What was really computed."""

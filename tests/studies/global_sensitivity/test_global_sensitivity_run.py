@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from lever import FORCE_N, MEASURED_DEG, POINT_MM, lever, table
-from small_project import Project
+from small_project import Project, Shared
+
+pytestmark = pytest.mark.slow
 
 SHARES = {"load_point_x": 0.8, "load_point_y": 0.2, "bending": 0.0, "dummy": 0.0}
 
@@ -23,17 +25,27 @@ def moment_nm(design: pd.DataFrame) -> "pd.Series[float]":
     return x * FORCE_N[1] - y * FORCE_N[0]
 
 
-@pytest.fixture(scope="module")
-def computed(tmp_path_factory: pytest.TempPathFactory) -> Project:
-    """Two studies alike but for how many samples a job computes."""
-    folder = tmp_path_factory.mktemp("lever") / "project"
-    project = lever(folder, ("single", 64, ""), ("batches", 64, "samples_per_target: 50"))
-    project.run_all()
+def build(folder: Path) -> Project:
+    """A study large enough to tell shares; two that differ in how many samples a job computes."""
+    few = ("single", 8, ""), ("batches", 8, "samples_per_target: 7")
+    project = lever(folder, ("known", 64, "samples_per_target: 100"), *few)
+    project.run(*(file for name in ("known", "single", "batches") for file in tables(name)))
     return project
 
 
+def tables(study: str) -> list[str]:
+    """The last tables of a study; all others are made for them."""
+    return [f"results/{study}/{name}.parquet" for name in ("indices", "convergence")]
+
+
+@pytest.fixture
+def computed(shared: Shared) -> Project:
+    """The same, built once and not to be changed."""
+    return shared.project("lever", build)
+
+
 def test_known_shares_lie_in_their_intervals(computed: Project) -> None:
-    rows = table(computed, "single", "indices")
+    rows = table(computed, "known", "indices")
     assert set(rows["specimen"]) == {"a", "b"}
     assert set(rows["output"]) == {"motion", "joint_load"}
     assert (rows["status"] == "done").all()
@@ -47,10 +59,10 @@ def test_known_shares_lie_in_their_intervals(computed: Project) -> None:
 
 def test_motion_is_the_lever_s(computed: Project) -> None:
     """Each run by hand: moment of the force about the joint over its stiffness, 51 N m/rad."""
-    design = table(computed, "single", "design").pivot(
+    design = table(computed, "known", "design").pivot(
         index="sample", columns="factor", values="value"
     )
-    responses = table(computed, "single", "responses")
+    responses = table(computed, "known", "responses")
     responses = responses[responses["specimen"] == "a"].set_index("sample")
     moment = moment_nm(design)
     found = responses["load_extension_nm"].reindex(design.index)
@@ -65,7 +77,7 @@ def test_samples_per_target_change_no_row(computed: Project) -> None:
         name: len(list(computed.path(f"results/{name}/{jobs}").glob("*.parquet")))
         for name in ("single", "batches")
     }
-    assert count == {"single": 384, "batches": 8}
+    assert count == {"single": 48, "batches": 7}
     for name in ("design", "responses", "indices", "convergence"):
         one, other = (table(computed, study, name) for study in ("single", "batches"))
         pd.testing.assert_frame_equal(one, other)
@@ -74,16 +86,15 @@ def test_samples_per_target_change_no_row(computed: Project) -> None:
 def test_a_lost_sample_is_computed_again_and_nothing_else_changes(
     computed: Project, tmp_path: Path
 ) -> None:
-    project = lever(tmp_path / "project", ("single", 64, ""))
-    done = project.snakemake("-j1", "all")
-    assert done.returncode == 0, done.stdout
+    project = lever(tmp_path / "project", ("single", 8, ""))
+    project.run(cores=1)
     before, files = project.contents(), project.files()
     for name, content in before.items():
         if name.endswith("parquet"):  # made on one core, the other on two
             assert computed.path(f"results/{name}").read_bytes() == content, name
     lost = "single/jobs/responses/specimen=b/batch=00017.parquet"
     project.path(f"results/{lost}").unlink()
-    project.run_all()
+    project.run()
     after = project.files()
     assert after[lost] != files[lost]
     others = {name for name in files if "/jobs/" in name and name != lost}
@@ -97,7 +108,7 @@ def test_calibrated_stiffness_is_the_lever_s(tmp_path: Path) -> None:
     project = lever(tmp_path / "project", ("fitted", 16, more))
     project.edit("config/studies/fitted.yaml", "sd: 5", "sd: 0.5")
     project.edit("config/studies/fitted.yaml", "joint_load: [extension]}", "stiffness: true}")
-    project.run_all()
+    project.run()
     design = table(project, "fitted", "design").pivot(
         index="sample", columns="factor", values="value"
     )

@@ -4,11 +4,15 @@ Everything but the solve is the product's: the design, batches, tables, indices,
 figures and report. Ishigami & Homma 1990, a = 7, b = 0.1.
 """
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 from known_indices import ishigami, morris_truth
 from lever import lever, table
-from small_project import Project
+from small_project import Project, Shared
+
+pytestmark = pytest.mark.slow
 
 SAMPLES = {"sobol": 1024, "fast": 2048, "morris": 500}
 NAMES = {"load_point_x": "x1", "load_point_y": "x2", "load_point_z": "x3"}
@@ -29,17 +33,17 @@ outputs: {{motion: [extension], joint_load: []}}
 STAND_IN = '''
 """Ishigami's function of the first three factors, in place of a solve."""
 
-from pathlib import Path
-
 import numpy as np
 import pyarrow.parquet as pq
 
-from spinepipe.studies.read import check
-from spinepipe.tables import RESPONSES, to_arrow, write
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of
+from spinepipe.studies.global_sensitivity.tables import RESPONSES
+from spinepipe.tables import to_arrow, write
 
 
 def run(root, study, design, specimen, batch, output):
-    settings, cohort = check(Path(root), study)
+    settings, cohort = study_of(root, study)
     size = settings.batch_size(1)
     values = pq.read_table(design).column("value").to_numpy().reshape(settings.n_runs, -1)
     part = values[int(batch) * size : (int(batch) + 1) * size]
@@ -55,21 +59,27 @@ def run(root, study, design, specimen, batch, output):
         status=["converged"] * len(part),
         message=[""] * len(part),
     )
-    write(to_arrow(table, columns), output, {})
+    known = provenance("respond", settings, cohort, [specimen], [str(size)])
+    write(to_arrow(table, columns), output, known)
 '''
 
 
-@pytest.fixture(scope="module")
-def computed(tmp_path_factory: pytest.TempPathFactory) -> Project:
+def build(folder: Path) -> Project:
     """A study by each method, the engine of its copy of the project replaced."""
-    project = lever(tmp_path_factory.mktemp("ishigami") / "project")
-    project.path("spinepipe/jobs/global_sensitivity/respond.py").write_text(STAND_IN)
+    project = lever(folder)
+    project.job("global_sensitivity", "respond").write_text(STAND_IN)
     for method, samples in SAMPLES.items():
         text = STUDY.format(method=method, samples=samples)
         project.path(f"config/studies/{method}.yaml").write_text(text)
     project.path("config/config.yaml").write_text(f"studies: [{', '.join(SAMPLES)}]\n")
-    project.run_all()
+    project.run()
     return project
+
+
+@pytest.fixture
+def computed(shared: Shared) -> Project:
+    """The same, built once and not to be changed."""
+    return shared.project("ishigami", build)
 
 
 def beside_truth(rows: pd.DataFrame, truth: dict[tuple[str, str, str], float]) -> pd.DataFrame:

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, Chains
+from drawn import caption, drawings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort, read
-from spinepipe.report.global_sensitivity import DRAW
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.global_sensitivity.figures.panels import (
     leading,
@@ -33,14 +33,16 @@ from spinepipe.studies.global_sensitivity.findings import (
     opening,
     settled,
 )
-from spinepipe.studies.global_sensitivity.page import TITLES, sensitivity_page, shown_tables
+from spinepipe.studies.global_sensitivity.kind import KIND
+from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
-from spinepipe.tables import Table, from_rows
+from spinepipe.tables import Table, Tables, from_rows
 
 Rows = list[dict[str, Any]]
 
 ROOT = Path(__file__).resolve().parents[3]
+DRAW = drawings("global_sensitivity")
 SLOPES = {"load_size": 4.0, "load_point_x": 2.0, "mass": 0.2, "damping": 0.0, "dummy": 0.0}
 """Of independent standard normals: S1 = ST = slope squared over their sum, mu* = |slope|."""
 
@@ -199,11 +201,17 @@ def study(method: str = "sobol", **more: Any) -> GlobalSensitivity:
     )
 
 
-def drawn(name: str, cohort: Cohort, *frames: pd.DataFrame) -> Figure:
+def drawn(name: str, cohort: Cohort, **tables: pd.DataFrame) -> Figure:
     with style():
-        figure = DRAW[name](cohort, *frames)
+        figure = DRAW[name](study(), cohort, Tables(tables))
         assert picture(figure, "svg")
     return figure
+
+
+def top_factors(
+    cohort: Cohort, responses: pd.DataFrame, design: pd.DataFrame, found: pd.DataFrame
+) -> Figure:
+    return drawn("top_factors", cohort, responses=responses, design=design, indices=found)
 
 
 def titles(figure: Figure) -> list[str]:
@@ -234,7 +242,7 @@ def labels(axis: Axes) -> list[str]:
 
 
 def test_a_bar_for_each_index_of_each_factor_in_order(cohort: Cohort) -> None:
-    figure = drawn("factor_indices", cohort, indices())
+    figure = drawn("factor_indices", cohort, indices=indices())
     assert len(titles(figure)) == 12, "2 outputs x 2 tests x 3 joints"
     first = figure.axes[0]
     names = ["load size", "load point x", "mass", "damping", "dummy (no effect)"]
@@ -250,17 +258,17 @@ def test_a_bar_for_each_index_of_each_factor_in_order(cohort: Cohort) -> None:
 
 
 def test_intervals_are_drawn_at_their_ends(cohort: Cohort) -> None:
-    axis = drawn("factor_indices", cohort, indices()).axes[0]
+    axis = drawn("factor_indices", cohort, indices=indices()).axes[0]
     ends = {tuple(np.round(x_of(line), 9)) for line in axis.lines}
     share = 16.0 / WHOLE
     assert (round(share - HALF, 9), round(share + HALF, 9)) in ends
-    fast = drawn("factor_indices", cohort, indices("fast"))
+    fast = drawn("factor_indices", cohort, indices=indices("fast"))
     assert "interval" not in said(fast)
     assert len(fast.axes[0].lines) == 1, "the line at 0"
 
 
 def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> None:
-    figure = drawn("factor_indices", cohort, indices("latin_hypercube"))
+    figure = drawn("factor_indices", cohort, indices=indices("latin_hypercube"))
     axis = figure.axes[0]
     (band,) = bands(axis)
     assert band.get_x() + band.get_width() == pytest.approx(FLOOR["PAWN"])
@@ -270,15 +278,15 @@ def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> N
     assert colors[0] == "#000000"
     assert set(colors[2:]) == {"#767676"}
     assert "noise floor of the dummy" in said(figure)
-    sobol = drawn("factor_indices", cohort, indices())
+    sobol = drawn("factor_indices", cohort, indices=indices())
     assert not bands(sobol.axes[0])
     assert "the dummy's index is exactly 0 in this design" in said(sobol)
-    bare = drawn("factor_indices", cohort, indices(factors=tuple(SLOPES)[:-1]))
+    bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1]))
     assert "no dummy, so no noise floor" in said(bare)
 
 
 def test_effects_have_the_unit_of_their_output(cohort: Cohort) -> None:
-    figure = drawn("factor_indices", cohort, indices("morris"))
+    figure = drawn("factor_indices", cohort, indices=indices("morris"))
     assert [axis.get_xlabel() for axis in figure.axes[:12]] == ["μ*, σ (°)"] * 6 + [
         "μ*, σ (N m)"
     ] * 6
@@ -289,7 +297,7 @@ def test_each_test_is_shown_in_the_coordinate_that_it_loads(cohort: Cohort) -> N
     assert loaded(cohort, "flexion") == ("extension", 3)
     assert loaded(cohort, "left_axial_rotation") == ("left_rotation", 3)
     assert loaded(cohort, "nobody did this") is None
-    figure = drawn("factor_indices", cohort, indices())
+    figure = drawn("factor_indices", cohort, indices=indices())
     assert titles(figure)[0] == "Flexion, L3L4\nMotion, flexion–extension"
     assert titles(figure)[-1] == "Left axial rotation, L5S1\nMoment, axial rotation"
 
@@ -302,7 +310,7 @@ def test_a_force_beside_the_spine_loads_by_its_lever() -> None:
 def test_several_specimens_are_means_with_dots(cohort: Cohort) -> None:
     found = indices(specimens=("a", "b"))
     doubled = found["estimate"].where(found["specimen"] == "a", 0.5 * found["estimate"])
-    figure = drawn("factor_indices", cohort, found.assign(estimate=doubled))
+    figure = drawn("factor_indices", cohort, indices=found.assign(estimate=doubled))
     assert len(titles(figure)) == 4
     widths = [bar.get_width() for bar in figure.axes[0].containers[0]]
     assert widths[0] == pytest.approx(0.75 * 16.0 / WHOLE)
@@ -313,7 +321,7 @@ def test_several_specimens_are_means_with_dots(cohort: Cohort) -> None:
 
 def test_factors_without_effect_leave_room_for_the_others(cohort: Cohort) -> None:
     many = (*SLOPES, *(f"landmark_{n}" for n in range(40)))
-    figure = drawn("factor_indices", cohort, indices(factors=many))
+    figure = drawn("factor_indices", cohort, indices=indices(factors=many))
     assert len(labels(figure.axes[0])) == 7
     assert labels(figure.axes[0])[-1] == "dummy (no effect)"
     assert "38 more factors without any effect" in said(figure)
@@ -348,13 +356,13 @@ def test_calibrated_stiffness_has_its_own_panels(cohort: Cohort) -> None:
     found = indices()
     own = found[(found["output"] == "motion") & (found["test"] == "flexion")]
     own = own[own["joint"] == JOINTS[0]].assign(output="stiffness", test="*", joint="*", step=None)
-    figure = drawn("factor_indices", cohort, pd.concat([found, own]))
+    figure = drawn("factor_indices", cohort, indices=pd.concat([found, own]))
     assert titles(figure)[-2:] == ["Stiffness, flexion–extension", "Stiffness, axial rotation"]
 
 
 def test_convergence_shows_leading_factors_and_the_dummy(cohort: Cohort) -> None:
     found = indices()
-    figure = drawn("index_convergence", cohort, convergence(found), found)
+    figure = drawn("index_convergence", cohort, convergence=convergence(found), indices=found)
     assert len(titles(figure)) == 4, "12 panels are too many: joints together"
     axis = figure.axes[0]
     line = next(line for line in axis.lines if line.get_label() == "load size")
@@ -369,12 +377,13 @@ def test_convergence_shows_leading_factors_and_the_dummy(cohort: Cohort) -> None
     assert axis.get_xscale() == "log"
     assert len(axis.collections) == 4, "a band for each line"
     whole = convergence(found).query("runs == 3072")
-    assert "no smaller part" in said(drawn("index_convergence", cohort, whole, found))
+    alone = drawn("index_convergence", cohort, convergence=whole, indices=found)
+    assert "no smaller part" in said(alone)
 
 
 def test_runs_over_the_leading_factors(cohort: Cohort) -> None:
     responses, design = runs()
-    figure = drawn("top_factors", cohort, responses, design, indices())
+    figure = top_factors(cohort, responses, design, indices())
     first = figure.axes[:3]
     assert [axis.get_xlabel() for axis in first] == [
         "load size (times)",
@@ -395,7 +404,7 @@ def test_a_group_is_shown_by_the_member_that_the_output_follows(cohort: Cohort) 
     responses, design = runs(load_size="rig", load_point_x="rig")
     grouped = indices(factors=("rig", "mass", "damping", "dummy"))
     grouped.loc[grouped["factor"] == "rig", "estimate"] = 0.99
-    figure = drawn("top_factors", cohort, responses, design, grouped)
+    figure = top_factors(cohort, responses, design, grouped)
     assert figure.axes[0].get_xlabel() == "load size (times)"
     assert titles(figure)[0] == "in a group"
     assert "of a group the factor" in said(figure)
@@ -416,20 +425,22 @@ def test_nothing_to_show_is_said_with_its_reason(cohort: Cohort) -> None:
     why = "40 failed runs: 90 of 256 base samples left out"
     lost = indices().assign(status="too_many_failed", message=why, estimate=np.nan)
     responses, design = runs(60, 0)
-    for name, frames in {
-        "factor_indices": (lost,),
-        "index_convergence": (convergence(lost), lost),
-        "top_factors": (responses, design, lost),
-    }.items():
-        assert why in said(drawn(name, cohort, *frames))
+    tables = {
+        "indices": lost,
+        "convergence": convergence(lost),
+        "responses": responses,
+        "design": design,
+    }
+    for name in DRAW:
+        assert why in said(drawn(name, cohort, **tables))
     gone = responses.assign(status="unstable")
-    assert "none has an equilibrium" in said(drawn("top_factors", cohort, gone, design, indices()))
+    assert "none has an equilibrium" in said(top_factors(cohort, gone, design, indices()))
 
 
 def test_every_figure_has_a_caption_and_a_title() -> None:
-    for name in DRAW:
-        assert (ROOT / "workflow" / "report" / f"{name}.rst").read_text().strip()
-    assert list(TITLES) == list(DRAW)
+    for figure in KIND.figures:
+        assert caption("global_sensitivity", figure.name).read_text().strip()
+        assert figure.title
 
 
 def told(cohort: Cohort, found: pd.DataFrame, place: int = 0) -> str:
@@ -478,12 +489,12 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
 
 @pytest.mark.parametrize("method", LEFT_OUT)
 def test_failed_runs_are_told_with_the_rule(cohort: Cohort, method: str) -> None:
-    found = Results({"indices": indices(method, failed=3)}, {}, {}, {})
+    found = Results(Tables({"indices": indices(method, failed=3)}), {}, {})
     sure = opening(study(method), cohort, found).how_sure
     assert "at most 3 failed" in sure
     assert LEFT_OUT[method] in sure
     assert "3\u2009036 runs or more" in sure
-    none = Results({"indices": indices(method)}, {}, {}, {})
+    none = Results(Tables({"indices": indices(method)}), {}, {})
     assert "none failed" in opening(study(method), cohort, none).how_sure
 
 
@@ -502,11 +513,11 @@ def test_outputs_without_an_index_are_told(cohort: Cohort) -> None:
     lost = (found["output"] == "joint_load") & (found["test"] == "flexion")
     found.loc[lost, ["status", "message"]] = ["too_many_failed", "far too many"]
     found.loc[lost, "estimate"] = np.nan
-    (warning,) = opening(study(), cohort, Results({"indices": found}, {}, {}, {})).warnings
+    (warning,) = opening(study(), cohort, Results(Tables({"indices": found}), {}, {})).warnings
     assert warning.startswith("6 of 24 outputs have no index")
     assert "far too many" in warning
     constant = found.assign(status=found["status"].replace("too_many_failed", "constant"))
-    results = Results({"indices": constant}, {}, {}, {})
+    results = Results(Tables({"indices": constant}), {}, {})
     assert opening(study(), cohort, results).warnings == ()
     assert any("vary with no factor" in words for words in findings(study(), cohort, results))
 
@@ -523,10 +534,12 @@ def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
         noise_floor=0.1,
         above_floor=True,
     )
-    both = Results({"indices": pd.concat([found, pair])}, {}, {}, {})
+    both = Results(Tables({"indices": pd.concat([found, pair])}), {}, {})
     words = " ".join(findings(study(), cohort, both))
     assert "(S2): load size with mass 0.20 [0.15 to 0.25]." in words
-    hidden = Results({"indices": pd.concat([found, pair.assign(above_floor=False)])}, {}, {}, {})
+    hidden = Results(
+        Tables({"indices": pd.concat([found, pair.assign(above_floor=False)])}), {}, {}
+    )
     assert "no interaction of two factors" in " ".join(findings(study(), cohort, hidden))
     names = [shown.title for shown in shown_tables(cohort, both)]
     assert names[0] == "Leading factors of every output"
@@ -535,16 +548,22 @@ def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
 
 def test_the_page_opens_with_the_answer_and_fetches_nothing(cohort: Cohort) -> None:
     found = indices()
-    pictures = dict.fromkeys(DRAW, "<svg xmlns='http://www.w3.org/2000/svg'/>")
-    captions = {name: f"caption of {name}" for name in DRAW}
-    tables = {"indices": found, "convergence": convergence(found)}
-    results = Results(tables, {}, pictures, captions)
-    page = sensitivity_page(study(dummy=True), cohort, results)
-    assert page == sensitivity_page(study(dummy=True), cohort, results)
+    svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    pictures = {
+        figure.name: Picture.of(figure.name, figure.title, svg, f"caption of {figure.name}")
+        for figure in KIND.figures
+    }
+    tables = Tables({"indices": found, "convergence": convergence(found)})
+
+    def page_of(asked: GlobalSensitivity) -> str:
+        return document(asked, cohort, Results(tables, {}, pictures)).html(asked, cohort)
+
+    page = page_of(study(dummy=True))
+    assert page == page_of(study(dummy=True))
     assert '<p class="headline">Motion and joint load' not in page, "each output by its name"
     assert "Motion hangs most on load size; joint load on load size." in page
     places_ = [page.index(f'<section id="{name}"') for name in ("findings", "figures", "tables")]
     assert places_ == sorted(places_)
     assert all(f"caption of {name}" in page for name in DRAW)
     assert "calibrated stiffness (outputs: stiffness: false)" in page
-    assert "no dummy factor" in sensitivity_page(study(dummy=False), cohort, results)
+    assert "no dummy factor" in page_of(study(dummy=False))

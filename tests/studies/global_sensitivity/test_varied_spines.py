@@ -13,13 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, landmarks
 from spinepipe.frames import FRAME_LANDMARKS, joint_pose, transform_of
 from spinepipe.studies.global_sensitivity.change import Change, Of
-from spinepipe.studies.global_sensitivity.start import (
-    Start,
-    asked_tests,
-    many_joint_frames,
-    one_joint_frame,
-    start_of,
-)
+from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, one_joint_frame
+from spinepipe.studies.global_sensitivity.start import Start, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.vary import Varied, vary
 
 STIFFNESS = np.array([24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from study_cases import TABLES
 
 from spinepipe.comparison.claim import (
     Claim,
@@ -33,7 +34,7 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a import against as agai
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
-from spinepipe.tables import TABLES, from_rows, read, read_frame
+from spinepipe.tables import from_rows, read, read_frame
 
 ROOT = Path(__file__).parents[3]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"

@@ -1,18 +1,20 @@
 """A cohort stands beside the paper it was rebuilt from, in the kind of study that paper did."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from identification_cases import identification
-from study_cases import STUDY, Size, project, results
+from study_cases import FIGURES, STUDY, Size, drawing, project, results
 
 from spinepipe import cohort as cohorts
-from spinepipe.jobs.layouts import JOINED, files_of
-from spinepipe.report import published
-from spinepipe.studies.joint_pose_sensitivity import draw as figures
-from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
-from spinepipe.studies.read import KINDS
+from spinepipe.report.style import picture, style
+from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import Study
+from spinepipe.tables import Tables
 
 COHORTS = Path(__file__).resolve().parents[3] / "config" / "cohorts"
 
@@ -28,7 +30,7 @@ def study_of(kind: str, cohort: str) -> Study:
             "outputs": {"stiffness": True},
         },
     }
-    return KINDS[kind](study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
+    return kind_of(kind).settings(study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 
 @pytest.mark.parametrize(
@@ -45,38 +47,40 @@ def study_of(kind: str, cohort: str) -> Study:
 def test_results_are_held_against_the_paper_of_cohort_and_question(
     kind: str, cohort: str, against: list[str]
 ) -> None:
-    found = files_of(study_of(kind, cohort), cohorts.read(COHORTS / cohort))
+    found = kind_of(kind).files.of(study_of(kind, cohort), cohorts.read(COHORTS / cohort))
     assert [name for name in found.tables if name.startswith("against")] == against
 
 
 def test_numbers_of_a_paper_are_for_its_own_cohort_only() -> None:
-    ours = published.paper_of("palanca_l1l4", "gould_2024a")
+    ours = GOULD_2024A.beside("palanca_l1l4")
     assert ours is not None
     assert ours[1]["doi"] == "10.3389/fbioe.2024.1304334"
-    assert published.paper_of("palanca_l1l4", "gould_2024b") is None
-    assert published.paper_of("t12s1_phantom", "gould_2024a") is None
-    assert published.paper_of("straight", "gould_2024a") is None
+    assert GOULD_2024B.beside("palanca_l1l4") is None
+    assert GOULD_2024A.beside("t12s1_phantom") is None
+    assert GOULD_2024A.beside("straight") is None
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_joint_pose_figures_of_a_cohort_of_the_other_paper(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: Path) -> None:
     size = Size(("a",), 2, 12)
     folder = results(project(tmp_path, size), size)
     identification(folder, size)
-    tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
-    svg, png = (folder / f"{name}.{kind}" for kind in ("svg", "png"))
-    figures.run(str(tmp_path), STUDY, name, tables, str(svg), str(png))
-    alone = svg.read_bytes()
-    monkeypatch.setitem(published.PAPER_OF_COHORT, "straight", "gould_2024b")
-    figures.run(str(tmp_path), STUDY, name, tables, str(svg), str(png))
-    assert svg.read_bytes() == alone
+    study, cohort = study_and_cohort(str(tmp_path), STUDY)
+    tables = Tables.read([folder / f"{table}.parquet" for table in FIGURES[name]])
+    with style():
+        alone, other = (
+            picture(drawing(name)(study, one, tables), "svg")
+            for one in (cohort, replace(cohort, name=GOULD_2024B.cohort))
+        )
+    assert other == alone
 
 
 def test_tables_of_job_files_of_every_kind_are_joined() -> None:
     phantom = cohorts.read(COHORTS / "t12s1_phantom")
-    layouts = [files_of(study_of(kind, "t12s1_phantom"), phantom) for kind in KINDS]
-    made = {table for layout in layouts for table in layout.made_of_jobs}
-    assert set(JOINED) == made | {"method_fits"}  # of joint-pose studies that ask for them
-    assert len(JOINED) == len(set(JOINED)), "one rule joins them all"
+    asked = {"joint_pose_sensitivity": {"method_fits"}}  # by studies that ask for them
+    for name in kind_names():
+        files = kind_of(name).files.of(study_of(name, "t12s1_phantom"), phantom)
+        made = {*files.made_of_jobs, *files.by_specimen} | asked.get(name, set())
+        joined = kind_of(name).files.joined
+        assert set(joined) == made, name
+        assert len(joined) == len(set(joined)), "one rule joins them all"

@@ -6,14 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
-from study_cases import STUDY, Size, project, results
+from study_cases import STUDY, Size, drawn, project, results
 
 from spinepipe.report.marks import quartiles
 from spinepipe.report.panels import MOST_ROWS, rows_of
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
 from spinepipe.report.words import fixed, number, percent, tick
-from spinepipe.studies.joint_pose_sensitivity import draw as figures
-from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
 from spinepipe.units import COORDINATES
 
 FIRST = ("stiffness", "errors", "joint_pose")
@@ -33,9 +31,7 @@ def draw(root: Path, size: Size) -> Path:
     """Figures of made-up results; returns their folder."""
     folder = results(project(root, size), size)
     for name in FIRST:
-        pictures = [str(folder / "figures" / f"{name}.{kind}") for kind in ("svg", "png")]
-        tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
-        figures.run(str(root), STUDY, name, tables, *pictures)
+        drawn(root, name)
     return folder / "figures"
 
 

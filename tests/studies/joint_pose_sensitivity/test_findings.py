@@ -9,11 +9,12 @@ import pandas as pd
 import pytest
 from study_cases import STUDY, Size, project
 
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.report.page.document import Results, left_out
+from spinepipe.report.page.document import Results
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
-from spinepipe.studies.joint_pose_sensitivity.page import shown_tables
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.page import left_out, shown_tables
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.tables import Tables
 
 NAN = float("nan")
 
@@ -26,8 +27,8 @@ def study(tmp_path: Path) -> JointPoseSensitivity:
 
 def told(study: JointPoseSensitivity, tables: Mapping[str, list[dict[str, Any]]]) -> str:
     """All findings as one text, with plain spaces."""
-    frames = {name: pd.DataFrame(rows) for name, rows in tables.items()}
-    return " ".join(findings(study, Results(frames, {}, {}, {}))).replace("\u00a0", " ")
+    frames = Tables({name: pd.DataFrame(rows) for name, rows in tables.items()})
+    return " ".join(findings(study, Results(frames, {}, {}))).replace("\u00a0", " ")
 
 
 def summary(n: int, iqr: float, part: str, loading: str, **more: Any) -> dict[str, Any]:
@@ -232,7 +233,8 @@ def test_trees_that_could_not_be_grown_have_a_row_that_says_why(
         }
         for name in ("p1", "p2")
     ]
-    (table,) = shown_tables(study, Results({"importance": pd.DataFrame(rows)}, {}, {}, {}))
+    frames = Tables({"importance": pd.DataFrame(rows)})
+    (table,) = shown_tables(study, Results(frames, {}, {}))
     (row,) = table.rows
     assert [head.name for head in table.heads] == ["joint", "coordinate", "n", "message"]
     assert row[-1].text == "18 rows; at least 20"

@@ -8,21 +8,17 @@ import pytest
 from identification_cases import identification, write_table
 from matplotlib.figure import Figure
 from PIL import Image
-from study_cases import STUDY, Size, project, results
+from study_cases import FIGURES, Size, drawing, drawn, project, results
 
 from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM
 from spinepipe.report.words import number
-from spinepipe.studies.cohort_stiffness.kind import COHORT_FIGURES
-from spinepipe.studies.discrepancy.kind import DISCREPANCY_FIGURES
-from spinepipe.studies.global_sensitivity.kind import SENSITIVITY_FIGURES
-from spinepipe.studies.joint_pose_sensitivity import draw as figures
-from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_errors
+from spinepipe.studies import joint_pose_sensitivity
+from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_paper
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     importance_by_factor,
 )
-from spinepipe.studies.joint_pose_sensitivity.kind import FIGURES
-from spinepipe.studies.range_of_motion.kind import ROM_FIGURES
+from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.units import COORDINATES
 
 NEW = (
@@ -45,14 +41,6 @@ def tables(root: Path, size: Size) -> Path:
     return folder
 
 
-def draw(root: Path, folder: Path, name: str) -> Path:
-    """One figure of made-up results; returns its SVG."""
-    svg, png = (folder / "figures" / f"{name}.{kind}" for kind in ("svg", "png"))
-    files = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
-    figures.run(str(root), STUDY, name, files, str(svg), str(png))
-    return svg
-
-
 def words(svg: Path) -> str:
     """Words of an SVG; matplotlib notes them beside the outlines."""
     parts = svg.read_text().split("<!--")[1:]
@@ -60,26 +48,26 @@ def words(svg: Path) -> str:
 
 
 def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
-    assert set(figures.DRAW) == set(FIGURES)
-    captions = Path(__file__).resolve().parents[3] / "workflow" / "report"
-    known = {*FIGURES, *COHORT_FIGURES, *ROM_FIGURES, *DISCREPANCY_FIGURES, *SENSITIVITY_FIGURES}
-    assert {path.stem for path in captions.glob("*.rst")} == known
+    folder = Path(joint_pose_sensitivity.__file__).parent
+    assert {path.stem for path in folder.glob("figures/*.rst")} == set(FIGURES)
+    for figure in KIND.figures:
+        assert callable(drawing(figure.name)), figure.name
 
 
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
 def test_new_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
-    folder = tables(tmp_path, size)
+    tables(tmp_path, size)
     for name in NEW:
-        with Image.open(draw(tmp_path, folder, name).with_suffix(".png")) as picture:
+        with Image.open(drawn(tmp_path, name).with_suffix(".png")) as picture:
             assert picture.width == int(WIDTH_MM / 25.4 * DPI), name
             assert np.asarray(picture.convert("L")).min() < 128, f"{name}: nothing is drawn"
 
 
 def test_new_figures_have_the_same_bytes_twice(tmp_path: Path) -> None:
-    folder = tables(tmp_path, ONE)
+    tables(tmp_path, ONE)
     for name in NEW:
-        first = draw(tmp_path, folder, name).read_bytes()
-        assert draw(tmp_path, folder, name).read_bytes() == first, name
+        first = drawn(tmp_path, name).read_bytes()
+        assert drawn(tmp_path, name).read_bytes() == first, name
 
 
 @pytest.mark.parametrize(
@@ -93,8 +81,8 @@ def test_new_figures_have_the_same_bytes_twice(tmp_path: Path) -> None:
     ],
 )
 def test_what_has_no_result_is_said(tmp_path: Path, name: str, told: str) -> None:
-    folder = tables(tmp_path, Size(solved=False))
-    assert told in words(draw(tmp_path, folder, name))
+    tables(tmp_path, Size(solved=False))
+    assert told in words(drawn(tmp_path, name))
 
 
 @pytest.mark.parametrize("name", NEW)
@@ -102,7 +90,7 @@ def test_tables_without_rows_are_told_not_drawn(tmp_path: Path, name: str) -> No
     folder = tables(tmp_path, ONE)
     for table in set(FIGURES[name]) - {"simulations"}:
         write_table(folder, table, [])
-    svg = draw(tmp_path, folder, name)
+    svg = drawn(tmp_path, name)
     told = {
         "bootstrap": "any of 0 bootstrap fits",
         "success_by_method": "No fit was done in several ways",
@@ -115,7 +103,7 @@ def test_tables_without_rows_are_told_not_drawn(tmp_path: Path, name: str) -> No
 
 def test_bootstrap_tells_median_range_and_n_of_each_row(tmp_path: Path) -> None:
     folder = tables(tmp_path, ONE)
-    told = words(draw(tmp_path, folder, "bootstrap"))
+    told = words(drawn(tmp_path, "bootstrap"))
     frame = pd.read_parquet(folder / "bootstrap.parquet")
     row = frame[(frame["bootstrap"] == "damping") & (frame["loading"] == "dynamic")]
     one = row[row["joint"] == "V1V2"]
@@ -169,28 +157,28 @@ def test_published_median_and_range_are_drawn(
 ) -> None:
     axis = Figure().subplots()
     row = pd.DataFrame([{"bootstrap": sampled, "loading": loading, "joint": joint}])
-    draw_errors(axis, "palanca_l1l4", name, row, 0.0)
+    draw_paper(axis, "palanca_l1l4", name, row, 0.0)
     line, tick, diamond = axis.lines
     np.testing.assert_allclose(line.get_xdata(), ends, atol=1e-12)
     assert float(tick.get_xdata()[0]) == float(diamond.get_xdata()[0]) == median
     other = Figure().subplots()
-    draw_errors(other, "straight", name, row, 0.0)
-    draw_errors(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
+    draw_paper(other, "straight", name, row, 0.0)
+    draw_paper(other, "palanca_l1l4", name, row.assign(loading="equilibrium"), 0.0)
     assert not other.lines, "no paper, or a loading that the paper does not have"
 
 
 def test_success_tells_counts_of_each_method(tmp_path: Path) -> None:
-    told = words(draw(tmp_path, tables(tmp_path, ONE), "success_by_method"))
+    told = words(drawn(tables(tmp_path, ONE).parents[1], "success_by_method"))
     for share in ("6 of 6 (100 %)", "1 of 6 (17 %)", "5 of 6 (83 %)", "least cost: 1 of 6"):
         assert share in told
     assert "all free stiffnesses within 1 % of the start" in told
 
 
 def test_agreement_tells_bias_and_limits(tmp_path: Path) -> None:
-    told = words(draw(tmp_path, tables(tmp_path, ONE), "agreement"))
+    told = words(drawn(tables(tmp_path, ONE).parents[1], "agreement"))
     assert told.count("bias 0.01 (\u22120.19 to 0.21), n = 12") == 4, "2 joints x 2 coordinates"
     many = Size(("a", "b"), 4, 4)
-    rows = words(draw(tmp_path / "m", tables(tmp_path / "m", many), "agreement"))
+    rows = words(drawn(tables(tmp_path / "m", many).parents[1], "agreement"))
     assert "bias with 95 % interval" in rows, "16 panels do not fit on a page: rows"
 
 
@@ -199,15 +187,15 @@ def test_only_reduced_poses_are_readings_of_agreement(tmp_path: Path) -> None:
     success = pd.read_parquet(folder / "success.parquet")
     success["reduced"] = success["pose"] < 3
     write_table(folder, "success", success.to_dict("records"))
-    few = draw(tmp_path, folder, "agreement").read_text().count("<use ")
+    few = drawn(tmp_path, "agreement").read_text().count("<use ")
     success["reduced"] = True
     write_table(folder, "success", success.to_dict("records"))
-    all_ = draw(tmp_path, folder, "agreement").read_text().count("<use ")
+    all_ = drawn(tmp_path, "agreement").read_text().count("<use ")
     assert all_ > few
 
 
 def test_shares_and_trees_are_told(tmp_path: Path) -> None:
-    told = words(draw(tmp_path, tables(tmp_path, ONE), "pose_against_stiffness"))
+    told = words(drawn(tables(tmp_path, ONE).parents[1], "pose_against_stiffness"))
     for share in ("70 %", "20 %", "10 %", "pose 80 %; 5 leaves, r² 0.60"):
         assert told.count(share) == 4
     assert "Grid of 12 joint poses times 2 stiffness sets" in told
@@ -234,7 +222,7 @@ def test_importance_is_summed_over_the_predictors_of_a_factor() -> None:
 
 
 def test_required_precision_is_told_or_why_not(tmp_path: Path) -> None:
-    told = words(draw(tmp_path, tables(tmp_path, ONE), "landmark_precision"))
+    told = words(drawn(tables(tmp_path, ONE).parents[1], "landmark_precision"))
     assert "1.25 mm (1.00–1.50)" in told
     assert "too many poses are above the limit even at 0.5 mm" in told
     assert "95 % asked for" in told
@@ -245,7 +233,7 @@ def test_precision_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -
     for name in FIGURES["landmark_precision"]:
         rows = pd.read_parquet(folder / f"{name}.parquet").query("motion == 'rotation'")
         write_table(folder, name, rows.to_dict("records"))
-    told = words(draw(tmp_path, folder, "landmark_precision"))
+    told = words(drawn(tmp_path, "landmark_precision"))
     assert "Largest rotation error" in told
     assert "translation" not in told
 

@@ -9,33 +9,33 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from study_cases import START, STUDY, Size, project, results
+from study_cases import START, STUDY, TABLES, Size, project, results
 
 from spinepipe.designs import sample_log_uniform
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity import (
+    agreement,
     bootstrap,
     landmark_errors,
     landmark_precision,
     rank,
+    significance,
     success,
     summary,
     two_factor,
 )
-from spinepipe.studies.joint_pose_sensitivity import errors as agreement
-from spinepipe.studies.joint_pose_sensitivity import significance as statistics
-from spinepipe.studies.joint_pose_sensitivity import success as counts
-from spinepipe.studies.joint_pose_sensitivity.errors import (
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
+from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
     measured_coordinates,
     measured_size,
+    pose_factors,
+    pose_parameters,
     readings,
 )
-from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
-from spinepipe.studies.joint_pose_sensitivity.poses import pose_factors, pose_parameters
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
-from spinepipe.tables import TABLES, Table, read_frame, to_arrow, write
+from spinepipe.tables import Table, read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
 Change = Callable[[pd.DataFrame], pd.DataFrame]
@@ -253,8 +253,9 @@ class Run:
             rows = change(read_frame(self.folder / f"{name}.parquet")).astype(object)
             rows = rows.where(rows.notna(), None)
             write_rows(self.folder / f"{name}.parquet", TABLES[name], rows.to_dict("records"))
-        success.success(self.root, STUDY, *self._files("calibrations", "success"))
-        rank.run(self.root, STUDY, *self._files("calibrations", "success"), self.best)
+        fits, judged = self._files("calibrations", "success")
+        success.success(self.root, STUDY, [fits], judged)
+        rank.run(self.root, STUDY, fits, judged, self.best)
 
     @property
     def best(self) -> str:
@@ -270,12 +271,12 @@ class Run:
         match name:
             case "counts":
                 extra = [f for f in self._files("bootstrap") if Path(f).exists()]
-                counts.counts(self.root, STUDY, [*base, *extra], output)
+                success.counts(self.root, STUDY, [*base, *extra], output)
             case "summary":
                 extra = [f for f in self._files("bootstrap") if Path(f).exists()]
                 summary.run(self.root, STUDY, [*base, *extra], self.best, output)
             case "statistics":
-                statistics.run(self.root, STUDY, base, self.best, output)
+                significance.run(self.root, STUDY, base, self.best, output)
             case "variance_shares" | "importance":
                 both = self._files("variance_shares", "importance")
                 two_factor.run(self.root, STUDY, base, self.best, *both)
@@ -626,7 +627,10 @@ def test_a_straight_spine_in_compression_and_flexion_in_closed_form(
     assert rows["anterior_error_mm"].isna().all()
 
 
-def precision_file(path: Path, grids: dict[str, list[list[float | None]]]) -> str:
+Grids = dict[str, list[list[float | None]]]
+
+
+def precision_file(path: Path, grids: Grids) -> str:
     """Errors of poses at 1 and 2 mm, by kind of motion; None without result."""
     rows = []
     for level, sd in enumerate((1.0, 2.0)):
@@ -640,9 +644,10 @@ def precision_file(path: Path, grids: dict[str, list[list[float | None]]]) -> st
     return write_rows(path, PRECISION_ERRORS, rows)
 
 
-def precision_tables(root: Path, errors: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+def precision_tables(root: Path, grids: Grids) -> tuple[pd.DataFrame, pd.DataFrame]:
+    errors = precision_file(root / "precision_errors.parquet", grids)
     files = [str(root / f"{name}.parquet") for name in ("precision", "required")]
-    landmark_precision.run(str(root), STUDY, errors, *files)
+    landmark_precision.run(str(root), STUDY, [errors], *files)
     spread, required = (read_frame(file) for file in files)
     return spread.set_index(["motion", "sd_mm"]), required.set_index("motion")
 
@@ -655,7 +660,7 @@ def test_precision_counts_lost_poses_as_above_the_limit(tmp_path: Path) -> None:
         "translation_error_mm": [[0.1, 0.2, 0.3, 0.4], [0.5, 1.5, None, 0.7]],
         "rotation_error_deg": [[0.1, 0.2, 0.3, 2.0], [3.0, 0.2, None, 4.0]],
     }
-    spread, required = precision_tables(root, precision_file(root / "errors.parquet", grids))
+    spread, required = precision_tables(root, grids)
     row = spread.loc[("translation", 2.0)]
     assert (row["n"], row["without_result"], row["below"]) == (4, 1, 0.5)
     assert (row["median"], row["largest"]) == (0.7, 1.5)
@@ -672,7 +677,7 @@ def test_precision_counts_lost_poses_as_above_the_limit(tmp_path: Path) -> None:
 def test_precision_of_one_kind_of_motion(tmp_path: Path) -> None:
     root = project(tmp_path, Size(specimens=("a",)))
     grids = {"rotation_error_deg": [[0.1, 0.2], [0.3, 0.4]]}
-    spread, required = precision_tables(root, precision_file(root / "errors.parquet", grids))
+    spread, required = precision_tables(root, grids)
     assert set(spread.index.get_level_values("motion")) == {"rotation"}
     assert required.index.tolist() == ["rotation"]
 
@@ -680,7 +685,7 @@ def test_precision_of_one_kind_of_motion(tmp_path: Path) -> None:
 def test_precision_where_every_pose_is_lost_is_not_silence(tmp_path: Path) -> None:
     root = project(tmp_path, Size(specimens=("a",)))
     grids = {"translation_error_mm": [[None] * 3] * 2, "rotation_error_deg": [[None] * 3] * 2}
-    spread, required = precision_tables(root, precision_file(root / "errors.parquet", grids))
+    spread, required = precision_tables(root, grids)
     assert len(spread) == 4
     assert (spread["below"] == 0.0).all()
     assert (spread["without_result"] == 3).all()

@@ -16,14 +16,15 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.report.page.document import Results, sortable
+from spinepipe.jobs import report
+from spinepipe.report.page.document import Picture, Results, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of
-from spinepipe.studies.joint_pose_sensitivity import report
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
-from spinepipe.studies.joint_pose_sensitivity.page import folded, in_full, study_page
-from spinepipe.tables import read_frame
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.page import document, folded, in_full
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.tables import Tables, read_frame
 from spinepipe.tables.schema import Column
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"><!-- &amp; --></svg>'
@@ -72,7 +73,7 @@ def made(root: Path, size: Size) -> tuple[str, list[Path]]:
     folder = results(project(root, size), size)
     identification(folder, size)
     files = sorted(folder.glob("*.parquet"))
-    pictures = {"stiffness": PICTURE, "new_one": PICTURE}
+    pictures = {"stiffness": PICTURE, "errors": PICTURE}
     for name, content in pictures.items():
         (folder / f"{name}.svg").write_text(content)
         (folder / f"{name}.rst").write_text(f"What {name}\nshows & means.\n")
@@ -83,6 +84,11 @@ def made(root: Path, size: Size) -> tuple[str, list[Path]]:
         str(root), STUDY, [str(file) for file in files], svgs, captions, str(folder / "report.html")
     )
     return (folder / "report.html").read_text(encoding="utf-8"), files
+
+
+def html(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
+    """The page of a study."""
+    return document(study, cohort, results).html(study, cohort)
 
 
 @cache
@@ -135,10 +141,13 @@ def test_every_figure_is_there_with_number_title_and_caption() -> None:
     images = found.all("img")
     assert len(images) == 3, "and the segment, for paper and for readers without scripts"
     assert all(image["alt"] for image in images)
-    assert found.text("b") == ["Figure 1. Calibrated stiffness.", "Figure 2. new one."]
+    assert found.text("b") == [
+        "Figure 1. Calibrated stiffness.",
+        "Figure 2. Errors of predicted motion.",
+    ]
     assert found.text("figcaption") == [
         "What stiffness shows & means.",
-        "What new_one shows & means.",
+        "What errors shows & means.",
     ]
     assert "shows &amp; means" in text
 
@@ -186,7 +195,8 @@ def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path:
     study, _ = study_and_cohort(str(root), STUDY)
     row = {"specimen": "a", "stiffness": "calibrated", "motion": "rotation", "message": ""}
     row |= {"n": 100, "sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
-    (told,) = findings(study, Results({"required_precision": pd.DataFrame([row])}, {}, {}, {}))
+    tables = Tables({"required_precision": pd.DataFrame([row])})
+    (told,) = findings(study, Results(tables, {}, {}))
     assert "to stay below 1°, the SD" in told
     assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told
 
@@ -211,8 +221,8 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     against = read_frame(write_table(folder, "against_gould_2024a", rows))
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
     poses = read_frame(folder / "poses.parquet")
-    tables = {"poses": poses, "against_gould_2024a": against}
-    found = Page(study_page(study, cohort, Results(tables, {}, {}, {})))
+    tables = Tables({"poses": poses, "against_gould_2024a": against})
+    found = Page(html(study, cohort, Results(tables, {}, {})))
     (told,) = found.text("li")
     assert "Of 7 published quantities ours are inside the paper's range for 3" in told
     assert "outside for 2; 1 are contradicted by other numbers" in told
@@ -234,8 +244,8 @@ def test_a_study_of_few_tables_has_a_page(tmp_path: Path) -> None:
     size = SIZES["one specimen"]
     folder = results(project(tmp_path, size), size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    few = Results({"poses": read_frame(folder / "poses.parquet")}, {}, {}, {})
-    found = Page(study_page(study, cohort, few))
+    few = Results(Tables.read([folder / "poses.parquet"]), {}, {})
+    found = Page(html(study, cohort, few))
     assert "There are no findings: no table has a result." in found.text("p")
 
 
@@ -265,11 +275,11 @@ def test_odd_names_are_text_and_nothing_else(tmp_path: Path) -> None:
     folder = results(project(tmp_path, size), size)
     files = identification(folder, size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    tables = {file.stem: read_frame(file) for file in [*files, folder / "poses.parquet"]}
-    tables = {name: frame.replace({"specimen": {"a": ODD}}) for name, frame in tables.items()}
+    read = Tables.read([*files, folder / "poses.parquet"])
+    tables = Tables({n: frame.replace({"specimen": {"a": ODD}}) for n, frame in read.items()})
     metadata = {"counts": {"seed": ODD}}
-    odd_results = Results(tables, metadata, {ODD: PICTURE}, {ODD: ODD})
-    text = study_page(study, odd(cohort), odd_results)
+    pictures = {ODD: Picture.of(ODD, ODD, PICTURE, ODD)}
+    text = html(study, odd(cohort), Results(tables, metadata, pictures))
     found = Page(text)
     assert f"({1} specimen: {ODD};" in " ".join(" ".join(found.text("p")).split())
     assert len(found.all("b")) == 1, "only the title of the one figure"
@@ -290,7 +300,7 @@ def test_scene_shows_frames_of_both_kinds(tmp_path: Path) -> None:
     size = Size(("a", "b"), 2, 250)
     folder = results(project(tmp_path, size), size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    views = [view_of(cohort, name, study) for name in cohort.specimen_names]
+    views = [view_of(cohort, name, study.tests) for name in cohort.specimen_names]
     drawn = scenes(views, cohort, read_frame(folder / "poses.parquet"))
     assert list(drawn) == ["a", "b"]
     traces = {trace["name"]: trace for trace in drawn["a"]["data"]}

@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cohort import Cohort
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.page.scene import scenes
 from spinepipe.report.panels import across_of, log_ticks
 from spinepipe.report.specimen import view_of
 from spinepipe.report.style import TALLEST_MM, style
+from spinepipe.studies.joint_pose_sensitivity.figures import agreement
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import agreement_figure
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_figure
 from spinepipe.studies.joint_pose_sensitivity.figures.errors import errors_figure
@@ -29,13 +29,14 @@ from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness imp
     pose_against_stiffness_figure,
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import success_figure
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import caption
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.tables import read_frame
+from spinepipe.tables import Tables
 
 FOUR = ("anterior", "superior", "extension", "right_bending")
-CAPTIONS = Path(__file__).resolve().parents[3] / "workflow" / "report"
-Study = tuple[JointPoseSensitivity, Cohort, dict[str, pd.DataFrame]]
+CAPTIONS = Path(agreement.__file__).parent
+Study = tuple[JointPoseSensitivity, Cohort, Tables]
 
 
 def made(root: Path, size: Size) -> Study:
@@ -43,7 +44,7 @@ def made(root: Path, size: Size) -> Study:
     folder = results(project(root, size), size)
     identification(folder, size)
     study, cohort = study_and_cohort(str(root), STUDY)
-    return study, cohort, {path.stem: read_frame(path) for path in folder.glob("*.parquet")}
+    return study, cohort, Tables.read(list(folder.glob("*.parquet")))
 
 
 def panels(figure: Figure) -> list[Axes]:
@@ -165,15 +166,17 @@ def test_trees_are_drawn_whatever_else_is_missing(tmp_path: Path) -> None:
 
 
 def test_zeros_of_step_0_are_no_readings(tmp_path: Path) -> None:
-    _, cohort, tables = made(tmp_path, Size(("a",), 2, 4))
+    study, cohort, tables = made(tmp_path, Size(("a",), 2, 4))
     runs = tables["simulations"]
     filled = [name for name in runs if name.startswith("error_") and runs[name].notna().any()]
     assert len(filled) == 2
     runs.loc[(runs["step"] == 0), filled] = 0.0
     with style():
-        assert "n = 8 per row" in words(errors_figure(cohort, runs)), "4 poses, steps 0 and 1"
+        assert "n = 8 per row" in words(errors_figure(study, cohort, tables)), (
+            "4 poses, steps 0 and 1"
+        )
         zeroed = replace(cohort, zeroed_at_step_0=True)
-        assert "n = 4 per row" in words(errors_figure(zeroed, runs))
+        assert "n = 4 per row" in words(errors_figure(study, zeroed, tables))
 
 
 def test_exact_fits_are_exact_not_1e_16(tmp_path: Path) -> None:
@@ -186,7 +189,7 @@ def test_exact_fits_are_exact_not_1e_16(tmp_path: Path) -> None:
         runs.loc[own, f"predicted_{name}"] = exact
         runs.loc[own & exact.notna(), f"error_{name}"] = 1e-15
     with style():
-        figures = [agreement_figure(study, cohort, tables), errors_figure(cohort, runs)]
+        figures = [agreement_figure(study, cohort, tables), errors_figure(study, cohort, tables)]
         for figure in figures:
             figure.canvas.draw()
             offsets = [
@@ -202,10 +205,10 @@ def test_motion_that_was_not_at_rest_is_told_below_the_figures(tmp_path: Path) -
     study, cohort, tables = made(tmp_path, Size(("a",), 2, 4))
     late = "simulated 0.3 s after loading"
     with style():
-        assert late in words(errors_figure(cohort, tables["simulations"], settling(study)))
+        assert late in words(errors_figure(settling(study), cohort, tables))
         assert late in words(agreement_figure(settling(study), cohort, tables))
         assert late not in words(agreement_figure(study, cohort, tables))
-        assert late not in words(errors_figure(cohort, tables["simulations"], study))
+        assert late not in words(errors_figure(study, cohort, tables))
 
 
 def test_medians_of_specimens_are_thick_in_all_panels(tmp_path: Path) -> None:
@@ -232,7 +235,8 @@ def test_a_method_that_was_refused_has_no_row(tmp_path: Path) -> None:
 def told(name: str, study: Study, **tables: pd.DataFrame) -> str:
     """A figure's caption on the page."""
     text = (CAPTIONS / f"{name}.rst").read_text(encoding="utf-8")
-    return caption(name, text, *study[:2], Results({**study[2], **tables}, {}, {}, {}))
+    picture = Picture(name, name, "", " ".join(text.split()))
+    return caption(picture, *study[:2], Results(Tables({**study[2], **tables}), {}, {}))
 
 
 def test_captions_speak_of_the_paper_only_beside_its_cohort(tmp_path: Path) -> None:
@@ -270,7 +274,7 @@ def test_legend_of_the_scene_names_each_load_once(tmp_path: Path) -> None:
     assert cohort.loads is not None
     twice = pd.concat([cohort.loads.assign(cycle=cycle) for cycle in (1, 2)], ignore_index=True)
     again = replace(cohort, loads=twice)
-    drawn = scenes([view_of(again, "a", study)], again, tables["poses"])["a"]["data"]
+    drawn = scenes([view_of(again, "a", study.tests)], again, tables["poses"])["a"]["data"]
     loads = [trace for trace in drawn if trace["meta"] == "loads"]
     assert len(loads) == 8, "line and head of a force and of a moment, in two cycles"
     named = sorted(t["name"] for t in loads if t["showlegend"])

@@ -4,11 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.studies.joint_pose_sensitivity.success import (
-    above_start,
-    count_by_method,
-    near_start,
-)
+from spinepipe.studies.joint_pose_sensitivity.filters import above_start, near_start
+from spinepipe.studies.joint_pose_sensitivity.success import count_by_method
 
 START = np.array([100.0, 40.0])
 

@@ -14,12 +14,10 @@ from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
-from spinepipe.studies.range_of_motion import analyse as summary
-from spinepipe.studies.range_of_motion import analyse as variance
 from spinepipe.studies.range_of_motion import draw as draw_stiffness
 from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion import load_steps, simulate
-from spinepipe.studies.range_of_motion.analyse import read_grid
+from spinepipe.studies.range_of_motion import load_steps, simulate, summary, variance
+from spinepipe.studies.range_of_motion.grid import read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion, VirtualTest
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import from_rows, read_frame, write
@@ -280,7 +278,7 @@ def test_summary_has_the_quantiles_of_pandas(tmp_path: Path) -> None:
     size = (3, 6, 4)
     root = made_up(tmp_path, size)
     path, rows = table_of(root, size, lost=((1, 2, 0), (1, 3, 3)))
-    summary.summary(str(root), STUDY, str(path), str(root / "out.parquet"))
+    summary.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
     found = read_frame(root / "out.parquet").set_index(["specimen", "test", "joint", "coordinate"])
     assert len(found) == 4 * 2 * 3 * 6
     column = rows["predicted_extension_deg"]
@@ -301,7 +299,7 @@ def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Pa
     size = (3, 7, 5)
     root = made_up(tmp_path, size)
     path, _ = table_of(root, size, lost=((1, 2, 3), (0, 0, 0)))
-    variance.variance(str(root), STUDY, str(path), str(root / "out.parquet"))
+    variance.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
     found = read_frame(root / "out.parquet").set_index(["specimen", "test"])
     assert set(found["status"]) == {"done"}
     assert set(found.loc["a", "n_poses"]) == {6}  # pose 0 is no draw
@@ -317,7 +315,7 @@ def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Pa
 def test_variance_of_a_study_without_draws_has_a_status(tmp_path: Path) -> None:
     root = made_up(tmp_path, (1, 1, 1))
     path, _ = table_of(root, (1, 1, 1))
-    variance.variance(str(root), STUDY, str(path), str(root / "out.parquet"))
+    variance.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
     found = read_frame(root / "out.parquet")
     assert set(found["status"]) == {"too_few"}
     assert found["pose_share"].isna().all()

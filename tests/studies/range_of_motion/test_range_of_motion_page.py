@@ -16,12 +16,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion.analyse import read_grid, summary_rows, variance_rows
 from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
-from spinepipe.studies.range_of_motion.page import findings, range_of_motion_page
+from spinepipe.studies.range_of_motion.grid import read_grid
+from spinepipe.studies.range_of_motion.page import document, findings
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.summary import summary_rows
+from spinepipe.studies.range_of_motion.variance import variance_rows
 from spinepipe.studies.read import check
-from spinepipe.tables import read_frame
+from spinepipe.tables import Tables, read_frame
 
 Size = tuple[int, int, int]
 Lost = tuple[tuple[int, int, int], ...]
@@ -38,7 +40,12 @@ def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Coh
         "rom_summary": pd.DataFrame(summary_rows(grid)),
         "rom_variance": pd.DataFrame(variance_rows(grid)),
     }
-    return study, cohort, Results(tables, {}, {}, {})
+    return study, cohort, Results(Tables(tables), {}, {})
+
+
+def page_of(study: RangeOfMotion, cohort: Cohort, found: Results) -> str:
+    """The whole report."""
+    return document(study, cohort, found).html(study, cohort)
 
 
 def words(figure: Figure) -> str:
@@ -50,11 +57,11 @@ def words(figure: Figure) -> str:
 
 
 def figures(root: Path, size: Size, lost: Lost = ()) -> tuple[Figure, Figure]:
-    _, cohort, found = results(root, size, lost)
+    study, cohort, found = results(root, size, lost)
     with style():
         drawn = (
-            levels_figure(cohort, found.table("rom_summary")),
-            variance_figure(cohort, found.table("rom_variance")),
+            levels_figure(study, cohort, found.tables),
+            variance_figure(study, cohort, found.tables),
         )
         assert all(picture(figure, "svg") for figure in drawn)
     return drawn
@@ -92,7 +99,7 @@ def test_nothing_to_show_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [(3, 5, 4), (1, 1, 1)])
 def test_findings_have_the_numbers_of_the_tables(tmp_path: Path, size: Size) -> None:
     study, cohort, found = results(tmp_path, size)
-    page = range_of_motion_page(study, cohort, found)
+    page = page_of(study, cohort, found)
     assert f"{size[0] * size[1] * size[2] * 2} runs of 2 tests: none without" in page
     assert "pure moments without weight" in page
     rows = found.table("rom_summary")
@@ -147,7 +154,7 @@ def test_most_is_more_than_half_at_every_joint(
 ) -> None:
     study, cohort, found = results(tmp_path, (3, 5, 4))
     tables = {**found.tables, "rom_variance": variance_of(stiffness)}
-    told = findings(study, cohort, replace(found, tables=tables))
+    told = findings(study, cohort, replace(found, tables=Tables(tables)))
     assert f"Left bending: {says}" in [line.replace("\u00a0", " ") for line in told]
 
 
@@ -174,7 +181,7 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
     tables = {**found.tables, "frames": pd.concat(parts, ignore_index=True)}
     study = study if virtual else study.model_copy(update={"virtual_tests": None})
     cohort = check(tmp_path, STUDY)[1]
-    page = range_of_motion_page(study, cohort, replace(found, tables=tables))
+    page = page_of(study, cohort, replace(found, tables=Tables(tables)))
     text = page.split('<script type="application/json"')[0]
     assert re.findall(r'data-group="(\w+)"', text) == ["own", "sampled", *["loads"] * (not virtual)]
     assert ("Arrows end where" in text) != virtual
@@ -189,6 +196,6 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
 
 def test_what_the_settings_leave_out_is_told(tmp_path: Path) -> None:
     study, cohort, found = results(tmp_path, (1, 1, 1))
-    page = range_of_motion_page(study, cohort, found)
+    page = page_of(study, cohort, found)
     assert "drawn joint frames (poses: 1); drawn stiffness sets (stiffness_sets: 1)" in page
-    assert "left out" not in range_of_motion_page(*results(tmp_path / "more", (1, 5, 4)))
+    assert "left out" not in page_of(*results(tmp_path / "more", (1, 5, 4)))

@@ -8,7 +8,7 @@ from typing import Any
 from spinepipe import cohort as cohorts
 from spinepipe.studies.discrepancy.search.grounds import NoBase
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
-from spinepipe.studies.discrepancy.search.investigation import investigate
+from spinepipe.studies.discrepancy.search.investigation import investigate, prepared
 from spinepipe.studies.discrepancy.search.model_files import fitted_values
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
@@ -60,7 +60,7 @@ def _truth(truth: Truth) -> Row:
 def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
     """What the search says, then what is asked besides."""
     started, cpu = time.perf_counter(), time.process_time()
-    ended = investigate(STUDY, cohort, None, at_once)
+    ended = investigate(prepared(STUDY, cohort, None), at_once)
     found = ended.found
     row = _said(found, ended.ended)
     seconds["search"] = time.perf_counter() - started

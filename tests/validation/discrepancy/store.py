@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.digest import code_digest, value_digest
+from spinepipe.jobs.code import code_digest
+from spinepipe.jobs.digest import value_digest
 from tests.validation.discrepancy.row import Row
 from tests.validation.discrepancy.targets import Target
 
 ROOT = Path(__file__).resolve().parents[3]
 PLACE = ROOT / "results" / "validation" / "discrepancy"
-SEARCH = ("investigation", "values", "design.testable")
-"""Modules of the room spinepipe.discrepancy that a row hangs on, with all that they import."""
+SEARCH = ("search.investigation", "search.model_files", "design.testable")
+"""Modules of the kind discrepancy that a row hangs on, with all that they import."""
 
 SOURCES = ("generators/hidden/*.py", "validation/discrepancy/row.py")
 """Files of tests that a row hangs on; its recipe is in its name."""
@@ -25,7 +26,7 @@ def folder() -> Path:
     """Where rows of the code as it is now are kept."""
     found = hashlib.sha256()
     for module in SEARCH:
-        found.update(code_digest(f"spinepipe.discrepancy.{module}").encode())
+        found.update(code_digest(f"spinepipe.studies.discrepancy.{module}").encode())
     for pattern in SOURCES:
         for path in sorted((ROOT / "tests").glob(pattern)):
             found.update(path.read_bytes())

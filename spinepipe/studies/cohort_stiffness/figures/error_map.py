@@ -1,7 +1,4 @@
-"""Figure: signed error at the largest load, specimen by level, for each load case and stage.
-
-What the map of errors compares: published, fitted and predicted stiffness.
-"""
+"""Figure: signed error at the largest load, specimen by level, for each load case and stage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,9 +13,16 @@ from matplotlib.patches import Patch, Rectangle
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
-from spinepipe.report.panels import explain_marks
+from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
-from spinepipe.report.words import NAME, POSITIVE, case, count, fixed, short
+from spinepipe.report.words import POSITIVE, case, count, fixed, short
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    OF_JOINTS,
+    POOLED,
+    PUBLISHED,
+    SHARED,
+)
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 
@@ -29,19 +33,19 @@ _BY_WHOM = {
     "fitted": "fitted to this specimen",
     "left_out_specimen": "from the other specimens",
 }
-_ALL = (
-    ("literature", "literature"),
-    ("per_specimen", "fitted"),
-    ("per_joint", "fitted"),
-    ("per_joint", "left_out_specimen"),
-    ("partially_pooled", "left_out_specimen"),
-)
 _FEW = (
-    ("literature", "literature"),
-    ("per_joint", "fitted"),
-    ("partially_pooled", "left_out_specimen"),
+    (PUBLISHED[0], "literature"),
+    (OF_JOINTS[0], "fitted"),
+    (POOLED, "left_out_specimen"),
 )
-_INSTEAD = ("partially_pooled", "per_joint", "per_specimen", "level_ratio")
+_ALL = (
+    _FEW[0],
+    (SHARED[0], "fitted"),
+    _FEW[1],
+    (OF_JOINTS[0], "left_out_specimen"),
+    _FEW[2],
+)
+_INSTEAD = (*OF_JOINTS[::-1], *SHARED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
 
 
 def _title(representation: str, stage: str) -> str:
-    name = NAME[representation]
+    name = IN_WORDS[representation]
     words = name if stage == "literature" else f"{name}, {_BY_WHOM[stage]}"
     return words[:1].upper() + words[1:]
 
@@ -118,7 +122,7 @@ def error_map_figure(
             axis.set_title(
                 f" \n{words}" if words else " ", fontweight="normal", fontsize=6.5, linespacing=1.7
             )
-        _heading(axes[line][0], line, stage.title)
+        head_line(axes[line][0], line, stage.title, 12.5 if line == 0 else 3.5)
     assert image is not None
     _explain(figure, axes, image, scale, found, signs)
     return figure
@@ -144,8 +148,7 @@ def _room(cohort: Cohort, across: int, lines: int) -> bool:
 def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Axes]]]:
     rows = len(cohort.specimen_names) * _line_mm(cohort, lines)
     figure = blank(lines * (rows + _HEAD_MM) + _NAMES_MM + _KEY_MM)
-    axes = figure.subplots(lines, across, squeeze=False)
-    return figure, [list(line) for line in axes]
+    return figure, lines_of(figure, lines * across, across)
 
 
 def _scale(found: Sequence[Stage]) -> Normalize:
@@ -245,23 +248,6 @@ def _over(test: str, loaded: pd.DataFrame, across: int) -> str:
     room = _LETTERS // across
     words = short(case(test), room)
     return words + direction if len(words) + len(direction) <= room else words
-
-
-def _heading(axis: Axes, line: int, words: str) -> None:
-    """Letter and words above the first panel of a line, over the names of the load cases."""
-    above = 12.5 if line == 0 else 3.5
-    axis.annotate(
-        f"{chr(ord('a') + line)}   {words}",
-        (0.0, 1.0),
-        (0.0, above),
-        va="bottom",
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=7.5,
-        fontweight="bold",
-        annotation_clip=False,
-        in_layout=False,
-    )
 
 
 def _explain(

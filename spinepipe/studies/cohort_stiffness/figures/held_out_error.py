@@ -1,9 +1,7 @@
-"""Figure: error of motion that was fitted and of motion that was held out, by representation.
-
-Errors of fitted and of held-out motion, one number per specimen.
-"""
+"""Figure: error of motion that was fitted and of motion that was held out, by representation."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,16 +10,59 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import finite
-from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.marks import finite, spread_out
+from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import NAME, count, number
+from spinepipe.report.words import count, number
 from spinepipe.statistics import mean_of
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NAMES, PUBLISHED, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, specimen_rms
-from spinepipe.studies.cohort_stiffness.tables import REPRESENTATIONS
 
 KEYS = ["stage", "representation", "specimen"]
+
+PANELS = {
+    "fitted": "Fitted motion",
+    "left_out_case": "Left-out load case",
+    "left_out_specimen": "Left-out specimen",
+}
+
+LEAST_DEG = 1e-3
+"""Smaller errors, of exact fits, are drawn there."""
+
+_ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
+_DASHES, _DOTS = (0, (4, 2)), (0, (1, 1))
+
+
+def held_out_error_figure(
+    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel for fitted motion and one for each way of holding motion out."""
+    errors = tables["errors"]
+    found = rotation_errors(errors) if len(errors) else errors
+    panels = [name for name in PANELS if len(found) and (found["stage"] == name).any()]
+    if not panels:
+        return saying("No error of a fit can be shown: no fit has a result.")
+    fitted = found[found["stage"].isin(panels)]
+    rows = [name for name in NAMES[::-1] if name in set(fitted["representation"])]
+    published = _published(found)
+    figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
+    axes = side_by_side(figure, len(panels), len(panels), sharey=True, sharex=True)
+    low, high = _reach([*finite(fitted["error"]), *published.values()])
+    for index, (name, axis) in enumerate(zip(panels, axes, strict=True)):
+        head(axis, index, PANELS[name])
+        axis.set_xscale("log")
+        axis.set_xlim(low, high)
+        log_ticks(axis.xaxis, low, high, 5)
+        axis.set_xlabel("root mean square error of rotations (°)")
+        axis.set_yticks(range(len(rows)), [IN_WORDS[row].replace(" of ", "\nof ") for row in rows])
+        axis.set_ylim(-0.55, len(rows) - 0.35)
+        axis.spines["left"].set_visible(False)
+        for representation, value in published.items():
+            axis.axvline(value, **_look(representation), zorder=1)
+        _draw(axis, found[found["stage"] == name], rows)
+    _explain(figure, published, len(cohort.specimen_names))
+    return figure
 
 
 def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
@@ -41,59 +82,18 @@ def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(found, names=KEYS).rename("error").reset_index()
 
 
-PANELS = {
-    "fitted": "Fitted motion",
-    "left_out_case": "Left-out load case",
-    "left_out_specimen": "Left-out specimen",
-}
-LEAST_DEG = 1e-3
-"""Smaller errors, of exact fits, are drawn there."""
-
-_ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
-_PUBLISHED: dict[str, tuple[str, tuple[int, tuple[int, int]]]] = {
-    "literature": (GREY, (0, (4, 2))),
-    "literature_levels": (THEIRS, (0, (1, 1))),
-}
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-
-
-def held_out_error_figure(
-    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
-    """A panel for fitted motion and one for each way of holding motion out."""
-    errors = tables["errors"]
-    found = rotation_errors(errors) if len(errors) else errors
-    panels = [name for name in PANELS if len(found) and (found["stage"] == name).any()]
-    if not panels:
-        return saying("No error of a fit can be shown: no fit has a result.")
-    fitted = found[found["stage"].isin(panels)]
-    rows = [name for name in REPRESENTATIONS[::-1] if name in set(fitted["representation"])]
-    published = _published(found)
-    figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
-    axes = figure.subplots(1, len(panels), sharey=True, sharex=True, squeeze=False).ravel()
-    low, high = _reach([*finite(fitted["error"]), *published.values()])
-    for index, (name, axis) in enumerate(zip(panels, axes, strict=True)):
-        head(axis, index, PANELS[name])
-        axis.set_xscale("log")
-        axis.set_xlim(low, high)
-        log_ticks(axis.xaxis, low, high, 5)
-        axis.set_xlabel("root mean square error of rotations (°)")
-        axis.set_yticks(range(len(rows)), [NAME[row].replace(" of ", "\nof ") for row in rows])
-        axis.set_ylim(-0.55, len(rows) - 0.35)
-        axis.spines["left"].set_visible(False)
-        for representation, value in published.items():
-            color, dashes = _PUBLISHED[representation]
-            axis.axvline(value, color=color, ls=dashes, lw=1.0, zorder=1)
-        _draw(axis, found[found["stage"] == name], rows)
-    _explain(figure, published, len(cohort.specimen_names))
-    return figure
-
-
 def _published(found: pd.DataFrame) -> dict[str, float]:
     """Mean error over specimens of each published set."""
     rows = found[found["stage"] == "literature"]
     means = rows.groupby("representation")["error"].mean()
-    return {name: float(means[name]) for name in _PUBLISHED if name in means.index}
+    return {name: float(means[name]) for name in PUBLISHED if name in means.index}
+
+
+def _look(published: str) -> dict[str, Any]:
+    """Line of a published set."""
+    if named(published).by_level:
+        return {"color": THEIRS, "ls": _DOTS, "lw": 1.0}
+    return {"color": GREY, "ls": _DASHES, "lw": 1.0}
 
 
 def _reach(values: Sequence[float]) -> tuple[float, float]:
@@ -110,8 +110,16 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
             note(axis, 0.02, y, "no result", GREY)
             continue
         shown = np.maximum(values, LEAST_DEG)
-        shift = (np.arange(len(values)) * _GOLDEN % 1.0 - 0.5) * 0.3
-        axis.plot(shown, y - 0.12 + shift, "o", color=OURS, ms=3.0, mew=0, alpha=0.55, zorder=3)
+        axis.plot(
+            shown,
+            y - 0.12 + 0.3 * spread_out(len(values)),
+            "o",
+            color=OURS,
+            ms=3.0,
+            mew=0,
+            alpha=0.55,
+            zorder=3,
+        )
         words = f"{number(float(values.mean()))}°"
         interval = mean_of(values).interval
         if interval is not None:
@@ -137,9 +145,8 @@ def _explain(figure: Figure, published: Mapping[str, float], specimens: int) -> 
     mean = "mean with 95 % interval" if specimens > 1 else "mean"
     handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
     for name, value in published.items():
-        color, dashes = _PUBLISHED[name]
-        label = f"{NAME[name]}: {number(value)}°"
-        handles.append(Line2D([], [], color=color, ls=dashes, lw=1.0, label=label))
+        label = f"{IN_WORDS[name]}: {number(value)}°"
+        handles.append(Line2D([], [], **_look(name), label=label))
     words = (
         "All measured rotations of all joints, load steps and used cycles; "
         f"{count(specimens, 'specimen')}. Vertical lines: stiffness that was not fitted at all."

@@ -1,7 +1,4 @@
-"""Figure: stiffness fitted to one load case against stiffness fitted to all of them.
-
-Stiffness fitted to one load case as a multiple of that fitted to all.
-"""
+"""Figure: stiffness fitted to one load case as a multiple of that fitted to all of them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,50 +10,20 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import BAR_PT, Array, finite, quartiles
+from spinepipe.report.marks import BAR_PT, Array, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
-from spinepipe.report.words import AXIS, NAME, case, count, short
+from spinepipe.report.words import AXIS, case, count, short
 from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, OF_JOINTS, SHARED
 from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
 
 _KEYS = ["specimen", "representation", "joint", "coordinate"]
-_SHARED = ("per_specimen", "level_ratio")
-"""Representations with one unknown for all joints of a specimen."""
-
-
-def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
-    """One row per fit to a single load case, with the ratio and its interval.
-
-    The interval is that of the fit to the single load case alone. Where joints share an unknown,
-    the first joint stands for all.
-
-    Returns
-    -------
-    Columns ``fitted_to``, those of the keys, ``ratio``, ``low``, ``high``, ``doubted``, and
-    ``loaded``: whether that load case drives the coordinate.
-    """
-    own = stiffness[stiffness["source"] == "own"]
-    first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
-    own = own[~own["representation"].isin(_SHARED) | first]
-    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
-    whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
-    both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
-    divided = {
-        new: both[old].astype(float) / both["whole"].astype(float)
-        for new, old in (("ratio", "stiffness"), ("low", "low"), ("high", "high"))
-    }
-    driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
-    pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
-    loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
-    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
-
-
-_SHOWN = ("per_specimen", "per_joint")
+_SHOWN = (SHARED[0], OF_JOINTS[0])
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 15.0, 22.0
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _LEAST_REACH, _FARTHEST = 1.15, 30.0
+
 _FEW, _MOST_INTERVALS = 12, 120
 """Fits of a row that keep their order; and that have an interval each."""
 
@@ -91,10 +58,37 @@ def load_case_stiffness_figure(
             place = axis.get_subplotspec()
             axis.tick_params(labelleft=place is None or place.is_first_col())
             if index == 0:
-                axis.set_ylabel(NAME[representation], fontweight="bold")
+                axis.set_ylabel(IN_WORDS[representation], fontweight="bold")
     tested = [_tested(study, tables["statistics"], name) for name in shown]
     _explain(figure, found[found["representation"].isin(shown)], tested)
     return figure
+
+
+def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
+    """One row per fit to a single load case, with the ratio and its interval.
+
+    The interval is that of the fit to the single load case alone. Where joints share an unknown,
+    the first joint stands for all.
+
+    Returns
+    -------
+    Columns ``fitted_to``, those of the keys, ``ratio``, ``low``, ``high``, ``doubted``, and
+    ``loaded``: whether that load case drives the coordinate.
+    """
+    own = stiffness[stiffness["source"] == "own"]
+    first = own["joint"] == own["joint"].iloc[0] if len(own) else own["joint"].notna()
+    own = own[~own["representation"].isin(SHARED) | first]
+    single = own[own["fitted_to"].isin(load_cases(stiffness["fitted_to"]))]
+    whole = own.loc[own["fitted_to"] == ALL, [*_KEYS, "stiffness"]]
+    both = single.merge(whole.rename(columns={"stiffness": "whole"}), on=_KEYS, how="left")
+    divided = {
+        new: both[old].astype(float) / both["whole"].astype(float)
+        for new, old in (("ratio", "stiffness"), ("low", "low"), ("high", "high"))
+    }
+    driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
+    pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
+    loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
+    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
 
 
 def _two_lines(test: str) -> str:
@@ -207,7 +201,7 @@ def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool
 def _shifts(n: int) -> Array:
     """(n,) places around the middle of a row: in order where they are few, else mixed."""
     if n > _FEW:
-        return np.asarray((np.arange(n) * _GOLDEN % 1.0 - 0.5) * 0.5, dtype=float)
+        return 0.5 * spread_out(n)
     return 0.3 - 0.6 * (np.arange(n) + 0.5) / n
 
 
@@ -248,6 +242,6 @@ def _tested(study: CohortStiffness, statistics: pd.DataFrame, representation: st
         return ""
     many = int((known < study.significance).sum())
     return (
-        f"{NAME[representation].capitalize()}: separate stiffness is significantly better in "
+        f"{IN_WORDS[representation].capitalize()}: separate stiffness is significantly better in "
         f"{many} of {count(len(known), 'specimen')} (nested F test, Holm)."
     )

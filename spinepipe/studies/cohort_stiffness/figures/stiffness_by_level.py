@@ -1,16 +1,8 @@
-"""Figure: fitted stiffness of every specimen, level by level, beside the published values.
-
-Which rows of the tables of a cohort study a figure shows.
-
-An axis of levels, cranial on the left.
-
-Symbols of stiffness with its interval, upright; hollow where the data do not hold it.
-
-How far a logarithmic axis of stiffness reaches.
-"""
+"""Figure: fitted stiffness of every specimen, level by level, beside the published values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,12 +12,91 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_upright, finite, quartiles
-from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
-from spinepipe.report.words import AXIS, NAME, count, first_of, number, short, stiffness_unit
+from spinepipe.report.words import AXIS, count, listed, number, short, stiffness_unit
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    OF_JOINTS,
+    PUBLISHED,
+    SHARED,
+    named,
+)
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.units import COORDINATES
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Colour, shape and size of a symbol, and whether it is filled."""
+
+    color: str
+    shape: str
+    size_pt: float
+    filled: bool = True
+
+    def hollow(self) -> "Mark":
+        """The same symbol, not filled."""
+        return replace(self, filled=False)
+
+
+MOST_INTERVALS = 170
+"""More intervals than this cannot be told apart side by side."""
+
+FARTHEST = 10.0
+"""What lies farther than this factor from the quartiles is shown at the edge."""
+
+_MARGIN, _LEAST = 0.06, 0.09
+"""Room at either end: a share of the axis, and at least so many decades."""
+
+_EDGE = 0.025
+"""How far from the end of the axis something beyond it is marked, as a share of the axis."""
+
+_SHARE = 0.82
+_SHADE = "#F2F2F2"
+
+_MOST_LETTERS = 140
+"""Letters that stand side by side below a panel of the whole width."""
+
+_PANEL_MM, _KEY_MM = 56.0, 22.0
+_MOST_NAMES = 12
+_FROM_BEST = (*OF_JOINTS, *SHARED)
+_MARKS = (Mark(OURS, "o", 3.4), Mark(BEST, "D", 2.9))
+_DASHES: tuple[int, tuple[int, int]] = (0, (4, 2))
+
+
+def stiffness_by_level_figure(
+    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel per free coordinate: levels side by side, and in each level the specimens."""
+    stiffness = tables["stiffness"]
+    shown = _representations(stiffness, cohort)
+    rows = own(stiffness, shown)
+    if not len(finite(rows["stiffness"])):
+        tried = own(stiffness, _FROM_BEST)["message"]
+        why = "; ".join(list(dict.fromkeys(tried[tried != ""]))[:2])
+        return saying("No stiffness was found for any specimen" + (f": {why}." if why else "."))
+    names = [name for name in COORDINATES if name in set(rows["coordinate"])]
+    figure = blank(_PANEL_MM * len(names) + _KEY_MM)
+    axes = side_by_side(figure, len(names), 1)
+    for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
+        head(axis, index, AXIS[name])
+        published = stiffness[
+            (stiffness["source"] == "literature") & (stiffness["coordinate"] == name)
+        ]
+        _draw(axis, name, rows[rows["coordinate"] == name], published, shown, cohort)
+    _explain(figure, stiffness, rows, shown, cohort)
+    return figure
+
+
+def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
+    """At most two: those with a value for each joint first; one where two would crowd."""
+    known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
+    found = [name for name in _FROM_BEST if name in set(known["representation"])]
+    free = [name for name in found if name in OF_JOINTS] or found[:1]
+    one = len(cohort.joint_names) * len(cohort.specimen_names)
+    return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
 
 
 def own(stiffness: pd.DataFrame, representations: Sequence[str]) -> pd.DataFrame:
@@ -44,10 +115,43 @@ def doubted(rows: pd.DataFrame) -> pd.Series:
     return ~known | (rows["at_bound"] != "no")
 
 
-_SHARE = 0.82
-_SHADE = "#F2F2F2"
-_MOST_LETTERS = 140
-"""Letters that stand side by side below a panel of the whole width."""
+def _crowded(cohort: Cohort) -> bool:
+    return len(cohort.joint_names) * len(cohort.specimen_names) > MOST_INTERVALS
+
+
+def _draw(
+    axis: Axes,
+    name: str,
+    rows: pd.DataFrame,
+    published: pd.DataFrame,
+    shown: Sequence[str],
+    cohort: Cohort,
+) -> None:
+    levels = cohort.joint_names[::-1]
+    shade(axis, len(levels))
+    _draw_published(axis, published, levels)
+    axis.set_yscale("log")
+    axis.set_ylabel(f"stiffness ({stiffness_unit(name)})")
+    label_levels(axis, levels)
+    if not len(finite(rows["stiffness"])):
+        axis.text(0.5, 0.5, "no stiffness was found", transform=axis.transAxes, ha="center")
+        return
+    low, high = reach(rows, published["stiffness"])
+    axis.set_ylim(low, high)
+    log_ticks(axis.yaxis, low, high, 6)
+    axis.tick_params(axis="y", which="major", length=2.5)
+    for level, joint in enumerate(levels):
+        here = rows[rows["joint"] == joint]
+        if _crowded(cohort):
+            values = finite(here.loc[~doubted(here), "stiffness"])
+            if len(values):
+                draw_upright(axis, values, level, OURS, 0.5)
+            continue
+        at = places(level, cohort.specimen_names, shown)
+        x = [at[key] for key in zip(here["specimen"], here["representation"], strict=True)]
+        for number_of, representation in enumerate(shown):
+            chosen = (here["representation"] == representation).to_numpy(bool)
+            draw_marks(axis, here[chosen], pd.Series(x)[chosen], _MARKS[number_of])
 
 
 def places(
@@ -75,37 +179,43 @@ def label_levels(axis: Axes, levels: Sequence[str]) -> None:
     axis.tick_params(axis="x", length=0.0)
 
 
-_EDGE = 0.025
-"""How far from the end of the axis something beyond it is marked, as a share of the axis."""
+def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
+    """Ends of the axis.
+
+    Parameters
+    ----------
+    rows : with stiffness and interval; those the data do not hold count only where all are such.
+    more : further values that are on the axis if they are near.
+    """
+    held = rows[~doubted(rows)]
+    chosen = held if len(held) else rows
+    values = finite(chosen["stiffness"])
+    middle = quartiles(values)
+    near = np.concatenate([finite(chosen[name]) for name in ("stiffness", "low", "high")])
+    near = np.concatenate([near, finite(more)])
+    near = near[(near > middle.low / FARTHEST) & (near < middle.high * FARTHEST)]
+    low, high = float(near.min()), float(near.max())
+    margin = 10.0 ** max(_LEAST, _MARGIN * np.log10(high / low))
+    return low / margin, high * margin
 
 
-@dataclass(frozen=True)
-class Mark:
-    """Colour, shape and size of a symbol, and whether it is filled."""
-
-    color: str
-    shape: str
-    size_pt: float
-    filled: bool = True
-
-    def hollow(self) -> "Mark":
-        """The same symbol, not filled."""
-        return replace(self, filled=False)
-
-
-def handle(mark: Mark, label: str) -> Line2D:
-    """The symbol as the key shows it."""
-    return Line2D(
-        [],
-        [],
-        color=mark.color,
-        lw=0.9,
-        marker=mark.shape,
-        ms=mark.size_pt,
-        mfc=mark.color if mark.filled else WHITE,
-        mew=0.7,
-        label=label,
-    )
+def _draw_published(axis: Axes, published: pd.DataFrame, levels: Sequence[str]) -> None:
+    """The same value for all joints as a dashed line, values of levels as short bars."""
+    by_level = published["representation"].map(lambda name: named(name).by_level).astype(bool)
+    for _, rows in published[~by_level].groupby("representation", sort=False):
+        for value in finite(rows["stiffness"])[:1]:
+            axis.axhline(value, color=GREY, lw=0.8, ls=_DASHES, zorder=1.5)
+    each = published[by_level]
+    for joint, value in each.groupby("joint")["stiffness"].first().dropna().items():
+        x = list(levels).index(str(joint))
+        axis.plot(
+            [x - 0.46, x + 0.46],
+            [value, value],
+            color=THEIRS,
+            lw=1.4,
+            solid_capstyle="butt",
+            zorder=1.6,
+        )
 
 
 def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
@@ -156,131 +266,19 @@ def _at_edge(axis: Axes, x: float, top: float, shape: str, color: str) -> None:
     )
 
 
-FARTHEST = 10.0
-"""What lies farther than this factor from the quartiles is shown at the edge."""
-
-_MARGIN, _LEAST = 0.06, 0.09
-"""Room at either end: a share of the axis, and at least so many decades."""
-
-
-def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
-    """Ends of the axis.
-
-    Parameters
-    ----------
-    rows : with stiffness and interval; those the data do not hold count only where all are such.
-    more : further values that are on the axis if they are near.
-    """
-    held = rows[~doubted(rows)]
-    chosen = held if len(held) else rows
-    values = finite(chosen["stiffness"])
-    middle = quartiles(values)
-    near = np.concatenate([finite(chosen[name]) for name in ("stiffness", "low", "high")])
-    near = np.concatenate([near, finite(more)])
-    near = near[(near > middle.low / FARTHEST) & (near < middle.high * FARTHEST)]
-    low, high = float(near.min()), float(near.max())
-    margin = 10.0 ** max(_LEAST, _MARGIN * np.log10(high / low))
-    return low / margin, high * margin
-
-
-MOST_INTERVALS = 170
-"""More intervals than this cannot be told apart side by side."""
-
-_PANEL_MM, _KEY_MM = 56.0, 22.0
-_MOST_NAMES = 12
-_FROM_BEST = ("per_joint", "partially_pooled", "per_specimen", "level_ratio")
-_MARKS = (Mark(OURS, "o", 3.4), Mark(BEST, "D", 2.9))
-_DASHES: tuple[int, tuple[int, int]] = (0, (4, 2))
-
-
-def stiffness_by_level_figure(
-    study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
-    """A panel per free coordinate: levels side by side, and in each level the specimens."""
-    stiffness = tables["stiffness"]
-    shown = _representations(stiffness, cohort)
-    rows = own(stiffness, shown)
-    if not len(finite(rows["stiffness"])):
-        tried = own(stiffness, _FROM_BEST)["message"]
-        why = "; ".join(list(dict.fromkeys(tried[tried != ""]))[:2])
-        return saying("No stiffness was found for any specimen" + (f": {why}." if why else "."))
-    names = [name for name in COORDINATES if name in set(rows["coordinate"])]
-    figure = blank(_PANEL_MM * len(names) + _KEY_MM)
-    axes = figure.subplots(len(names), 1, squeeze=False).ravel()
-    for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
-        head(axis, index, AXIS[name])
-        published = stiffness[
-            (stiffness["source"] == "literature") & (stiffness["coordinate"] == name)
-        ]
-        _draw(axis, name, rows[rows["coordinate"] == name], published, shown, cohort)
-    _explain(figure, stiffness, rows, shown, cohort)
-    return figure
-
-
-def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
-    """At most two: those with a value for each joint first; one where two would crowd."""
-    known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
-    found = [name for name in _FROM_BEST if name in set(known["representation"])]
-    free = [name for name in found if name in _FROM_BEST[:2]] or found[:1]
-    one = len(cohort.joint_names) * len(cohort.specimen_names)
-    return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
-
-
-def _crowded(cohort: Cohort) -> bool:
-    return len(cohort.joint_names) * len(cohort.specimen_names) > MOST_INTERVALS
-
-
-def _draw(
-    axis: Axes,
-    name: str,
-    rows: pd.DataFrame,
-    published: pd.DataFrame,
-    shown: Sequence[str],
-    cohort: Cohort,
-) -> None:
-    levels = cohort.joint_names[::-1]
-    shade(axis, len(levels))
-    _draw_published(axis, published, levels)
-    axis.set_yscale("log")
-    axis.set_ylabel(f"stiffness ({stiffness_unit(name)})")
-    label_levels(axis, levels)
-    if not len(finite(rows["stiffness"])):
-        axis.text(0.5, 0.5, "no stiffness was found", transform=axis.transAxes, ha="center")
-        return
-    low, high = reach(rows, published["stiffness"])
-    axis.set_ylim(low, high)
-    log_ticks(axis.yaxis, low, high, 6)
-    axis.tick_params(axis="y", which="major", length=2.5)
-    for level, joint in enumerate(levels):
-        here = rows[rows["joint"] == joint]
-        if _crowded(cohort):
-            values = finite(here.loc[~doubted(here), "stiffness"])
-            if len(values):
-                draw_upright(axis, values, level, OURS, 0.5)
-            continue
-        at = places(level, cohort.specimen_names, shown)
-        x = [at[key] for key in zip(here["specimen"], here["representation"], strict=True)]
-        for number_of, representation in enumerate(shown):
-            chosen = (here["representation"] == representation).to_numpy(bool)
-            draw_marks(axis, here[chosen], pd.Series(x)[chosen], _MARKS[number_of])
-
-
-def _draw_published(axis: Axes, published: pd.DataFrame, levels: Sequence[str]) -> None:
-    """The same value for all joints as a dashed line, values of levels as short bars."""
-    one = finite(published.loc[published["representation"] == "literature", "stiffness"])
-    if len(one):
-        axis.axhline(one[0], color=GREY, lw=0.8, ls=_DASHES, zorder=1.5)
-    each = published[published["representation"] == "literature_levels"]
-    for joint, value in each.groupby("joint")["stiffness"].first().dropna().items():
-        x = list(levels).index(str(joint))
-        axis.plot(
-            [x - 0.46, x + 0.46],
-            [value, value],
-            color=THEIRS,
-            lw=1.4,
-            solid_capstyle="butt",
-            zorder=1.6,
-        )
+def handle(mark: Mark, label: str) -> Line2D:
+    """The symbol as the key shows it."""
+    return Line2D(
+        [],
+        [],
+        color=mark.color,
+        lw=0.9,
+        marker=mark.shape,
+        ms=mark.size_pt,
+        mfc=mark.color if mark.filled else WHITE,
+        mew=0.7,
+        label=label,
+    )
 
 
 def _explain(
@@ -301,16 +299,17 @@ def _explain(
                 ms=2.2,
                 mew=0,
                 ls="",
-                label=f"{NAME[shown[0]]}, a specimen",
+                label=f"{IN_WORDS[shown[0]]}, a specimen",
             )
         )
     else:
-        handles += [handle(mark, NAME[name]) for mark, name in zip(_MARKS, shown, strict=False)]
+        handles += [handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
-    if "literature" in published:
-        handles.append(Line2D([], [], color=GREY, lw=0.8, ls=_DASHES, label=NAME["literature"]))
-    if "literature_levels" in published:
-        handles.append(Line2D([], [], color=THEIRS, lw=1.4, label=NAME["literature_levels"]))
+    for name in (name for name in PUBLISHED if name in published):
+        look: dict[str, Any] = {"color": THEIRS, "lw": 1.4}
+        if not named(name).by_level:
+            look = {"color": GREY, "lw": 0.8, "ls": _DASHES}
+        handles.append(Line2D([], [], **look, label=IN_WORDS[name]))
     doubt = bool(doubted(rows[rows["stiffness"].notna()]).any())
     if doubt and not _crowded(cohort):
         handles.append(handle(_MARKS[0].hollow(), "not identifiable or at a bound"))
@@ -337,8 +336,7 @@ def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
     else:
         several = len(cohort.specimen_names) > 1
         if several:
-            words.append(
-                f"in each level from left to right: {first_of(cohort.specimen_names, _MOST_NAMES)}"
-            )
+            names = listed(map(short, cohort.specimen_names), _MOST_NAMES, last=None)
+            words.append(f"in each level from left to right: {names}")
         words += ["line: 95 % interval, where longer than the symbol", "▲▼: beyond the axis"]
     return "; ".join(words) + "."

@@ -1,20 +1,22 @@
-"""All claims of Gould et al. 2024b (doi 10.3389/fbioe.2024.1372088), in the order of the paper.
+"""Job: the numbers of Gould et al. 2024b beside those of a run on the phantom made after it.
 
-Job: the numbers of Gould et al. 2024b beside those of a run on the phantom made after it.
+doi 10.3389/fbioe.2024.1372088.
 """
 
 from spinepipe.comparison.claim import Run, judged
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.cohort_stiffness.gould_2024b.errors import (
+from spinepipe.studies.cohort_stiffness.gould_2024b.error_patterns import (
     claims_of_error_orders,
     claims_of_error_patterns,
-    claims_of_mean_errors,
+)
+from spinepipe.studies.cohort_stiffness.gould_2024b.errors import claims_of_mean_errors
+from spinepipe.studies.cohort_stiffness.gould_2024b.motion import (
+    claims_of_implied_motion,
+    claims_of_rotations,
 )
 from spinepipe.studies.cohort_stiffness.gould_2024b.numbers import (
-    claims_of_implied_motion,
     claims_of_own_numbers,
-    claims_of_rotations,
     claims_of_set_up,
 )
 from spinepipe.studies.cohort_stiffness.gould_2024b.stiffness import (

@@ -13,6 +13,7 @@ import pandas as pd
 
 from spinepipe.anatomy import published
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Range, Run, Verdict, exactly
+from spinepipe.studies.cohort_stiffness.representations import start_of
 from spinepipe.studies.cohort_stiffness.stages import largest_mean_motion
 
 PAPER = published("gould_2024b")
@@ -35,7 +36,7 @@ JOINTS = tuple(name for name in PAPER["level_stiffness"] if name != "where")
 LOWER_FIVE = JOINTS[1:]
 """The five levels that the paper's numbers point to (B5)."""
 
-LITERATURE = {"per_specimen": "literature", "level_ratio": "literature_levels"}
+LITERATURE = {name: start_of(name) for name in ("per_specimen", "level_ratio")}
 """The paper's two models, and what each is before it is fitted."""
 
 MODELS = tuple(LITERATURE)

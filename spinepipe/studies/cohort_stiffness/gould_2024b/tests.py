@@ -1,9 +1,4 @@
-"""Table 5: do errors differ between specimens, and between levels?
-
-Table 7: do the errors of the two models differ?
-
-Table 6: do errors of a specimen differ between stages?
-"""
+"""Tests of significance: Table 5, specimens and levels; Table 6, stages; Table 7, models."""
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import product
@@ -45,11 +40,35 @@ from spinepipe.studies.cohort_stiffness.gould_2024b.paper import (
 )
 
 TABLE_5 = "Table 5"
+TABLE_6 = "Table 6"
+TABLE_7 = "Table 7"
+COMPARISONS = ("literature_against_fitted", "fitted_against_left_out_specimen")
 _GROUP_NAMES = {"level": "levels", "specimen": "specimens"}
 _RESPONSES = ("loaded_error", "rotation_error")
+
 _POWER = (
     PHANTOM + "; which differences are significant hangs on the size of the phantom's invented "
     "differences between levels, on six levels instead of five, and on noise"
+)
+
+_OUTSIDE_PAIRS = (
+    PHANTOM
+    + "; ours have 18 pairs of six levels instead of 15, and the phantom's errors are those "
+    "of linear stiffness"
+)
+
+_PRINTED = PAPER["per_specimen_against_level_ratio"]
+_MOTIONS = (*COORDINATES, "overall")
+_GROUPS = 2
+
+_PAIRED = (
+    "B18: both models have the same specimens, so the values are paired, but were tested as "
+    "independent"
+)
+
+_OUTSIDE = (
+    PHANTOM
+    + "; Table 2's ratios are far from the phantom's mild ones in all of its specimens alike"
 )
 
 
@@ -64,13 +83,6 @@ def _printed_between(test: str, model: str, group: str, stage: str) -> str:
     """What the cell holds: ``p = 0.003``, ``p < 0.001``, or not significant."""
     loads = PAPER["kruskal_wallis"].get(test, {})
     return in_words(loads.get(model, {}).get(group, {}).get(stage, {}))
-
-
-def in_words(found: Mapping[str, float]) -> str:
-    """A printed p of the paper, nothing where none is printed."""
-    if "p_below" in found:
-        return f"p < {float(found['p_below']):g}"
-    return f"p = {float(found['p']):g}" if "p" in found else ""
 
 
 def _cell_between(test: str, model: str, group: str, stage: str) -> Claim:
@@ -160,20 +172,72 @@ def _contradicted() -> Iterator[Claim]:
     )
 
 
-TABLE_7 = "Table 7"
-_PRINTED = PAPER["per_specimen_against_level_ratio"]
-_MOTIONS = (*COORDINATES, "overall")
-_GROUPS = 2
-_PAIRED = (
-    "B18: both models have the same specimens, so the values are paired, but were tested as "
-    "independent"
-)
+def claims_of_signed_rank() -> Iterator[Claim]:
+    """How many specimens differ, then the smallest p that can be."""
+    for comparison, model, test in product(COMPARISONS, MODELS, TESTS):
+        yield _share(comparison, model, test)
+    yield _smallest_p()
 
 
-_OUTSIDE = (
-    PHANTOM
-    + "; Table 2's ratios are far from the phantom's mild ones in all of its specimens alike"
-)
+def _share(comparison: str, model: str, test: str) -> Claim:
+    printed = PAPER["signed_rank"][comparison][model].get(test, {})
+    significant = sum(_p(found) < P_BELOW for found in printed.values())
+    tests = SPECIMENS - len(not_converged(model, test))
+    values = ", ".join(f"{name} {in_words(found)}" for name, found in printed.items())
+    before, after = comparison.split("_against_")
+    return Claim(
+        f"table_6.{comparison}.{model}.{test}",
+        TABLE_6,
+        f"specimens whose errors under {LOAD[test]} differ between {before} and {after}, {model}",
+        "%",
+        100.0 * significant / tests,
+        binomial(significant, tests),
+        _ours(comparison, model, test),
+        _OUTSIDE_PAIRS,
+        f"{NOT_BY_SPECIMEN}; printed: {values or 'no p'}",
+    )
+
+
+def _ours(comparison: str, model: str, test: str) -> Callable[[Run], Ours]:
+    family = f"signed_rank/{comparison}/{model}/{test}"
+
+    def ours(run: Run) -> Ours:
+        rows = tested(run, "wilcoxon", family=family, stratum=test, response="rotation_error")
+        significant = rows["p_bonferroni"] < P_BELOW
+        return Ours(
+            100.0 * float(significant.mean()),
+            note=f"ours: {int(significant.sum())} of {len(rows)}, "
+            f"{int(rows['n'].min())} to {int(rows['n'].max())} pairs",
+        )
+
+    return ours
+
+
+def _smallest_p() -> Claim:
+    pairs, family = int(COUNTS["signed_rank_pairs"]), int(COUNTS["signed_rank_family"])
+    ours = family * 2.0 / 2**pairs
+    bound = min(
+        float(found["p_below"])
+        for comparison, model in product(COMPARISONS, MODELS)
+        for load in PAPER["signed_rank"][comparison][model].values()
+        for found in load.values()
+        if "p_below" in found
+    )
+    return recomputed(
+        "smallest_signed_rank_p",
+        "section 2.6.4, Table 6",
+        f"smallest p that {pairs} pairs can have, times {family}",
+        "p",
+        None,
+        Range(0.0, bound, "below the smallest p that Table 6 prints"),
+        ours,
+        f"B20: {family} x 2 / 2^{pairs}",
+    )
+
+
+def _p(found: Mapping[str, float]) -> float:
+    """A printed p, or what it is said to be below."""
+    return float(found["p"] if "p" in found else found["p_below"])
 
 
 def claims_of_model_tests() -> Iterator[Claim]:
@@ -288,78 +352,8 @@ def _critical() -> Claim:
     )
 
 
-TABLE_6 = "Table 6"
-COMPARISONS = ("literature_against_fitted", "fitted_against_left_out_specimen")
-_OUTSIDE_PAIRS = (
-    PHANTOM
-    + "; ours have 18 pairs of six levels instead of 15, and the phantom's errors are those "
-    "of linear stiffness"
-)
-
-
-def claims_of_signed_rank() -> Iterator[Claim]:
-    """How many specimens differ, then the smallest p that can be."""
-    for comparison, model, test in product(COMPARISONS, MODELS, TESTS):
-        yield _share(comparison, model, test)
-    yield _smallest_p()
-
-
-def _share(comparison: str, model: str, test: str) -> Claim:
-    printed = PAPER["signed_rank"][comparison][model].get(test, {})
-    significant = sum(_p(found) < P_BELOW for found in printed.values())
-    tests = SPECIMENS - len(not_converged(model, test))
-    values = ", ".join(f"{name} {in_words(found)}" for name, found in printed.items())
-    before, after = comparison.split("_against_")
-    return Claim(
-        f"table_6.{comparison}.{model}.{test}",
-        TABLE_6,
-        f"specimens whose errors under {LOAD[test]} differ between {before} and {after}, {model}",
-        "%",
-        100.0 * significant / tests,
-        binomial(significant, tests),
-        _ours(comparison, model, test),
-        _OUTSIDE_PAIRS,
-        f"{NOT_BY_SPECIMEN}; printed: {values or 'no p'}",
-    )
-
-
-def _p(found: Mapping[str, float]) -> float:
-    """A printed p, or what it is said to be below."""
-    return float(found["p"] if "p" in found else found["p_below"])
-
-
-def _ours(comparison: str, model: str, test: str) -> Callable[[Run], Ours]:
-    family = f"signed_rank/{comparison}/{model}/{test}"
-
-    def ours(run: Run) -> Ours:
-        rows = tested(run, "wilcoxon", family=family, stratum=test, response="rotation_error")
-        significant = rows["p_bonferroni"] < P_BELOW
-        return Ours(
-            100.0 * float(significant.mean()),
-            note=f"ours: {int(significant.sum())} of {len(rows)}, "
-            f"{int(rows['n'].min())} to {int(rows['n'].max())} pairs",
-        )
-
-    return ours
-
-
-def _smallest_p() -> Claim:
-    pairs, family = int(COUNTS["signed_rank_pairs"]), int(COUNTS["signed_rank_family"])
-    ours = family * 2.0 / 2**pairs
-    bound = min(
-        float(found["p_below"])
-        for comparison, model in product(COMPARISONS, MODELS)
-        for load in PAPER["signed_rank"][comparison][model].values()
-        for found in load.values()
-        if "p_below" in found
-    )
-    return recomputed(
-        "smallest_signed_rank_p",
-        "section 2.6.4, Table 6",
-        f"smallest p that {pairs} pairs can have, times {family}",
-        "p",
-        None,
-        Range(0.0, bound, "below the smallest p that Table 6 prints"),
-        ours,
-        f"B20: {family} x 2 / 2^{pairs}",
-    )
+def in_words(found: Mapping[str, float]) -> str:
+    """A printed p of the paper, nothing where none is printed."""
+    if "p_below" in found:
+        return f"p < {float(found['p_below']):g}"
+    return f"p = {float(found['p']):g}" if "p" in found else ""

@@ -42,6 +42,7 @@ from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
+from spinepipe.studies.discrepancy.verdict import NotTestable
 from spinepipe.units import COORDINATES
 
 SLOWER = 10.0
@@ -151,15 +152,6 @@ PRELOAD = "follower_load"
 
 MOST_STEPS = 10
 """Per test before anything is added; fewer readings than in truth err on the safe side."""
-
-
-@dataclass(frozen=True)
-class NotTestable:
-    """An effect that these tests cannot show, why, and the test that would."""
-
-    name: str
-    why: str
-    test_that_would_tell: str
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from scipy.sparse.csgraph import connected_components
 
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.design.extra_tests import NotTestable, bench, not_testable
+from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
 from spinepipe.studies.discrepancy.design.testable import Judgement, Typical, judgements, summing
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.screen import SIZES, Places
 from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
 
 ALIKE = 0.95
 """Effects that explain more than this share of each other cannot be told apart."""
@@ -136,14 +137,6 @@ def _products(
             if specimen in target.made:
                 moment += onto @ target.made[specimen][mine]
     return gram, moments
-
-
-@dataclass(frozen=True)
-class SmallestDetectable:
-    """The smallest gap, noise SD, at which an effect would be found."""
-
-    name: str
-    gap: float
 
 
 @dataclass(frozen=True)

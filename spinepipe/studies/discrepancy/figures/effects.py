@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
-from spinepipe.report.panels import explain_marks, sections
+from spinepipe.report.panels import explain_marks, head, sections, side_by_side
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, blank, note, saying
 from spinepipe.report.words import fixed, number, plain, short, tick
 from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell, name_cells
@@ -47,14 +47,14 @@ def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
     if not rows:
         return saying("Nothing can be shown: no effect could be tried.")
     figure = blank(len(rows) * _SQUARE_MM + _BESIDE_MM + _SCALE_MM)
-    left, right = figure.subplots(1, 2, width_ratios=[3.0, 1.0], sharey=True)
+    left, right = side_by_side(figure, 2, 2, width_ratios=[3.0, 1.0], sharey=True)
     grid = _square(confusions, rows, names)
     decimals = 2 if len(rows) <= _MOST_WITH_NUMBERS else None
     image = draw_heat(left, np.where(grid < _LEAST_SHARE, 0.0, grid), Normalize(0.0, 1.0), decimals)
     name_cells(left, [plain(name) for name in rows], [plain(name) for name in names], True)
     _detectable(right, rows, hidden, _gaps(candidates, verdict))
     for index, (axis, words) in enumerate(zip((left, right), HEADINGS, strict=True)):
-        axis.set_title(f"{chr(ord('a') + index)}   {words}")
+        head(axis, index, words)
     left.set_ylabel("effect that is there")
     left.set_xlabel("effect that is taken for it")
     bar = figure.colorbar(image, ax=[left, right], location="bottom", aspect=60, shrink=0.6)
@@ -130,7 +130,8 @@ def effect_evidence_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -
         return saying("No evidence can be shown: no effect was tried.")
     longest = max(len(found) for found in rounds)
     (panels,), figure = sections([(len(rounds), longest * _ROW_MM + _AROUND_MM)], _KEY_MM, _ACROSS)
-    low, high = _reach(rounds, verdict)
+    threshold = verdict.threshold.log_evidence
+    low, high = _reach(rounds, threshold)
     for index, (axis, found) in enumerate(zip(panels, rounds, strict=True)):
         _draw(axis, found, verdict)
         axis.set_ylim(len(found) - longest - 0.7, len(found) - 0.3)
@@ -138,9 +139,9 @@ def effect_evidence_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -
         axis.set_xlim(low, high)
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
         axis.set_xlabel("log evidence for the effect")
-        axis.set_title(f"{chr(ord('a') + index)}   {_title(rounds[:index])}")
-        if verdict.threshold is not None:
-            axis.axvline(verdict.threshold, color=BLACK, lw=0.8, ls="--", zorder=5)
+        head(axis, index, _title(rounds[:index]))
+        if threshold is not None:
+            axis.axvline(threshold, color=BLACK, lw=0.8, ls="--", zorder=5)
     explain_marks(figure, _handles(verdict), _words(verdict), len(_handles(verdict)))
     return figure
 
@@ -198,7 +199,7 @@ def _draw(axis: Axes, found: pd.DataFrame, verdict: Verdict) -> None:
     axis.set_yticks(range(len(found)), [plain(str(name)) for name in found.index])
     for label, name in zip(axis.get_yticklabels(), found.index, strict=True):
         label.set_fontweight(
-            "bold" if name in verdict.named or name in verdict.in_set else "normal"
+            "bold" if name in verdict.named or name in verdict.candidates_in_set else "normal"
         )
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=2)
     axis.spines["left"].set_visible(False)
@@ -207,13 +208,13 @@ def _draw(axis: Axes, found: pd.DataFrame, verdict: Verdict) -> None:
 def _color(name: str, verdict: Verdict) -> str:
     if name in verdict.named:
         return BLUE
-    return GREEN if name in verdict.in_set else PALE
+    return GREEN if name in verdict.candidates_in_set else PALE
 
 
-def _reach(rounds: list[pd.DataFrame], verdict: Verdict) -> tuple[float, float]:
+def _reach(rounds: list[pd.DataFrame], threshold: float | None) -> tuple[float, float]:
     values = finite(pd.concat(rounds).to_numpy(float))
     low = min(0.0, float(values.min()))
-    high = max(_LINEAR_TO, float(values.max()), 1.5 * (verdict.threshold or 0.0))
+    high = max(_LINEAR_TO, float(values.max()), 1.5 * (threshold or 0.0))
     return 1.2 * low - 1.0, _ROOM_FOR_NUMBERS * high
 
 
@@ -227,23 +228,24 @@ def _handles(verdict: Verdict) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = []
     if verdict.named:
         handles.append(Patch(facecolor=BLUE, lw=0, label="named"))
-    if verdict.in_set:
+    if verdict.candidates_in_set:
         handles.append(Patch(facecolor=GREEN, lw=0, label="cannot be told apart"))
     handles += [
         Patch(facecolor=PALE, lw=0, label="other effect, refitted"),
         Patch(facecolor=PALE, alpha=0.45, lw=0, label="screened only"),
         Line2D([], [], color=BLACK, marker="|", ms=6.0, mew=1.1, lw=0, label="at the screen"),
     ]
-    if verdict.threshold is not None:
+    if verdict.threshold.log_evidence is not None:
         handles.append(Line2D([], [], color=BLACK, lw=0.8, ls="--", label="threshold"))
     return handles
 
 
 def _words(verdict: Verdict) -> str:
     told = "Best form of each effect (places, shape); linear up to 10, logarithmic beyond"
-    if verdict.threshold is None or verdict.false_alarm is None:
+    threshold, false_alarm = verdict.threshold.log_evidence, verdict.threshold.false_alarm
+    if threshold is None or false_alarm is None:
         return f"{told}."
     return (
-        f"{told}; the threshold {number(verdict.threshold, 2)} is passed in "
-        f"{tick(100.0 * verdict.false_alarm)} % of data sets that lack nothing."
+        f"{told}; the threshold {number(threshold, 2)} is passed in "
+        f"{tick(100.0 * false_alarm)} % of data sets that lack nothing."
     )

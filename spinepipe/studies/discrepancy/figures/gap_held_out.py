@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import finite
-from spinepipe.report.panels import explain_marks, head, log_ticks
+from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import plain, short
 from spinepipe.studies.discrepancy.settings import Discrepancy
@@ -39,7 +39,7 @@ def gap_held_out_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> F
         return saying("No held-out motion can be shown: nothing was left out, or no fit ended.")
     longest = max(int((rows["kind"] == kind).sum()) for kind in kinds)
     figure = blank(longest * _ROW_MM + _AROUND_MM + _KEY_MM)
-    axes = figure.subplots(1, len(kinds), squeeze=False).ravel()
+    axes = side_by_side(figure, len(kinds), len(kinds))
     for index, (axis, kind) in enumerate(zip(axes, kinds, strict=True)):
         head(axis, index, KINDS[kind])
         folds = rows[rows["kind"] == kind].iloc[::-1]

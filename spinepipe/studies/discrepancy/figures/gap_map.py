@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
-from spinepipe.report.panels import explain_marks, sections
+from spinepipe.report.panels import explain_marks, head, head_line, lines_of, sections
 from spinepipe.report.style import (
     BLACK,
     GREY,
@@ -35,7 +35,7 @@ from spinepipe.report.style import (
     blank,
     saying,
 )
-from spinepipe.report.words import AXIS, capital, count, fixed, number, plain, short, unit
+from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.tables import Tables
 from spinepipe.units import COORDINATES
@@ -97,9 +97,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, with_effects: bool) -> None:
 def _label_steps(axis: Axes, index: int, place: tuple[Any, ...], specimens: int) -> None:
     specimen, test, joint, coordinate = place
     whose = f", {short(str(specimen), 14)}" if specimens > 1 else ""
-    axis.set_title(
-        f"{chr(ord('a') + index)}   {joint}{whose}\n{short(capital(plain(str(test))), 34)}"
-    )
+    head(axis, index, f"{joint}{whose}\n{short(case(str(test)), 34)}")
     axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
     axis.set_xlabel("load step")
     axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
@@ -265,7 +263,7 @@ def gap_map_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure
             )
             image = draw_heat(axis, grid, scale, 1 if numbers else None, low <= 0.0)
             _label(axis, cohort.joint_names[::-1], columns, MODELS[model], side == 0)
-        _heading(line[first], place, test, across)
+        head_line(line[first], place, short(case(test), 96 // across), 13.0)
     bar = figure.colorbar(
         image,
         ax=[axis for line in axes for axis in line],
@@ -301,11 +299,7 @@ def _grid(n: int, across: int, models: int, joints: int) -> tuple[Figure, list[l
     room = (TALLEST_MM - _KEY_MM) / down - _AROUND_MM
     row = min(_ROW_MM, max(_LEAST_ROW_MM, room / joints))
     figure = blank(down * (joints * row + _AROUND_MM) + _KEY_MM)
-    axes = [list(line) for line in figure.subplots(down, models * across, squeeze=False)]
-    spare = [axis for line in axes for axis in line][models * n :]
-    for axis in spare:
-        axis.set_visible(False)
-    return figure, axes
+    return figure, lines_of(figure, models * n, models * across)
 
 
 def _room(panels: int, columns: int, joints: int) -> bool:
@@ -326,23 +320,6 @@ def _label(
     name_cells(axis, [short(name, 10) for name in joints], [SHORT[c] for c in columns], True)
     axis.tick_params(labelleft=leftmost)
     axis.set_title(f" \n{model}", fontweight="normal", fontsize=6.5, linespacing=1.7)
-
-
-def _heading(axis: Axes, place: int, test: str, across: int) -> None:
-    """Letter and test above the pair of panels."""
-    words = f"{chr(ord('a') + place)}   {short(capital(plain(test)), 96 // across)}"
-    axis.annotate(
-        words,
-        (0.0, 1.0),
-        (0.0, 13.0),
-        xycoords="axes fraction",
-        va="bottom",
-        textcoords="offset points",
-        fontsize=7.5,
-        fontweight="bold",
-        annotation_clip=False,
-        in_layout=False,
-    )
 
 
 def _words(rows: pd.DataFrame, tests: Sequence[str], models: Sequence[str]) -> str:

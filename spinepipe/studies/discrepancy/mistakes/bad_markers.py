@@ -15,11 +15,11 @@ from scipy.stats import f as f_distribution
 from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.suspected import (
-    SuspectedError,
     joint_moments,
     of_specimens,
 )
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, ROTATIONS
 
 MANY_TIMES = 3.0

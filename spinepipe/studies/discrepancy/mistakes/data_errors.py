@@ -24,7 +24,7 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     beside_the_curve,
     between_cycles,
 )
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError, answers
+from spinepipe.studies.discrepancy.mistakes.suspected import answers
 from spinepipe.studies.discrepancy.mistakes.wrong_units_and_signs import wrong_signs, wrong_units
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, hypothesis
@@ -32,6 +32,7 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, jo
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.verdict import SuspectedError
 
 LEAST_EXCESS = 3.0
 """SDs of chi2 (sqrt of twice the readings) by which both specimens must fail to be looked at."""

@@ -20,20 +20,6 @@ from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
 ALL = "all specimens"
 
 
-@dataclass(frozen=True)
-class SuspectedError:
-    """A mistake that the data point to; nothing is corrected.
-
-    Attributes
-    ----------
-    where : specimens, and joint, coordinate or test. what : the mistake. evidence : with numbers.
-    """
-
-    where: str
-    what: str
-    evidence: str
-
-
 def of_specimens(names: Iterable[str], every: Iterable[str]) -> str:
     """Specimens in words; all of them by one word where there are several."""
     chosen, known = list(names), list(every)

@@ -21,10 +21,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.suspected import (
     ALL,
     Answer,
-    SuspectedError,
     of_specimens,
     typical,
 )
+from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS
 
 AGAINST = -0.9

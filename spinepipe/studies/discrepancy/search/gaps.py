@@ -4,7 +4,7 @@ Where the discrepancy is: gaps by specimen, joint, coordinate, test and load ste
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -49,6 +49,10 @@ class Gap:
     def excess(self) -> float:
         """chi2 beyond what noise makes."""
         return self.chi2 - self.dof
+
+    def against(self, expected: float) -> "Gap":
+        """Held out: beside what a right model leaves, noise and nuisances left open."""
+        return replace(self, dof=expected)
 
     def _of(self, excess: float) -> float:
         return float(np.sqrt(max(0.0, excess / self.dof))) if self.dof > 0.0 else 0.0

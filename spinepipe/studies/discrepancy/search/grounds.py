@@ -8,12 +8,13 @@ from spinepipe.model import SpineModel
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Supposed, hypothesis
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.studies.discrepancy.search.noise import REPEATS, Noise, noise_of_residuals
+from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import Solved
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
 from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.verdict import REPEATS
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,4 @@
-"""A search at work: its rules, how its pieces are run, and what it has looked at so far.
-
-What a search may do, and where it ended.
-
-One round of a search: all effects screened at where the fit stands.
-"""
+"""A search at work: what it may do, what it has looked at so far, and where it ended."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -80,12 +75,16 @@ class Standing:
 class Stage:
     """One look at the effects, with the refits that followed.
 
-    ``name`` : number of the round, or whose place all others were tried in.
+    Attributes
+    ----------
+    name : number of the round, or whose place all others were tried in.
+    in_place : whether they were tried in the place of an effect; else some could enter.
     """
 
     name: str
     screen: Screen
-    refits: tuple[Refit, ...] = ()
+    refits: tuple[Refit, ...]
+    in_place: bool
 
 
 @dataclass(frozen=True)
@@ -154,10 +153,10 @@ def linearised_for(
 
 
 class Inquiry:
-    """Looks, refits and fits by the rules; ``stages`` is the log."""
+    """Looks, refits and fits by the rules, from the base alone on; ``stages`` is the log."""
 
-    def __init__(self, rules: Rules, run: Run) -> None:
-        self.rules, self.run = rules, run
+    def __init__(self, base: Grounds, rules: Rules, run: Run) -> None:
+        self.base, self.rules, self.run = base, rules, run
         self.stages: list[Stage] = []
 
     @property
@@ -165,17 +164,27 @@ class Inquiry:
         """The first look, beside the base alone."""
         return self.stages[0]
 
-    @property
-    def rounds(self) -> int:
-        """Rounds so far in which effects could enter."""
-        return sum(stage.name.isdigit() for stage in self.stages)
+    def stage(self, grounds: Grounds, in_place_of: str = "") -> Stage:
+        """A look at all effects beside the grounds' fit, refits of those that lead, an entry.
 
-    @property
-    def rivalries(self) -> int:
-        """Times so far that all others were tried in an effect's place."""
-        return len(self.stages) - self.rounds
+        Parameters
+        ----------
+        in_place_of : whose place all are tried in. Without it they may enter, and none is refitted
+            where none is evident.
+        """
+        place = bool(in_place_of)
+        if place and grounds is self.base:
+            screen, tried = self.first.screen, self.first.refits
+        else:
+            screen = self._look(grounds)
+            evident = not screen.effects[0].log_evidence <= screen.threshold
+            tried = self._refits(grounds, screen) if place or evident else ()
+        number = 1 + sum(one.in_place == place for one in self.stages)
+        name = f"in place of {in_place_of} ({number})" if place else str(number)
+        self.stages.append(Stage(name, screen, tried, place))
+        return self.stages[-1]
 
-    def look(self, grounds: Grounds) -> Screen:
+    def _look(self, grounds: Grounds) -> Screen:
         """A screen; the null's draws are those of the first, beside the base alone."""
         rules = self.rules
         threshold = self.first.screen.threshold if self.stages else None
@@ -187,7 +196,7 @@ class Inquiry:
         rules = self.rules
         return self.run(lack_of_fit, grounds, rules.coordinates, rules.draws, rules.seed)
 
-    def refits(self, grounds: Grounds, screen: Screen) -> tuple[Refit, ...]:
+    def _refits(self, grounds: Grounds, screen: Screen) -> tuple[Refit, ...]:
         """The forms that lead a screen, refitted; best first."""
         return refits(grounds, screen, self.rules.trials, self.run)
 
@@ -196,9 +205,9 @@ class Inquiry:
         trials = next(t for t in self.rules.trials if t.effect == one.form.name)
         return refit(grounds, one, trials, self.run)
 
-    def beside(self, base: Grounds, current: Grounds, others: tuple[Supposed, ...]) -> Grounds:
+    def beside(self, current: Grounds, others: tuple[Supposed, ...]) -> Grounds:
         """Grounds with these of the current effects alone; the base where they have no fit."""
         if not others:
-            return base
-        fit: JointFit = self.run(joint_fit, current.suppose(others), base.setting)
-        return base.at(fit) if fit.usable else base
+            return self.base
+        fit: JointFit = self.run(joint_fit, current.suppose(others), self.base.setting)
+        return self.base.at(fit) if fit.usable else self.base

@@ -1,8 +1,6 @@
-"""An investigation from beginning to end: base, search, data errors, proof, verdict.
+"""An investigation from beginning to end: readings, base, search, data errors, proof, verdict."""
 
-From a study of kind discrepancy and its cohort to the grounds and the rules of its search.
-"""
-
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,23 +9,22 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
-from spinepipe.studies.discrepancy.mistakes.suspected import SuspectedError
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
 from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters, trials
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.noise import (
-    DECLARED,
     Noise,
     estimated_noise,
     without_outliers,
 )
-from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, as_si
+from spinepipe.studies.discrepancy.search.nuisance import as_si
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
 
 PER_SPECIMEN = "per_specimen"
@@ -36,88 +33,27 @@ GUESSED_SD = np.array([1e-3] * 3 + [np.deg2rad(1.0)] * 3)
 """For the first fit of a cohort that declares no SD and whose cycles differ in their loads."""
 
 
-def prepared(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, run: Run
-) -> tuple[Grounds, Rules]:
-    """Grounds with the base fitted, and what the search may do.
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A study and what it takes of its cohort, read once.
 
-    Parameters
+    Attributes
     ----------
     file : the model file that the study starts from, if it does.
-
-    Raises
-    ------
-    NoBase
-        When there is no base fit, or nothing tells how large the noise is.
+    coordinates : those with readings, of those that the study uses.
+    measured : all readings that the study uses, of specimens that have any.
+    readings, noise : the same without outliers, and their noise.
+    declared : (6,) m and rad, SD of one reading as the study or the cohort declares it, or None.
     """
-    coordinates = read_coordinates(study, cohort)
-    readings, noise = with_noise(study, cohort, measured(study, cohort))
-    start = np.array(study.stiffness.in_order(), dtype=float)
-    models = {one.specimen: base_model(cohort, one, start, file) for one in readings}
-    grouping = study.base.stiffness or PER_SPECIMEN
-    base = {name: base_parameters(model, grouping, coordinates) for name, model in models.items()}
-    begin = Start(models, base, study.bound_factor)
-    grounds = laid(readings, noise, priors(study), begin, run)
-    if grounds.noise.source == DECLARED and declared_sd(study, cohort) is None:
-        raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
-    return grounds, rules(study, cohort, coordinates)
 
-
-def rules(study: Discrepancy, cohort: Cohort, coordinates: tuple[str, ...]) -> Rules:
-    """What a search may do, as the study says."""
-    tried = trials(study.effects, coordinates, cohort.specimen_names, len(cohort.joint_names))
-    return Rules(
-        tried,
-        coordinates,
-        study.false_alarm,
-        study.bootstrap,
-        study.margin,
-        study.most_effects,
-        study.seed,
-    )
-
-
-def priors(study: Discrepancy) -> NuisancePriors:
-    """The study's nuisance block, SI."""
-    return as_si(study.nuisance.model_dump())
-
-
-def read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
-    """Coordinates with readings, of those that the study uses."""
-    assert cohort.motion is not None
-    motion = cohort.motion[cohort.motion["test"].isin(list(study.tests or cohort.tests))]
-    return tuple(
-        name
-        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
-        if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
-    )
-
-
-def measured(study: Discrepancy, cohort: Cohort) -> tuple[SpecimenReadings, ...]:
-    """All readings that the study uses, specimens without any left out."""
-    coordinates, tests = read_coordinates(study, cohort), study.tests or cohort.tests
-    found = (specimen_readings(cohort, s, tests, coordinates) for s in cohort.specimen_names)
-    return tuple(one for one in found if one.tests)
-
-
-def with_noise(
-    study: Discrepancy, cohort: Cohort, readings: tuple[SpecimenReadings, ...]
-) -> tuple[tuple[SpecimenReadings, ...], Noise]:
-    """Readings without outliers, and their noise."""
-    kept, outliers = without_outliers(readings)
-    noise = estimated_noise(kept, declared_sd(study, cohort), cohort.zeroed_at_step_0, outliers)
-    if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
-        noise = estimated_noise(kept, GUESSED_SD, cohort.zeroed_at_step_0, outliers)
-    assert noise is not None
-    return kept, noise
-
-
-def declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
-    """(6,) m and rad, SD of one reading as the study or the cohort declares it."""
-    sd = study.measurement_sd or cohort.measurement_sd
-    if sd is None:
-        return None
-    return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
+    study: Discrepancy
+    cohort: Cohort
+    file: ModelFile | None
+    coordinates: tuple[str, ...]
+    measured: tuple[SpecimenReadings, ...]
+    readings: tuple[SpecimenReadings, ...]
+    noise: Noise
+    declared: Array | None
 
 
 @dataclass(frozen=True)
@@ -139,24 +75,89 @@ class Investigation:
         return replace(self, found=found, proof=self.proof.of_base())
 
 
-def investigate(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, run: Run
-) -> Investigation:
-    """All that decides the verdict of a study.
+def prepared(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepared:
+    """Readings and noise of a study, before anything is fitted."""
+    coordinates, declared = _read_coordinates(study, cohort), _declared_sd(study, cohort)
+    measured = _measured(study, cohort, coordinates)
+    readings, outliers = without_outliers(measured)
+    noise = estimated_noise(readings, declared, cohort.zeroed_at_step_0, outliers)
+    if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
+        noise = estimated_noise(readings, GUESSED_SD, cohort.zeroed_at_step_0, outliers)
+    assert noise is not None
+    return Prepared(study, cohort, file, coordinates, measured, readings, noise, declared)
 
-    Parameters
-    ----------
-    file : the model file that the study starts from, if it does.
+
+def investigate(ready: Prepared, run: Run) -> Investigation:
+    """All that decides the verdict of a study.
 
     Raises
     ------
     NoBase
-        When the base has no fit.
+        When the base has no fit, or nothing tells how large the noise is.
     """
-    grounds, rules = prepared(study, cohort, file, run)
+    study, rules = ready.study, _rules(ready)
+    grounds = _laid(ready, run)
     found = search(grounds, rules, run)
-    errors = suspected_errors(grounds, measured(study, cohort), run)
+    errors = suspected_errors(grounds, ready.measured, run)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     ended = outcome(found, study.margin, proof, errors)
     return Investigation(grounds, rules, found, errors, proof, ended)
+
+
+def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
+    assert cohort.motion is not None
+    motion = cohort.motion[cohort.motion["test"].isin(list(study.tests or cohort.tests))]
+    return tuple(
+        name
+        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
+        if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
+    )
+
+
+def _measured(
+    study: Discrepancy, cohort: Cohort, coordinates: Sequence[str]
+) -> tuple[SpecimenReadings, ...]:
+    tests = study.tests or cohort.tests
+    found = (specimen_readings(cohort, s, tests, coordinates) for s in cohort.specimen_names)
+    return tuple(one for one in found if one.tests)
+
+
+def _declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
+    sd = study.measurement_sd or cohort.measurement_sd
+    if sd is None:
+        return None
+    return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
+
+
+def _laid(ready: Prepared, run: Run) -> Grounds:
+    """Grounds with the base fitted."""
+    study = ready.study
+    start = np.array(study.stiffness.in_order(), dtype=float)
+    models = {
+        one.specimen: base_model(ready.cohort, one, start, ready.file) for one in ready.readings
+    }
+    grouping = study.base.stiffness or PER_SPECIMEN
+    base = {
+        name: base_parameters(model, grouping, ready.coordinates) for name, model in models.items()
+    }
+    begin = Start(models, base, study.bound_factor)
+    grounds = laid(ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run)
+    if grounds.noise.source == DECLARED and ready.declared is None:
+        raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
+    return grounds
+
+
+def _rules(ready: Prepared) -> Rules:
+    """What a search may do, as the study says."""
+    study, cohort = ready.study, ready.cohort
+    joints = len(cohort.joint_names)
+    return Rules(
+        trials(study.effects, ready.coordinates, cohort.specimen_names, joints),
+        ready.coordinates,
+        study.false_alarm,
+        study.bootstrap,
+        study.margin,
+        study.most_effects,
+        study.seed,
+    )

@@ -18,6 +18,7 @@ from scipy.linalg import helmert
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.verdict import DECLARED, REPEATS
 from spinepipe.units import less_step_0
 
 FAR, FAR_CYCLE = 4.0, 5.0
@@ -34,9 +35,6 @@ MAD_PER_SD = 0.67449
 CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
 FEWEST = 30
 """Independent differences between cycles from which an SD is taken for known."""
-
-REPEATS, DECLARED = "repeats", "declared"
-"""Where the noise is known from."""
 
 DECLARED_DOUBT = 1.2
 """Without repeats readings count as this much noisier than declared: a doubt kept on purpose."""

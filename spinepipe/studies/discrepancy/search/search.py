@@ -2,10 +2,8 @@
 
 The order of events and what decides: a screen of all effects in the linearised problem; nonlinear
 refits of those that lead; the best enters if its evidence exceeds what the null would show and it
-closes a real share of the gap; then again beside it. At the end each effect is taken away once and
-all others are tried in its place.
-
-Each effect, and each two, against their rivals: taken away, with all others tried in place.
+closes a real share of the gap; then again beside it. At the end each effect, and each two, are
+taken away once and all others are tried in their place.
 """
 
 from collections.abc import Sequence
@@ -32,6 +30,18 @@ from spinepipe.studies.discrepancy.search.screen import Screen, exceeded
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.units import ROTATIONS
 
+HOPELESS = (4.0, 2.5, 1.5)
+"""Times the evidence of the first, second and further effect that the generic basis may have.
+
+With more, no known effect is what is missing, and adding them up would only imitate it.
+"""
+
+REAL_SHARE = 0.01
+"""Of the base's excess chi2: a further effect that closes less is not worth a name."""
+
+MOST_FORMS_NAMED = 4
+MOST_SWAPS = 3
+
 IMITATED = 0.3
 """Share of an effect's evidence that a simpler one must have, to be tried beside a second."""
 
@@ -42,14 +52,69 @@ LEVELS = "level_dependence"
 """The effect by which joints differ in stiffness."""
 
 
-def examined(
-    base: Grounds, current: Grounds, inquiry: Inquiry
-) -> tuple[Grounds, tuple[Standing, ...] | None]:
+def search(base: Grounds, rules: Rules, run: Run) -> Found:
+    """Effects that the base lacks; none where rivals keep taking each other's place."""
+    inquiry = Inquiry(base, rules, run)
+    base_gap = whole_gap(base, base.fit)
+    lack_of_base = inquiry.lack(base)
+    current = _forward(base, inquiry, base_gap)
+    stood: tuple[Standing, ...] = ()
+    for _ in range(MOST_SWAPS):
+        current, found = _examined(current, inquiry)
+        if found is not None:
+            stood = found
+            break
+        current = _forward(current, inquiry, base_gap)
+    final = current if stood else base
+    lack = inquiry.lack(final) if stood else lack_of_base
+    return Found(
+        base,
+        final,
+        stood,
+        tuple(inquiry.stages),
+        lack,
+        exceeded(lack.null, rules.false_alarm),
+        base_gap,
+        whole_gap(final, final.fit),
+    )
+
+
+def _forward(current: Grounds, inquiry: Inquiry, base_gap: Gap) -> Grounds:
+    """Let effects enter; the grounds that are left."""
+    while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
+        best = _admitted(current, inquiry.stage(current), inquiry.rules, base_gap)
+        if best is None or _hopeless(best, number, inquiry.lack(current)):
+            break
+        current = current.at(best.fit)
+    return current
+
+
+def _admitted(current: Grounds, stage: Stage, rules: Rules, base_gap: Gap) -> Refit | None:
+    """The best refit, if it may enter."""
+    supposed = current.fit.hypothesis.supposed
+    names = {one.form.name for one in supposed}
+    for one in stage.refits:
+        if not one.log_evidence > stage.screen.threshold:
+            return None
+        enough = not supposed or one.gain >= REAL_SHARE * base_gap.excess
+        if enough and (one.name in names or len(names) < rules.most_effects):
+            return one
+    return None
+
+
+def _hopeless(best: Refit, number: int, lack: LackOfFit) -> bool:
+    """Whether the generic basis has so much more evidence that no known effect is the one."""
+    times = HOPELESS[min(number, len(HOPELESS) - 1)]
+    return lack.log_evidence > times * best.log_evidence
+
+
+def _examined(current: Grounds, inquiry: Inquiry) -> tuple[Grounds, tuple[Standing, ...] | None]:
     """The effects of a fit with their rivals; other grounds and None if one left or gave way."""
     stood: list[Standing] = []
     supposed = standing(current.fit)
     for number, one in enumerate(supposed):
-        without, screen, tried = _tried_without(base, current, (number,), inquiry)
+        without, stage = _tried_without(current, (number,), inquiry)
+        screen, tried = stage.screen, stage.refits
         own = _own(without, one, tried, inquiry)
         if not own.log_evidence > screen.threshold:
             return without, None
@@ -62,7 +127,7 @@ def examined(
             return by_two, None
         stood.append(_standing(without, one, own, _rivals(own, tried, screen), inquiry))
     for pair in combinations(range(len(supposed)), 2):
-        given, with_rivals = _against_one(base, current, pair, stood, inquiry)
+        given, with_rivals = _against_one(current, pair, stood, inquiry)
         if given is not None:
             return given, None
         stood = with_rivals
@@ -70,23 +135,17 @@ def examined(
 
 
 def _tried_without(
-    base: Grounds, current: Grounds, left_out: tuple[int, ...], inquiry: Inquiry
-) -> tuple[Grounds, Screen, tuple[Refit, ...]]:
+    current: Grounds, left_out: tuple[int, ...], inquiry: Inquiry
+) -> tuple[Grounds, Stage]:
     """The grounds without some of the effects, and all effects tried there."""
     supposed = standing(current.fit)
     others = tuple(one for number, one in enumerate(supposed) if number not in left_out)
-    without = inquiry.beside(base, current, others)
-    screen, tried = inquiry.first.screen, inquiry.first.refits
-    if without is not base:
-        screen = inquiry.look(without)
-        tried = inquiry.refits(without, screen)
+    without = inquiry.beside(current, others)
     names = " and ".join(supposed[number].form.name for number in left_out)
-    inquiry.stages.append(Stage(f"in place of {names} ({inquiry.rivalries + 1})", screen, tried))
-    return without, screen, tried
+    return without, inquiry.stage(without, in_place_of=names)
 
 
 def _against_one(
-    base: Grounds,
     current: Grounds,
     pair: tuple[int, ...],
     stood: Sequence[Standing],
@@ -97,7 +156,8 @@ def _against_one(
     Returns the grounds with the single one if it has more evidence than both together, and the
     effects, that one among their rivals.
     """
-    without, _, tried = _tried_without(base, current, pair, inquiry)
+    without, stage = _tried_without(current, pair, inquiry)
+    tried = stage.refits
     first, second = (stood[number] for number in pair)
     alone = _own(without, first.supposed, tried, inquiry)
     both = second.log_evidence + max(alone.log_evidence, 0.0)
@@ -131,12 +191,9 @@ def _two_simpler(
         return None
     first = max(simpler, key=lambda one: one.log_evidence)
     beside = without.at(first.fit)
-    screen = inquiry.look(beside)
-    tried = inquiry.refits(beside, screen)
-    name = f"in place of {own.name}, beside {first.name} ({inquiry.rivalries + 1})"
-    inquiry.stages.append(Stage(name, screen, tried))
+    stage = inquiry.stage(beside, in_place_of=f"{own.name}, beside {first.name}")
     few = own.unknowns - first.unknowns
-    others = [one for one in tried if one.name != own.name and one.unknowns <= few]
+    others = [one for one in stage.refits if one.name != own.name and one.unknowns <= few]
     second = max(others, key=lambda one: one.log_evidence, default=None)
     if second is not None and first.log_evidence + second.log_evidence > own.log_evidence:
         return beside.at(second.fit)
@@ -195,81 +252,3 @@ def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, 
     possible = [(n, v) for n, v in evidence.items() if n != own.name and np.isfinite(v)]
     ranked = sorted(possible, key=lambda item: -item[1])
     return tuple(Rival(name, own.log_evidence - value) for name, value in ranked)
-
-
-HOPELESS = (4.0, 2.5, 1.5)
-"""Times the evidence of the first, second and further effect that the generic basis may have.
-
-With more, no known effect is what is missing, and adding them up would only imitate it.
-"""
-
-REAL_SHARE = 0.01
-"""Of the base's excess chi2: a further effect that closes less is not worth a name."""
-
-MOST_FORMS_NAMED = 4
-MOST_SWAPS = 3
-
-
-def search(base: Grounds, rules: Rules, run: Run) -> Found:
-    """Effects that the base lacks; none where rivals keep taking each other's place."""
-    inquiry = Inquiry(rules, run)
-    base_gap = whole_gap(base, base.fit)
-    lack_of_base = inquiry.lack(base)
-    current = _forward(base, inquiry, base_gap)
-    stood: tuple[Standing, ...] = ()
-    for _ in range(MOST_SWAPS):
-        current, found = examined(base, current, inquiry)
-        if found is not None:
-            stood = found
-            break
-        current = _forward(current, inquiry, base_gap)
-    final = current if stood else base
-    lack = inquiry.lack(final) if stood else lack_of_base
-    return Found(
-        base,
-        final,
-        stood,
-        tuple(inquiry.stages),
-        lack,
-        exceeded(lack.null, rules.false_alarm),
-        base_gap,
-        whole_gap(final, final.fit),
-    )
-
-
-def _forward(current: Grounds, inquiry: Inquiry, base_gap: Gap) -> Grounds:
-    """Let effects enter; the grounds that are left."""
-    while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
-        screen = inquiry.look(current)
-        name = str(inquiry.rounds + 1)
-        if screen.effects[0].log_evidence <= screen.threshold:
-            inquiry.stages.append(Stage(name, screen))
-            break
-        tried = inquiry.refits(current, screen)
-        inquiry.stages.append(Stage(name, screen, tried))
-        best = _admitted(current, tried, screen, inquiry.rules, base_gap)
-        if best is None or _hopeless(best, number, inquiry.lack(current)):
-            break
-        current = current.at(best.fit)
-    return current
-
-
-def _admitted(
-    current: Grounds, tried: Sequence[Refit], screen: Screen, rules: Rules, base_gap: Gap
-) -> Refit | None:
-    """The best refit, if it may enter."""
-    supposed = current.fit.hypothesis.supposed
-    names = {one.form.name for one in supposed}
-    for one in tried:
-        if not one.log_evidence > screen.threshold:
-            return None
-        enough = not supposed or one.gain >= REAL_SHARE * base_gap.excess
-        if enough and (one.name in names or len(names) < rules.most_effects):
-            return one
-    return None
-
-
-def _hopeless(best: Refit, number: int, lack: LackOfFit) -> bool:
-    """Whether the generic basis has so much more evidence that no known effect is the one."""
-    times = HOPELESS[min(number, len(HOPELESS) - 1)]
-    return lack.log_evidence > times * best.log_evidence

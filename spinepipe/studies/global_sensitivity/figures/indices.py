@@ -1,7 +1,4 @@
-"""Figure: what each output hangs on, factor by factor, beside the noise floor.
-
-Which factors have a row in the figure: those with an effect, and the dummy below them.
-"""
+"""Figure: what each output hangs on, factor by factor, beside the noise floor."""
 
 from collections.abc import Mapping, Sequence
 

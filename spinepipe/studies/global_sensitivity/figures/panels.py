@@ -1,13 +1,4 @@
-"""Which outputs the figures show, and the rows of each.
-
-Which coordinate a test loads, and at which step most: also of loads without a moment.
-
-Which indices a study has, and how they are called.
-
-What figures and sentences call outputs and factors.
-
-What stands above and below the panels of sensitivity figures.
-"""
+"""Which outputs the figures and findings show, the rows of each, and what they are called."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,46 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.report.marks import Array
-from spinepipe.report.panels import sections
+from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
-from spinepipe.report.words import AXIS, capital, count, plain, short, unit
+from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
 from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
-
-_DRIVEN = ("right_bending", "left_rotation", "extension")
-"""Coordinate that a moment about x, y and z of ground drives."""
-
-
-def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
-    """Coordinate and step of a test's largest moment about the most cranial joint.
-
-    None where the cohort has no such test, or nothing turns that joint.
-    """
-    if cohort.loads is None or test not in cohort.tests:
-        return None
-    rows = cohort.loads[cohort.loads["test"] == test]
-    specimen = cohort.specimen_names[0]
-    own = rows[rows["specimen"].isin([specimen, "*"])]
-    rows = own if len(own) else rows
-    rows = rows[rows["cycle"].isna() | (rows["cycle"] == rows["cycle"].min())]
-    turning = _moments(rows, joint_frames(cohort, specimen)[-1].origin)
-    by_step = pd.DataFrame(turning).groupby(rows["step"].to_numpy()).sum()
-    size = np.linalg.norm(by_step, axis=1)
-    if not size.any():
-        return None
-    peak = int(size.argmax())
-    return _DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
-
-
-def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
-    """(n, 3) N m, ground: each row's moment and that of its force about a point."""
-    forces, moments, points_mm = (
-        loads[[f"{letter}{axis}_{unit}" for axis in "xyz"]].fillna(0.0).to_numpy(float)
-        for letter, unit in (("f", "n"), ("m", "nm"), ("p", "mm"))
-    )
-    return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
 
 
 @dataclass(frozen=True)
@@ -76,80 +36,6 @@ class Measures:
     shown: tuple[str, ...]
     of_variance: bool = False
     in_units: bool = False
-
-
-_KNOWN = (
-    Measures("ST", ("ST", "S1"), of_variance=True),
-    Measures("mu_star", ("mu_star", "sigma"), in_units=True),
-    Measures("PAWN", ("PAWN", "delta", "S1_RBD")),
-)
-NAME = {
-    "ST": "total index ST",
-    "S1": "first-order index S1",
-    "mu_star": "mean size of effects μ*",
-    "sigma": "SD of effects σ",
-    "PAWN": "PAWN",
-    "delta": "δ",
-    "S1_RBD": "S1 (RBD-FAST)",
-}
-COLORS = (BLUE, GREEN, VERMILLION)
-"""Of the shown indices, the main one first."""
-
-DONE = "done"
-
-
-def measures_of(indices: pd.DataFrame) -> Measures | None:
-    """The measures of a study's indices; None where none of them is known."""
-    names = set(indices["index"])
-    return next((known for known in _KNOWN if known.main in names), None)
-
-
-def unit_of(output: str, coordinate: str) -> str:
-    """Unit of an output as printed."""
-    along = coordinate in TRANSLATIONS
-    if output == "stiffness":
-        return "N/m" if along else "N m/rad"
-    if output == "joint_load":
-        return "N" if along else "N m"
-    return unit(coordinate)
-
-
-OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrated stiffness"}
-"""Outputs in their order."""
-
-_LONGEST = 34
-
-
-def factor_name(factor: str, longest: int = _LONGEST) -> str:
-    """``stiffness_L1L2_extension`` as ``stiffness L1L2 extension``."""
-    return f"{DUMMY} (no effect)" if factor == DUMMY else short(plain(factor), longest)
-
-
-def what(output: str, coordinate: str) -> str:
-    """``motion in flexion–extension``; a load along a rotation is a moment."""
-    return f"{kind(output, coordinate)} in {AXIS[coordinate].lower()}"
-
-
-def kind(output: str, coordinate: str) -> str:
-    """``motion``, ``force``, ``moment`` or ``stiffness``."""
-    if output == "joint_load":
-        return "force" if coordinate in TRANSLATIONS else "moment"
-    return output
-
-
-def where(test: str, joint: str) -> str:
-    """``flexion, L1L2``: what there is of them."""
-    return ", ".join(part for part in (capital(plain(test)), joint) if part)
-
-
-def whole(n: int) -> str:
-    """``20 480``."""
-    return f"{n:,}".replace(",", "\u2009")
-
-
-PLACE = ["specimen", "joint"]
-EVERY = "*"
-"""All tests, or all joints: of stiffness."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +67,40 @@ class Panel:
         return Panel(self.output, self.test, self.step, self.coordinate, self.joint, kept)
 
 
+NAME = {
+    "ST": "total index ST",
+    "S1": "first-order index S1",
+    "mu_star": "mean size of effects μ*",
+    "sigma": "SD of effects σ",
+    "PAWN": "PAWN",
+    "delta": "δ",
+    "S1_RBD": "S1 (RBD-FAST)",
+}
+
+_KNOWN = (
+    Measures("ST", ("ST", "S1"), of_variance=True),
+    Measures("mu_star", ("mu_star", "sigma"), in_units=True),
+    Measures("PAWN", ("PAWN", "delta", "S1_RBD")),
+)
+
+COLORS = (BLUE, GREEN, VERMILLION)
+"""Of the shown indices, the main one first."""
+
+DONE = "done"
+PLACE = ["specimen", "joint"]
+
+OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrated stiffness"}
+"""Outputs in their order."""
+
+_LONGEST = 34
+
+
+def measures_of(indices: pd.DataFrame) -> Measures | None:
+    """The measures of a study's indices; None where none of them is known."""
+    names = set(indices["index"])
+    return next((known for known in _KNOWN if known.main in names), None)
+
+
 def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[Panel]:
     """One panel for each output and test: the coordinate that the test loads, at its peak.
 
@@ -203,6 +123,50 @@ def with_results(rows: pd.DataFrame, measures: Measures) -> pd.DataFrame:
     kept = rows[rows["estimate"].notna() & rows["index"].isin(measures.shown)]
     names = {name: kept[name].replace(EVERY, "") for name in ("test", "joint")}
     return kept.assign(**names, step=kept["step"].fillna(0).astype(int))
+
+
+def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: str) -> pd.DataFrame:
+    return rows[
+        (rows["output"] == output)
+        & (rows["test"] == test)
+        & (rows["step"] == step)
+        & (rows["coordinate"] == coordinate)
+    ]
+
+
+def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
+    there = [name for name in COORDINATES if name in set(rows["coordinate"])]
+    return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
+
+
+def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
+    """Coordinate and step of a test's largest moment about the most cranial joint.
+
+    None where the cohort has no such test, or nothing turns that joint.
+    """
+    if cohort.loads is None or test not in cohort.tests:
+        return None
+    rows = cohort.loads[cohort.loads["test"] == test]
+    specimen = cohort.specimen_names[0]
+    own = rows[rows["specimen"].isin([specimen, "*"])]
+    rows = own if len(own) else rows
+    rows = rows[rows["cycle"].isna() | (rows["cycle"] == rows["cycle"].min())]
+    turning = _moments(rows, joint_frames(cohort, specimen)[-1].origin)
+    by_step = pd.DataFrame(turning).groupby(rows["step"].to_numpy()).sum()
+    size = np.linalg.norm(by_step, axis=1)
+    if not size.any():
+        return None
+    peak = int(size.argmax())
+    return DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
+
+
+def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
+    """(n, 3) N m, ground: each row's moment and that of its force about a point."""
+    forces, moments, points_mm = (
+        loads[[f"{letter}{axis}_{unit}" for axis in "xyz"]].fillna(0.0).to_numpy(float)
+        for letter, unit in (("f", "n"), ("m", "nm"), ("p", "mm"))
+    )
+    return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
 
 
 def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
@@ -231,20 +195,6 @@ def by_joint(panel: Panel, joints: Sequence[str]) -> list[Panel]:
     return [
         replace(panel, joint=name, rows=panel.rows[panel.rows["joint"] == name]) for name in there
     ] or [panel]
-
-
-def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
-    there = [name for name in COORDINATES if name in set(rows["coordinate"])]
-    return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
-
-
-def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: str) -> pd.DataFrame:
-    return rows[
-        (rows["output"] == output)
-        & (rows["test"] == test)
-        & (rows["step"] == step)
-        & (rows["coordinate"] == coordinate)
-    ]
 
 
 def pooled(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
@@ -290,7 +240,44 @@ def title(index: int, panel: Panel) -> str:
     """Letter, test and joint, and below them the output."""
     first = where(panel.test, panel.joint)
     second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
-    return f"{chr(ord('a') + index)}   " + "\n".join(part for part in (first, second) if part)
+    return lettered(index, "\n".join(part for part in (first, second) if part))
+
+
+def factor_name(factor: str, longest: int = _LONGEST) -> str:
+    """``stiffness_L1L2_extension`` as ``stiffness L1L2 extension``."""
+    return f"{DUMMY} (no effect)" if factor == DUMMY else short(plain(factor), longest)
+
+
+def what(output: str, coordinate: str) -> str:
+    """``motion in flexion–extension``; a load along a rotation is a moment."""
+    return f"{kind(output, coordinate)} in {AXIS[coordinate].lower()}"
+
+
+def kind(output: str, coordinate: str) -> str:
+    """``motion``, ``force``, ``moment`` or ``stiffness``."""
+    if output == "joint_load":
+        return "force" if coordinate in TRANSLATIONS else "moment"
+    return output
+
+
+def where(test: str, joint: str) -> str:
+    """``flexion, L1L2``: what there is of them."""
+    return ", ".join(part for part in (case(test), joint) if part)
+
+
+def unit_of(output: str, coordinate: str) -> str:
+    """Unit of an output as printed."""
+    along = coordinate in TRANSLATIONS
+    if output == "stiffness":
+        return "N/m" if along else "N m/rad"
+    if output == "joint_load":
+        return "N" if along else "N m"
+    return unit(coordinate)
+
+
+def whole(n: int) -> str:
+    """``20 480``."""
+    return f"{n:,}".replace(",", "\u2009")
 
 
 def sections_of(

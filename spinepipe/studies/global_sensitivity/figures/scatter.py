@@ -1,7 +1,4 @@
-"""Figure: outputs of all runs over the values of the factors that lead.
-
-Outputs run by run beside the factors' values.
-"""
+"""Figure: outputs of all runs over the values of the factors that lead."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +12,7 @@ from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array
-from spinepipe.report.panels import explain_marks, log_ticks
+from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import BLUE, GREY, blank, saying
 from spinepipe.report.words import capital, count, fixed, number
 from spinepipe.status import Status
@@ -156,7 +153,7 @@ def scatter_figure(
     if not lines:
         return saying("No runs can be shown: none has an equilibrium.")
     figure = blank(len(lines) * _PANEL_MM + _KEY_MM)
-    axes = figure.subplots(len(lines), TOP, squeeze=False, sharey="row")
+    axes = lines_of(figure, len(lines) * TOP, TOP, sharey="row")
     for number_, (line, one) in enumerate(zip(axes, lines, strict=True)):
         _line(line, one, values, units, measures, number_ * TOP)
     explain_marks(figure, _handles(), _words(lines, cohort), 3)
@@ -187,12 +184,12 @@ def _line(
         x = np.asarray(values[name].reindex(one.values.index), dtype=np.float64)
         _cloud(axis, x, np.asarray(one.values, dtype=np.float64), unit)
         axis.set_xlabel(f"{factor_name(name, 40)} ({_UNITS.get(unit, unit)})")
-        axis.set_title(f"{chr(ord('a') + letter + place)}   {_index(one, name, measures)}")
+        head(axis, letter + place, _index(one, name, measures))
         axis.tick_params(axis="y", length=2.5)
     panel = one.panel
     unit = unit_of(panel.output, panel.coordinate)
-    head = f"{where(panel.test, one.joint)}\n{what(panel.output, panel.coordinate)} ({unit})"
-    axes[0].set_ylabel(head)
+    words = f"{where(panel.test, one.joint)}\n{what(panel.output, panel.coordinate)} ({unit})"
+    axes[0].set_ylabel(words)
 
 
 def _cloud(axis: Axes, x: Array, y: Array, unit: str) -> None:

@@ -1,7 +1,4 @@
-"""Figure: predicted against measured motion after Bland and Altman.
-
-Bias and limits of agreement of many joints: a row for each, without the readings.
-"""
+"""Figure: predicted against measured motion after Bland and Altman."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +10,16 @@ from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import EXACT, exact, rounded
-from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
+from spinepipe.report.panels import (
+    Rows,
+    explain,
+    grid,
+    head,
+    label_rows,
+    row_height,
+    rows_of,
+    side_by_side,
+)
 from spinepipe.report.style import BLACK, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, unit
 from spinepipe.studies.joint_pose_sensitivity.findings import settling
@@ -21,40 +27,6 @@ from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivi
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 _NUMBERS = ["lower_limit", "upper_limit", "bias_low", "bias_high", "bias"]
-
-
-def draw_rows(cohort: Cohort, known: pd.DataFrame, settled: str = "") -> Figure:
-    """A panel per coordinate: bias with its interval on a line from limit to limit.
-
-    ``settled`` is what is to be said where motion was not simulated at rest, or nothing.
-    """
-    names = [name for name in COORDINATES if name in set(known["coordinate"])]
-    rows = rows_of(known, cohort.specimen_names, cohort.joint_names)
-    axes, figure = grid(len(names), rows, row_height(rows, 8.0))
-    for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
-        head(axis, index, AXIS[name])
-        draw_row(name, axis, rows)
-    bars = {OURS: "limits of agreement (bias ± 1.96 SD)", BLACK: "bias with 95 % interval"}
-    told = ("Reduced poses with their own stiffness.", rows.note and f"{rows.note}.", settled)
-    explain(figure, bars, " ".join(words for words in told if words))
-    return figure
-
-
-def draw_row(name: str, axis: Axes, rows: Rows) -> None:
-    axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
-    for y, frame in enumerate(rows.frames):
-        here = frame[frame["coordinate"] == name]
-        alpha = 1.0 if len(here) == 1 else 0.35
-        for _, row in here.iterrows():
-            low, high, bias_low, bias_high, bias = rounded(row[_NUMBERS])
-            axis.plot([low, high], [y, y], color=OURS, lw=2.5, alpha=alpha, solid_capstyle="butt")
-            axis.plot([bias_low, bias_high], [y, y], color=BLACK, lw=1.2, zorder=4)
-            axis.plot([bias], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
-    label_rows(axis, rows, below=0.6, above=0.6)
-    axis.xaxis.set_major_locator(MaxNLocator(4))
-    axis.set_xlabel(f"predicted less measured ({unit(name)})")
-
-
 MOST_PANELS = 12
 """With more of them, bias and limits are drawn in rows instead, without the readings."""
 
@@ -62,15 +34,6 @@ _DATASET, _OWN = "reduced", "calibrated"
 _ACROSS_AT_MOST, _PANEL_MM, _KEY_MM = 3, 48.0, 16.0
 _MOST_OUTLINES = 300
 LIMITS = VERMILLION
-
-
-@dataclass(frozen=True)
-class _Panel:
-    """One joint and coordinate of a specimen: the row of the table and the readings behind it."""
-
-    row: pd.Series
-    readings: pd.DataFrame
-    title: str
 
 
 def agreement_figure(
@@ -82,7 +45,7 @@ def agreement_figure(
         total = count(len(tables["agreement"]), "row")
         return saying(f"No agreement can be shown: none of {total} has two different readings.")
     if len(known) > MOST_PANELS:
-        return draw_rows(cohort, known, settling(study))
+        return _draw_rows(cohort, known, settling(study))
     panels = [_panel(row, tables, len(cohort.specimen_names)) for _, row in known.iterrows()]
     figure, axes = _grid(len(panels), known["coordinate"].nunique())
     for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
@@ -117,6 +80,15 @@ def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
     return found.sort_values(["_specimen", "_joint", "_coordinate"])
 
 
+@dataclass(frozen=True)
+class _Panel:
+    """One joint and coordinate of a specimen: the row of the table and the readings behind it."""
+
+    row: pd.Series
+    readings: pd.DataFrame
+    title: str
+
+
 def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int) -> _Panel:
     column = COORDINATE_COLUMNS[COORDINATES.index(row["coordinate"])]
     success, runs = tables["success"], tables["simulations"]
@@ -138,10 +110,7 @@ def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
     across = min(n, n_coordinates if n_coordinates > 1 else _ACROSS_AT_MOST)
     down = -(-n // across)
     figure = blank(down * _PANEL_MM + _KEY_MM)
-    panels = list(figure.subplots(down, across, squeeze=False).ravel())
-    for spare in panels[n:]:
-        spare.set_visible(False)
-    return figure, panels[:n]
+    return figure, side_by_side(figure, n, across)
 
 
 def _draw(axis: Axes, panel: _Panel) -> None:
@@ -186,3 +155,35 @@ def _draw_limits(axis: Axes, row: pd.Series) -> None:
 def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:
     axis.axhspan(*ends, color=color, alpha=0.15, lw=0, zorder=1)
     axis.axhline(y, color=color, lw=0.9, ls="-" if color == BLACK else (0, (5, 2)), zorder=4)
+
+
+def _draw_rows(cohort: Cohort, known: pd.DataFrame, settled: str = "") -> Figure:
+    """A panel per coordinate: bias with its interval on a line from limit to limit.
+
+    ``settled`` is what is to be said where motion was not simulated at rest, or nothing.
+    """
+    names = [name for name in COORDINATES if name in set(known["coordinate"])]
+    rows = rows_of(known, cohort.specimen_names, cohort.joint_names)
+    axes, figure = grid(len(names), rows, row_height(rows, 8.0))
+    for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
+        head(axis, index, AXIS[name])
+        _draw_coordinate(name, axis, rows)
+    bars = {OURS: "limits of agreement (bias ± 1.96 SD)", BLACK: "bias with 95 % interval"}
+    told = ("Reduced poses with their own stiffness.", rows.note and f"{rows.note}.", settled)
+    explain(figure, bars, " ".join(words for words in told if words))
+    return figure
+
+
+def _draw_coordinate(name: str, axis: Axes, rows: Rows) -> None:
+    axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
+    for y, frame in enumerate(rows.frames):
+        here = frame[frame["coordinate"] == name]
+        alpha = 1.0 if len(here) == 1 else 0.35
+        for _, row in here.iterrows():
+            low, high, bias_low, bias_high, bias = rounded(row[_NUMBERS])
+            axis.plot([low, high], [y, y], color=OURS, lw=2.5, alpha=alpha, solid_capstyle="butt")
+            axis.plot([bias_low, bias_high], [y, y], color=BLACK, lw=1.2, zorder=4)
+            axis.plot([bias], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
+    label_rows(axis, rows, below=0.6, above=0.6)
+    axis.xaxis.set_major_locator(MaxNLocator(4))
+    axis.set_xlabel(f"predicted less measured ({unit(name)})")

@@ -1,9 +1,4 @@
-"""Figure: how much fitted stiffness and errors hang on start values, damping and loading.
-
-The published bootstrap beside ours: medians and ranges by loading, joint and direction.
-
-Which rows the bootstrap figure has: what was sampled, how it was loaded, specimen and joint.
-"""
+"""Figure: how much fitted stiffness and errors hang on start values, damping and loading."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -29,47 +24,16 @@ from spinepipe.report.panels import (
     mark_start,
     sections,
 )
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import BLACK, GREY, OURS, TALLEST_MM, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
-from spinepipe.status import Status
+from spinepipe.status import USABLE
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 _RANGE_OF = "quasi_static"
 """The loading whose ranges of stiffness are published."""
-
-
-def draw_errors(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
-    """Median of an error with its range around it (no ends are printed), where it is published."""
-    sampled, loading, joint = (row[key].iloc[0] for key in ("bootstrap", "loading", "joint"))
-    column = COORDINATE_COLUMNS[COORDINATES.index(name)]
-    table = _paper(cohort).get(f"{sampled}_bootstrap_error", {})
-    found = table.get(loading, {}).get(joint, {})
-    median, width = (found.get(what, {}).get(column) for what in ("median", "range"))
-    if median is None or width is None:
-        return
-    low = max(0.0, median - width / 2.0)  # an error is not negative
-    axis.plot([low, low + width], [y, y], color=THEIRS, lw=0.8, zorder=4)
-    axis.plot([median], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
-    axis.plot([median], [y], "D", color=THEIRS, ms=2.6, mew=0.0, zorder=4)
-
-
-def write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
-    """Width of the range of a stiffness, where it is published (its place is not)."""
-    column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
-    table = _paper(cohort).get("bootstrap_stiffness_range", {})
-    width = table.get(row["bootstrap"].iloc[0], {}).get(column)
-    if width is not None and row["loading"].iloc[0] == _RANGE_OF:
-        note(axis, 0.02, y, f"range {number(width, 2)}", THEIRS)
-
-
-def _paper(cohort: str) -> Mapping[str, Any]:
-    """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
-    found = paper_of(cohort, OF_JOINT_POSE)
-    return {} if found is None else found[1]
-
 
 SAMPLED = {"start": "start", "damping": "damping"}
 """What is sampled, as printed; the first stands on top."""
@@ -79,8 +43,85 @@ LOADING_NAMES = {
     "quasi_static": "quasi-static",
     "dynamic": "dynamic",
 }
+
 FIT = ["specimen", "bootstrap", "loading", "set"]
 """What one fit is known by."""
+
+MOST_ROWS_WITH_WORDS = 14
+_ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 3.2, 15.0, 16.0
+_MOST_ACROSS, _FEW_TICKS, _TICK_PT = 4, 3, 5.5
+_LEAST_SPREAD = 1.05
+"""An axis shows at least 5 % to either side: smaller spreads are to look small."""
+
+_LEAST_DIFFERENCE = 0.05
+"""So do differences of errors, mm or degrees."""
+
+
+def bootstrap_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Upper panels: fitted stiffness; lower panels: errors; every fit a dot."""
+    fits = tables["bootstrap"]
+    solved = fits[fits["status"].isin(USABLE)]
+    tried, found = (len(frame[FIT].drop_duplicates()) for frame in (fits, solved))
+    if not found:
+        return saying(f"No stiffness was found in any of {count(tried, 'bootstrap fit')}.")
+    free: list[str] = [name for name in COORDINATES if name in study.calibration.free]
+    measured = [name for name in COORDINATES if solved[_error(name)].notna().any()]
+    columns = [_stiffness(name) for name in free] + [_error(name) for name in measured]
+    shared = study.calibration.grouping == "per_specimen"
+    joints = (EVERY_JOINT,) if shared else cohort.joint_names
+    most = _most_rows(len(free), len(measured))
+    upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints, most)
+    moving = [name for name in cohort.joint_names if _has_error(solved, name, measured)]
+    lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving, most)
+    room = _room_for_words([(len(free), upper), (len(measured), lower)])
+    parts = [(len(free), _height(upper, room)), (len(measured), _height(lower, room))]
+    across = MOST_ACROSS if room else _MOST_ACROSS
+    (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM, across)
+    below = others[0] if others else []
+    for index, (name, axis) in enumerate(zip(free, above, strict=True)):
+        head(axis, index, AXIS[name])
+        _draw_stiffness(name, axis, upper, study, pooled)
+        if len(upper) <= room:
+            _tell_stiffness(name, axis, upper, pooled, cohort.name)
+    for index, (name, axis) in enumerate(zip(measured, below, strict=True)):
+        head(axis, len(free) + index, AXIS[name])
+        _draw_errors(name, axis, lower, relative, cohort.name)
+        if len(lower) <= room:
+            _tell(axis, lower, _error(name), relative)
+    words = _words(tried, found, upper)
+    explain(figure, _bars(cohort.name), words, dashed="" if pooled else "start of the other fits")
+    return figure
+
+
+def _most_rows(n_above: int, n_below: int) -> int:
+    """How many narrow rows a panel may have for all lines of panels to fit on the page."""
+    lines = sum(-(-n // _MOST_ACROSS) for n in (n_above, n_below))
+    return int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
+
+
+def _room_for_words(parts: Sequence[tuple[int, Rows]]) -> int:
+    """Up to how many rows of a panel have words: none where the page would be too small."""
+    height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
+    return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
+
+
+def _height(rows: Rows, room: int) -> float:
+    return len(rows) * (_ROW_MM if len(rows) <= room else _NARROW_MM) + _AROUND_MM
+
+
+def _has_error(solved: pd.DataFrame, joint: str, measured: Sequence[str]) -> bool:
+    rows = solved.loc[solved["joint"] == joint, [_error(name) for name in measured]]
+    return bool(rows.notna().any(axis=None))
+
+
+def _stiffness(name: str) -> str:
+    return STIFFNESS_COLUMNS[COORDINATES.index(name)]
+
+
+def _error(name: str) -> str:
+    return f"{name}_error_{'mm' if name in TRANSLATIONS else 'deg'}"
 
 
 def bootstrap_rows(
@@ -139,83 +180,6 @@ def _label(
     return ", ".join(words)
 
 
-MOST_ROWS_WITH_WORDS = 14
-_ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 9.0, 3.2, 15.0, 16.0
-_MOST_ACROSS, _FEW_TICKS, _TICK_PT = 4, 3, 5.5
-_LEAST_SPREAD = 1.05
-"""An axis shows at least 5 % to either side: smaller spreads are to look small."""
-
-_LEAST_DIFFERENCE = 0.05
-"""So do differences of errors, mm or degrees."""
-
-
-def bootstrap_figure(
-    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
-    """Upper panels: fitted stiffness; lower panels: errors; every fit a dot."""
-    fits = tables["bootstrap"]
-    solved = fits[fits["status"].isin([status.value for status in Status if status.usable])]
-    tried, found = (len(frame[FIT].drop_duplicates()) for frame in (fits, solved))
-    if not found:
-        return saying(f"No stiffness was found in any of {count(tried, 'bootstrap fit')}.")
-    free: list[str] = [name for name in COORDINATES if name in study.calibration.free]
-    measured = [name for name in COORDINATES if solved[_error(name)].notna().any()]
-    columns = [_stiffness(name) for name in free] + [_error(name) for name in measured]
-    shared = study.calibration.grouping == "per_specimen"
-    joints = (EVERY_JOINT,) if shared else cohort.joint_names
-    most = _most_rows(len(free), len(measured))
-    upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints, most)
-    moving = [name for name in cohort.joint_names if _has_error(solved, name, measured)]
-    lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving, most)
-    room = _room_for_words([(len(free), upper), (len(measured), lower)])
-    parts = [(len(free), _height(upper, room)), (len(measured), _height(lower, room))]
-    across = MOST_ACROSS if room else _MOST_ACROSS
-    (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM, across)
-    below = others[0] if others else []
-    for index, (name, axis) in enumerate(zip(free, above, strict=True)):
-        head(axis, index, AXIS[name])
-        _draw_stiffness(name, axis, upper, study, pooled)
-        if len(upper) <= room:
-            _tell_stiffness(name, axis, upper, pooled, cohort.name)
-    for index, (name, axis) in enumerate(zip(measured, below, strict=True)):
-        head(axis, len(free) + index, AXIS[name])
-        _draw_errors(name, axis, lower, relative, cohort.name)
-        if len(lower) <= room:
-            _tell(axis, lower, _error(name), relative)
-    words = _words(tried, found, upper)
-    explain(figure, _bars(cohort.name), words, dashed="" if pooled else "start of the other fits")
-    return figure
-
-
-def _stiffness(name: str) -> str:
-    return STIFFNESS_COLUMNS[COORDINATES.index(name)]
-
-
-def _error(name: str) -> str:
-    return f"{name}_error_{'mm' if name in TRANSLATIONS else 'deg'}"
-
-
-def _has_error(solved: pd.DataFrame, joint: str, measured: Sequence[str]) -> bool:
-    rows = solved.loc[solved["joint"] == joint, [_error(name) for name in measured]]
-    return bool(rows.notna().any(axis=None))
-
-
-def _most_rows(n_above: int, n_below: int) -> int:
-    """How many narrow rows a panel may have for all lines of panels to fit on the page."""
-    lines = sum(-(-n // _MOST_ACROSS) for n in (n_above, n_below))
-    return int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
-
-
-def _room_for_words(parts: Sequence[tuple[int, Rows]]) -> int:
-    """Up to how many rows of a panel have words: none where the page would be too small."""
-    height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
-    return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
-
-
-def _height(rows: Rows, room: int) -> float:
-    return len(rows) * (_ROW_MM if len(rows) <= room else _NARROW_MM) + _AROUND_MM
-
-
 def _draw_stiffness(
     name: str, axis: Axes, rows: Rows, study: JointPoseSensitivity, relative: bool
 ) -> None:
@@ -252,7 +216,7 @@ def _draw_errors(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str)
             continue
         draw_strip(axis, values, y, OURS)
         if not relative:
-            draw_errors(axis, cohort, name, frame, y - 0.32)
+            draw_paper(axis, cohort, name, frame, y - 0.32)
     if not relative:
         axis.set_xlim(0.0, max(1.05 * axis.get_xlim()[1], 0.1))
     else:
@@ -263,11 +227,35 @@ def _draw_errors(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str)
     axis.set_xlabel(f"{what} ({unit(name)})")
 
 
+def draw_paper(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
+    """Median of an error with its range around it (no ends are printed), where it is published."""
+    sampled, loading, joint = (row[key].iloc[0] for key in ("bootstrap", "loading", "joint"))
+    column = COORDINATE_COLUMNS[COORDINATES.index(name)]
+    table = _paper(cohort).get(f"{sampled}_bootstrap_error", {})
+    found = table.get(loading, {}).get(joint, {})
+    median, width = (found.get(what, {}).get(column) for what in ("median", "range"))
+    if median is None or width is None:
+        return
+    low = max(0.0, median - width / 2.0)  # an error is not negative
+    axis.plot([low, low + width], [y, y], color=THEIRS, lw=0.8, zorder=4)
+    axis.plot([median], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
+    axis.plot([median], [y], "D", color=THEIRS, ms=2.6, mew=0.0, zorder=4)
+
+
 def _tell_stiffness(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
     """Numbers of each row, and the paper's below them."""
     _tell(axis, rows, _stiffness(name), relative)
     for y, frame in enumerate(rows.frames):
-        write_range(axis, cohort, name, frame, y - 0.36)
+        _write_range(axis, cohort, name, frame, y - 0.36)
+
+
+def _write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
+    """Width of the range of a stiffness, where it is published (its place is not)."""
+    column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
+    table = _paper(cohort).get("bootstrap_stiffness_range", {})
+    width = table.get(row["bootstrap"].iloc[0], {}).get(column)
+    if width is not None and row["loading"].iloc[0] == _RANGE_OF:
+        note(axis, 0.02, y, f"range {number(width, 2)}", THEIRS)
 
 
 def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
@@ -280,9 +268,15 @@ def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
             note(axis, 0.02, y + 0.4, words, OURS)
 
 
+def _paper(cohort: str) -> Mapping[str, Any]:
+    """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
+    found = GOULD_2024A.beside(cohort)
+    return {} if found is None else found[1]
+
+
 def _bars(cohort: str) -> dict[str, str]:
     bars = {OURS: "fits in the cohort's own joint poses"}
-    paper = paper_of(cohort, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort)
     return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
 
 

@@ -14,10 +14,11 @@ from spinepipe.report.marks import BAR_PT, EXACT, KEY, THIN_BAR_PT, draw_bar, ex
 from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
-from spinepipe.status import Status
+from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.findings import settling
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
+from spinepipe.studies.joint_pose_sensitivity.variables import readings
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 OWN = "calibrated"
 _RUN = ["specimen", "pose", "stiffness", "test", "cycle"]
@@ -48,7 +49,7 @@ def errors_figure(
         if simulations[f"error_{column}"].notna().any()
     ]
     runs = _failed_runs(simulations)
-    simulations = simulations[has_reading(simulations["step"], cohort.zeroed_at_step_0)]
+    simulations = readings(simulations, cohort.zeroed_at_step_0)
     if not measured:
         total = count(len(runs), "simulation")
         return saying(f"No error can be shown: none of {total} reached a measured equilibrium.")
@@ -92,8 +93,7 @@ def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
 
 def _failed_runs(simulations: pd.DataFrame) -> pd.DataFrame:
     """One row per run (a test of a pose with a stiffness): did a step end without equilibrium?"""
-    usable = [status.value for status in Status if status.usable]
-    failed = ~simulations["status"].isin(usable)
+    failed = ~simulations["status"].isin(USABLE)
     return simulations.assign(failed=failed).groupby(_RUN)["failed"].any().reset_index()
 
 

@@ -13,10 +13,10 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
 from spinepipe.report.marks import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
 from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent, unit
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M, ROTATIONS, TRANSLATIONS
 
@@ -47,7 +47,7 @@ def joint_pose_figure(
     _equal_reach(axes[3:])
     failed = total - len(sampled[["specimen", "pose"]].drop_duplicates())
     bars = {OURS: "sampled landmarks"}
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     if paper:
         bars[THEIRS] = f"{paper[0]}, Tables 7 and 8, complete set (IQR drawn around the median)"
     explain(figure, bars, _words(total, failed, rows))
@@ -114,7 +114,7 @@ def _write(axis: Axes, y: int, found: Quartiles, center: float, paper: Quartiles
 
 def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
     """The paper's median and IQR of a joint; it prints no quartiles, the IQR is put around it."""
-    found = paper_of(cohort.name, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort.name)
     if found is None:
         return None
     table = "joint_origin" if column in _ORIGIN else "joint_orientation"

@@ -1,7 +1,4 @@
-"""Figure: how precise landmarks must be for errors below a limit.
-
-A required landmark SD in words.
-"""
+"""Figure: how precise landmarks must be for errors below a limit."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,11 +8,49 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.panels import explain, head
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
+from spinepipe.report.panels import explain, head, lines_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+
+COLORS = {"calibrated": OURS, "nominal": BEST}
+
+WHOSE = {
+    "calibrated": "stiffness fitted to each pose",
+    "nominal": "stiffness of the cohort's own pose",
+}
+
+MOTIONS = {"translation": "mm", "rotation": "°"}
+
+_HEIGHT_MM = 125.0
+
+
+def landmark_precision_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Above: quantiles of the largest error over landmark SD; below: share under the limit."""
+    curves, required = tables["landmark_precision"], tables["required_precision"]
+    if curves.empty or not curves["median"].notna().any():
+        return saying("No error can be shown: no sampled pose has a result at any landmark SD.")
+    figure = blank(_HEIGHT_MM)
+    measured = [motion for motion in MOTIONS if (curves["motion"] == motion).any()]
+    axes = lines_of(figure, 2 * len(measured), len(measured), sharex=True)
+    for index, motion in enumerate(measured):
+        symbol, here = MOTIONS[motion], curves[curves["motion"] == motion]
+        upper, lower = axes[0][index], axes[1][index]
+        head(upper, index, f"Largest {motion} error")
+        head(lower, index + len(measured), f"Poses below the limit of {motion}")
+        _draw_errors(upper, here, symbol)
+        _draw_shares(lower, here, required[required["motion"] == motion], study)
+        _mark_paper(upper, lower, cohort)
+        lower.set_xlabel("SD of each landmark, per axis (mm)")
+    axes[1][0].set_ylabel("share of poses (%)")
+    bars = {
+        COLORS[name]: words for name, words in WHOSE.items() if name in set(curves["stiffness"])
+    }
+    explain(figure, bars, _words(study, cohort, curves, required))
+    return figure
 
 
 def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
@@ -32,42 +67,6 @@ def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
     start = fixed(low) if np.isfinite(low) else f"below {tick(min(sampled))}"
     end = f"{fixed(high)} mm" if np.isfinite(high) else f"above {tick(max(sampled))} mm"
     return f"{fixed(row['sd_mm'])} mm ({start} to {end})"
-
-
-COLORS = {"calibrated": OURS, "nominal": BEST}
-WHOSE = {
-    "calibrated": "stiffness fitted to each pose",
-    "nominal": "stiffness of the cohort's own pose",
-}
-MOTIONS = {"translation": "mm", "rotation": "°"}
-_HEIGHT_MM = 125.0
-
-
-def landmark_precision_figure(
-    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
-    """Above: quantiles of the largest error over landmark SD; below: share under the limit."""
-    curves, required = tables["landmark_precision"], tables["required_precision"]
-    if curves.empty or not curves["median"].notna().any():
-        return saying("No error can be shown: no sampled pose has a result at any landmark SD.")
-    figure = blank(_HEIGHT_MM)
-    measured = [motion for motion in MOTIONS if (curves["motion"] == motion).any()]
-    axes = figure.subplots(2, len(measured), sharex=True, squeeze=False)
-    for index, motion in enumerate(measured):
-        symbol, here = MOTIONS[motion], curves[curves["motion"] == motion]
-        upper, lower = axes[0][index], axes[1][index]
-        head(upper, index, f"Largest {motion} error")
-        head(lower, index + len(measured), f"Poses below the limit of {motion}")
-        _draw_errors(upper, here, symbol)
-        _draw_shares(lower, here, required[required["motion"] == motion], study)
-        _mark_paper(upper, lower, cohort)
-        lower.set_xlabel("SD of each landmark, per axis (mm)")
-    axes[1][0].set_ylabel("share of poses (%)")
-    bars = {
-        COLORS[name]: words for name, words in WHOSE.items() if name in set(curves["stiffness"])
-    }
-    explain(figure, bars, _words(study, cohort, curves, required))
-    return figure
 
 
 def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
@@ -105,13 +104,6 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
     )
     axis.set_ylim(0.0, None)
     axis.set_ylabel(f"error ({symbol})")
-
-
-def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
-    """Median over the specimens as a thick line."""
-    for whose, rows in here.groupby("stiffness"):
-        middle = factor * rows.groupby("sd_mm")[column].median()
-        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
 
 
 def _draw_shares(
@@ -155,6 +147,13 @@ def _draw_shares(
     axis.set_xlim(0.0, None)
 
 
+def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
+    """Median over the specimens as a thick line."""
+    for whose, rows in here.groupby("stiffness"):
+        middle = factor * rows.groupby("sd_mm")[column].median()
+        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
+
+
 def _mark_required(
     axis: Axes, rows: pd.DataFrame, color: str, y: float, sampled: Sequence[float]
 ) -> None:
@@ -192,7 +191,7 @@ def _mark_required(
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
     """The SD that the paper reports for its landmarks."""
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     if paper is None:
         return
     sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
@@ -228,6 +227,6 @@ def _words(
         for _, row in both.iterrows()
         if specimens == 1
     ]
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
+    paper = GOULD_2024A.beside(cohort.name)
     resultant = "the paper's SD is the largest resultant, not per axis" if paper else ""
     return "; ".join(part for part in (poses, lines, shown, *told, resultant) if part) + "."

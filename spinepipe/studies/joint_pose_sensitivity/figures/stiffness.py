@@ -33,10 +33,10 @@ from spinepipe.report.panels import (
     row_height,
     rows_of,
 )
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
-from spinepipe.status import Status
+from spinepipe.status import USABLE
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
@@ -45,6 +45,35 @@ AT_BOUND = 1e-4
 
 FARTHEST = 10.0
 """A start or bound is on the axis if it is within this factor of what was found."""
+
+_PAPER_Y = -0.26
+
+
+def stiffness_figure(
+    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Distribution of every fitted stiffness, with start, bounds and the paper's values."""
+    calibrations = tables["calibrations"]
+    solved = calibrations[calibrations["status"].isin(USABLE)]
+    poses = len(calibrations[["specimen", "pose"]].drop_duplicates())
+    if solved.empty:
+        return saying(f"No stiffness was found for any of {count(poses, 'joint pose')}.")
+    per_joint = study.calibration.grouping == "per_joint"
+    joints = cohort.joint_names if per_joint else (EVERY_JOINT,)
+    rows = rows_of(solved, cohort.specimen_names, joints)
+    panels = [_panel(study, cohort, name) for name in COORDINATES if name in study.calibration.free]
+    axes, figure = grid(len(panels), rows, row_height(rows, 22.0))
+    for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
+        head(axis, index, AXIS[panel.coordinate])
+        _draw(panel, axis, rows, solved)
+    found = len(solved[["specimen", "pose"]].drop_duplicates())
+    bars = {OURS: "calibrated, over all sampled joint poses"}
+    paper = GOULD_2024A.beside(cohort.name)
+    if paper:
+        bars[THEIRS] = f"{paper[0]}, {paper[1]['counts']['pose_samples_reduced']} poses"
+    words = _words(study.calibration.bound_factor, found, poses, rows)
+    explain(figure, bars, words, dashed="start of the fit")
+    return figure
 
 
 @dataclass(frozen=True)
@@ -64,40 +93,6 @@ class _Panel:
         return values[(values > above) & (values < below)]
 
 
-def stiffness_figure(
-    study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> Figure:
-    """Distribution of every fitted stiffness, with start, bounds and the paper's values."""
-    calibrations = tables["calibrations"]
-    usable = [status.value for status in Status if status.usable]
-    solved = calibrations[calibrations["status"].isin(usable)]
-    poses = len(calibrations[["specimen", "pose"]].drop_duplicates())
-    if solved.empty:
-        return saying(f"No stiffness was found for any of {count(poses, 'joint pose')}.")
-    per_joint = study.calibration.grouping == "per_joint"
-    joints = cohort.joint_names if per_joint else (EVERY_JOINT,)
-    rows = rows_of(solved, cohort.specimen_names, joints)
-    panels = [_panel(study, cohort, name) for name in COORDINATES if name in study.calibration.free]
-    axes, figure = grid(len(panels), rows, row_height(rows, 22.0))
-    for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
-        head(axis, index, AXIS[panel.coordinate])
-        _draw(panel, axis, rows, solved)
-    found = len(solved[["specimen", "pose"]].drop_duplicates())
-    bars = {OURS: "calibrated, over all sampled joint poses"}
-    paper = paper_of(cohort.name, OF_JOINT_POSE)
-    if paper:
-        bars[THEIRS] = f"{paper[0]}, {paper[1]['counts']['pose_samples_reduced']} poses"
-    words = _words(study.calibration.bound_factor, found, poses, rows)
-    explain(figure, bars, words, dashed="start of the fit")
-    return figure
-
-
-def _words(bound_factor: float, found: int, poses: int, rows: Rows) -> str:
-    solved = f"{count(found, 'joint pose')} of {poses} with a stiffness"
-    parts = (solved, rows.note, KEY, f"bounds: start times and divided by {number(bound_factor)}")
-    return "; ".join(part for part in parts if part) + "."
-
-
 def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Panel:
     index = COORDINATES.index(coordinate)
     start = study.stiffness.in_order()[index]
@@ -108,7 +103,7 @@ def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Pan
 
 
 def _paper(cohort: Cohort, column: str) -> Quartiles | None:
-    found = paper_of(cohort.name, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort.name)
     if found is None:
         return None
     reduced = found[1]["reduced_stiffness"]
@@ -138,42 +133,6 @@ def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
         note(axis, 0.02, len(rows) + 0.25, _shares(panel, solved), GREY)
 
 
-_PAPER_Y = -0.26
-
-
-def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool) -> None:
-    values = finite(frame[panel.column])
-    draw_density(axis, panel.inside(values), y + 0.1, 0.42, OURS, logarithmic=True)
-    found = draw_bar(axis, values, y, OURS)
-    if with_numbers:
-        note(axis, 0.02, y + 0.78, _median_and_iqr(found), OURS)
-        note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
-        _tell_far_bound(panel, axis, values, y - 0.125)
-
-
-def _median_and_iqr(found: Quartiles) -> str:
-    return f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
-
-
-def _tell_far_bound(panel: _Panel, axis: Axes, values: Array, y: float) -> None:
-    """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
-    for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
-        there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
-        if there and not _shown(axis, bound):
-            told = words.format(percent(there, len(values)), number(bound))
-            side = "right" if x else "left"
-            note(axis, x, y, told, OURS, ha=side)
-
-
-def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
-    """Shares at a bound and not identifiable, of the solved fits."""
-    values = finite(frame[panel.column])
-    flags = frame[f"{panel.coordinate}_identifiable"]
-    lost = int((flags == False).sum())  # noqa: E712  (None: held fixed)
-    at = percent(len(values) - len(panel.inside(values)), len(values))
-    return f"at a bound {at}, not identifiable {percent(lost, len(values))}, n = {len(values)}"
-
-
 def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     """Limits around the middle 98 % of what was found, start and paper as far as they are near."""
     inside = panel.inside(values)
@@ -193,6 +152,45 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     log_ticks(axis.xaxis, low / margin, high * margin)
 
 
+def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool) -> None:
+    values = finite(frame[panel.column])
+    draw_density(axis, panel.inside(values), y + 0.1, 0.42, OURS, logarithmic=True)
+    found = draw_bar(axis, values, y, OURS)
+    if with_numbers:
+        note(axis, 0.02, y + 0.78, _median_and_iqr(found), OURS)
+        note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
+        _tell_far_bound(panel, axis, values, y - 0.125)
+
+
+def _median_and_iqr(found: Quartiles) -> str:
+    return f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
+
+
+def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
+    """Shares at a bound and not identifiable, of the solved fits."""
+    values = finite(frame[panel.column])
+    flags = frame[f"{panel.coordinate}_identifiable"]
+    lost = int((flags == False).sum())  # noqa: E712  (None: held fixed)
+    at = percent(len(values) - len(panel.inside(values)), len(values))
+    return f"at a bound {at}, not identifiable {percent(lost, len(values))}, n = {len(values)}"
+
+
+def _tell_far_bound(panel: _Panel, axis: Axes, values: Array, y: float) -> None:
+    """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
+    for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
+        there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
+        if there and not _shown(axis, bound):
+            told = words.format(percent(there, len(values)), number(bound))
+            side = "right" if x else "left"
+            note(axis, x, y, told, OURS, ha=side)
+
+
 def _shown(axis: Axes, x: float) -> bool:
     low, high = axis.get_xlim()
     return bool(low < x < high)
+
+
+def _words(bound_factor: float, found: int, poses: int, rows: Rows) -> str:
+    solved = f"{count(found, 'joint pose')} of {poses} with a stiffness"
+    parts = (solved, rows.note, KEY, f"bounds: start times and divided by {number(bound_factor)}")
+    return "; ".join(part for part in parts if part) + "."

@@ -1,7 +1,4 @@
-"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by.
-
-Ways of fitting that were refused, and why.
-"""
+"""Figure: how many fits each way of fitting brings to an end, and the derivatives it goes by."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,24 +11,12 @@ from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import STRIP_KEY, draw_interval, draw_strip, finite
-from spinepipe.report.panels import explain, head, log_ticks
-from spinepipe.report.published import OF_JOINT_POSE, paper_of
+from spinepipe.report.panels import explain, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number, percent, tick
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-
-
-def refused(fits: pd.DataFrame) -> dict[str, str]:
-    """Message of each method of which every fit was refused, in the order of the table."""
-    if fits.empty:
-        return {}
-    return {
-        str(method): "; ".join(dict.fromkeys(rows["message"]))
-        for method, rows in fits.groupby("method", sort=False)
-        if (rows["status"] == Status.REFUSED.value).all()
-    }
-
 
 _ROW_MM, _AROUND_MM = 12.0, 36.0
 _LEAST = 1e-16
@@ -53,7 +38,7 @@ def success_figure(
         return saying("Not compared: " + "; ".join(dict.fromkeys(why.values())) + ".")
     paper = _paper(cohort)
     figure = blank(_AROUND_MM + _ROW_MM * (len(methods) + bool(paper)))
-    axes = figure.subplots(1, 3, sharey=True)
+    axes = side_by_side(figure, 3, 3, sharey=True)
     for index, axis in enumerate(axes):
         words = ("Successful fits", "Error of the derivative", "Runs of the model per fit")
         head(axis, index, words[index])
@@ -72,6 +57,17 @@ def success_figure(
     return figure
 
 
+def refused(fits: pd.DataFrame) -> dict[str, str]:
+    """Message of each method of which every fit was refused, in the order of the table."""
+    if fits.empty:
+        return {}
+    return {
+        str(method): "; ".join(dict.fromkeys(rows["message"]))
+        for method, rows in fits.groupby("method", sort=False)
+        if (rows["status"] == Status.REFUSED.value).all()
+    }
+
+
 def method_name(name: str) -> str:
     """Name of a way of fitting, in two lines where it is long."""
     return name.replace("forward_run_", "forward run,\n").replace("_", " ")
@@ -79,7 +75,7 @@ def method_name(name: str) -> str:
 
 def _paper(cohort: Cohort) -> tuple[str, int, int] | None:
     """Name, successful fits and fits of the paper."""
-    found = paper_of(cohort.name, OF_JOINT_POSE)
+    found = GOULD_2024A.beside(cohort.name)
     if found is None:
         return None
     counts = found[1]["counts"]

@@ -1,7 +1,4 @@
-"""All claims of Gould et al. 2024 (doi 10.3389/fbioe.2024.1304334), in the order of the paper.
-
-Job: the numbers of Gould et al. 2024 beside those of a run on the cohort rebuilt from it.
-"""
+"""Job: the numbers of Gould et al. 2024 beside those of a run on the cohort rebuilt from it."""
 
 import pandas as pd
 
@@ -16,7 +13,6 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.counts import (
     claims_of_experiment,
 )
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.factors import (
-    claims_of_datasets,
     claims_of_factors,
     claims_of_two_factor,
 )
@@ -25,9 +21,12 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.fits import (
     claims_of_nominal,
     claims_of_stiffness_ranges,
 )
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.frames import (
+    claims_of_datasets,
+    claims_of_joint_frames,
+)
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.poses import (
     claims_of_correlations,
-    claims_of_joint_frames,
     claims_of_normality,
     claims_of_pose_sampling,
 )
@@ -57,6 +56,7 @@ CLAIMS = (
     *claims_of_precision(),
     *claims_of_closed_forms(),
 )
+"""All claims of the paper (doi 10.3389/fbioe.2024.1304334), in its order."""
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:

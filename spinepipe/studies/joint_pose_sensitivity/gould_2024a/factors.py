@@ -1,9 +1,4 @@
-"""Joint pose against stiffness: Friedman tests, regression tree, shares of variance.
-
-The reduced dataset against the complete one, and bounds of both: sections 3.5 and 4.
-
-Table 6: correlations within the two-factor grid, compared by significance and sign.
-"""
+"""Joint pose against stiffness, section 3.4: Table 6, Friedman tests, tree, shares of variance."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -17,270 +12,34 @@ from spinepipe.comparison.claim import (
     Ours,
     Range,
     Run,
-    at_most,
     exactly,
     kendall_p,
     spearman_p,
     tested,
 )
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import paper as summary
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
-    JOINTS,
     MEASURED_JOINTS,
     P_BELOW,
     PAPER,
     REDUCED,
 )
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.poses import DATASETS, END_JOINTS
-from spinepipe.units import ROTATIONS, TRANSLATIONS
+from spinepipe.units import ROTATIONS
 
 _HALF = Range(0.5, 1.0, "the paper's tree finds the joint pose more influential: above one half")
+
 _TREE = (
     "the paper's own grid and tree are not published; how strong either factor is hangs on how "
     "far the landmarks scatter and how far the best stiffness sets differ"
 )
 
-
-def claims_of_factors() -> Iterator[Claim]:
-    """Section 3.4."""
-    bound = float(PAPER["friedman"]["p_below"])
-    for factor in ("pose", "stiffness"):
-        yield Claim(
-            f"friedman.{factor}",
-            "section 3.4",
-            f"largest p of Friedman tests of errors between levels of {factor}",
-            "p",
-            None,
-            Range(0.0, bound, f"the paper finds all below {bound:g}"),
-            _friedman(factor),
-            _TREE,
-        )
-    for joint, name in product(MEASURED_JOINTS, FITTED):
-        yield Claim(
-            f"tree.{joint}.{name}",
-            "section 3.4",
-            f"share of the joint pose in the regression tree of the {name} error at {joint}",
-            "share",
-            None,
-            _HALF,
-            _tree(joint, name),
-            _TREE,
-        )
-    for joint, name in product(MEASURED_JOINTS, FITTED):
-        yield Claim(
-            f"variance_share.{joint}.{name}",
-            "section 3.4",
-            f"variance of the {name} error at {joint} due to the joint pose, of that due to pose "
-            "or stiffness alone",
-            "share",
-            None,
-            _HALF,
-            _variance(joint, name),
-            _TREE,
-            "the paper has no such shares; its tree's order is what is compared",
-        )
-
-
-def _friedman(factor: str) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        rows = tested(run, "friedman", family="friedman", factor=factor)
-        largest, corrected = float(rows["p"].max()), float(rows["p_bonferroni"].max())
-        note = f"ours: {len(rows)} tests; after Bonferroni at most {corrected:.2g}"
-        return Ours(largest, note=note)
-
-    return ours
-
-
-def _tree(joint: str, name: str) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        rows = run.rows("importance", joint=joint, coordinate=name)
-        known = rows.dropna(subset=["importance"])
-        total = float(known["importance"].sum())
-        if total <= 0.0:
-            raise NotComputed(str(rows.iloc[0]["message"]) or "the pruned tree has no split")
-        pose = float(known.loc[known["factor"] == "pose", "importance"].sum())
-        first = known.iloc[0]
-        return Ours(pose / total, note=f"ours: {int(first['leaves'])} leaves, r2 {first['r2']:.2f}")
-
-    return ours
-
-
-def _variance(joint: str, name: str) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        where = {"joint": joint, "coordinate": name}
-        pose, stiffness = (
-            run.number("variance_shares", "share", factor=factor, **where)
-            for factor in ("pose", "stiffness")
-        )
-        if pose + stiffness == 0.0:
-            raise NotComputed("neither factor alone explains any variance")
-        note = f"ours: pose {pose:.2f}, stiffness {stiffness:.2f}, rest interaction"
-        return Ours(pose / (pose + stiffness), note=note)
-
-    return ours
-
-
-_SHIFT = PAPER["reduced_against_complete"]
-_BOUND = PAPER["spread_bound"]
-MIDDLE_JOINT = "L2L3"
-_KEPT = "it hangs on which fits succeeded, and those are not the paper's"
-_SCATTER = "landmark SDs and the construction of frames are not published (A20, A21)"
-_SIDEWAYS = ("right_bending", "left_rotation")
-
-
-def claims_of_datasets() -> Iterator[Claim]:
-    """Shifts between the datasets, drops of the extension IQR, bounds of the spreads."""
-    for key, words, unit, bound, quantity, kind, names in (
-        (
-            "origin_median",
-            "median origin",
-            "mm",
-            "origin_median_mm",
-            "origin",
-            "median",
-            TRANSLATIONS,
-        ),
-        ("origin_iqr", "IQR of origins", "mm", "origin_iqr_mm", "origin", "iqr", TRANSLATIONS),
-        (
-            "orientation_median",
-            "median orientation",
-            "deg",
-            "orientation_deg",
-            "orientation",
-            "median",
-            ROTATIONS,
-        ),
-        (
-            "orientation_iqr",
-            "IQR of bending and rotation",
-            "deg",
-            "orientation_deg",
-            "orientation",
-            "iqr",
-            _SIDEWAYS,
-        ),
-    ):
-        value = float(_SHIFT[bound])
-        yield Claim(
-            f"reduced_against_complete.{key}",
-            "section 3.5",
-            f"largest difference of {words} between reduced and complete dataset",
-            unit,
-            value,
-            at_most(value),
-            _largest_shift(quantity, kind, names),
-            _KEPT,
-        )
-    for joint in END_JOINTS:
-        yield _drop(joint)
-    yield from _bounds()
-    for joint in END_JOINTS:
-        yield _ratio(joint)
-
-
-def _value(run: Run, dataset: str, column: str, quantity: str, joint: str, name: str) -> float:
-    return summary.value(
-        run,
-        column,
-        part="poses",
-        loading="equilibrium",
-        dataset=DATASETS[dataset][0],
-        quantity=quantity,
-        joint=joint,
-        coordinate=name,
-    )
-
-
-def _shift(run: Run, column: str, quantity: str, joint: str, name: str) -> float:
-    """Reduced less complete."""
-    reduced, complete = (
-        _value(run, dataset, column, quantity, joint, name) for dataset in ("reduced", "complete")
-    )
-    return reduced - complete
-
-
-def _largest_shift(quantity: str, column: str, names: tuple[str, ...]) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        cells = product(JOINTS, names)
-        return Ours(max(abs(_shift(run, column, quantity, *cell)) for cell in cells))
-
-    return ours
-
-
-def _drop(joint: str) -> Claim:
-    paper = float(_SHIFT["extension_iqr_drop_deg"][joint])
-    return Claim(
-        f"reduced_against_complete.extension_iqr_drop.{joint}",
-        "section 3.5",
-        f"drop of the IQR of extension of {joint} from complete to reduced dataset",
-        "deg",
-        paper,
-        exactly(paper),
-        lambda run: Ours(-_shift(run, "iqr", "orientation", joint, "extension")),
-        _KEPT,
-        contradicted="A19: it rests on a column of Table 8 that is probably copied",
-    )
-
-
-def _ratio(joint: str) -> Claim:
-    """Extension of an end joint scatters more than that of the middle joint."""
-    printed = PAPER["joint_orientation"]["complete"]
-    end, middle = (float(printed[name]["iqr"]["extension_deg"]) for name in (joint, MIDDLE_JOINT))
-    return Claim(
-        f"extension_iqr_over_middle.{joint}",
-        "section 4, Table 8",
-        f"IQR of extension of {joint} in that of {MIDDLE_JOINT}",
-        "ratio",
-        end / middle,
-        Range(1.0, None, "the paper finds the end joints' larger: above 1"),
-        partial(_over_middle, joint),
-        _SCATTER,
-        "one vertebra against the mean of two (A21)",
-    )
-
-
-def _over_middle(joint: str, run: Run) -> Ours:
-    end, middle = (
-        _value(run, "complete", "iqr", "orientation", name, "extension")
-        for name in (joint, MIDDLE_JOINT)
-    )
-    if middle == 0.0:
-        raise NotComputed(f"the IQR of {MIDDLE_JOINT} is 0")
-    return Ours(end / middle)
-
-
-def _bounds() -> Iterator[Claim]:
-    for key, unit, quantity, names in (
-        ("origin_iqr_mm", "mm", "origin", TRANSLATIONS),
-        ("bending_and_rotation_iqr_deg", "deg", "orientation", _SIDEWAYS),
-        ("extension_iqr_deg", "deg", "orientation", ("extension",)),
-    ):
-        value = float(_BOUND[key])
-        yield Claim(
-            f"spread_bound.{key.rsplit('_', 1)[0]}",
-            "section 4",
-            f"largest IQR of {quantity}: {', '.join(names)}",
-            unit,
-            value,
-            at_most(value),
-            _largest_iqr(quantity, names),
-            _SCATTER,
-        )
-
-
-def _largest_iqr(quantity: str, names: tuple[str, ...]) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        cells = product(JOINTS, names)
-        return Ours(max(_value(run, "complete", "iqr", quantity, *cell) for cell in cells))
-
-    return ours
-
-
 _PRINTED = PAPER["two_factor_correlation"]
 _TEST = {"orientation": "kendall", "stiffness": "spearman"}
+
 _AGAINST = {"orientation": "pose", "stiffness": "stiffness"}
+
 _FACTORS = {"orientation": ROTATIONS, "stiffness": FITTED}
+
 _BEST = int(PAPER["counts"]["best_models"])
 
 _FEWEST_TESTS = 2
@@ -290,6 +49,7 @@ _POWER = (
     "whether any of many tests passes Bonferroni hangs on the size of the family, which the paper "
     "does not give, and on frames and motion that are not published"
 )
+
 _SIGN = "signs hang on frames and motion that are not published"
 _ASSUMED = "signs of the paper's joint angles are assumed to be as printed"
 NOTES = {
@@ -354,12 +114,6 @@ def _unreachable(kind: str, low: float, high: float) -> str:
         f"{check}: {smallest:g} of {n} values has p = {p:.2g}, not below {P_BELOW:g} after "
         f"Bonferroni for even {_FEWEST_TESTS} tests"
     )
-
-
-def _tests(run: Run, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
-    """Tests of one cell that have a result."""
-    family = f"two-factor: {error}_error at {joint} against {_AGAINST[kind]}"
-    return tested(run, _TEST[kind], family=family, factor=f"{factor}_{kind}")
 
 
 def _any(kind: str, factor: str, joint: str, error: str) -> Callable[[Run], Ours]:
@@ -463,3 +217,88 @@ def _contradicted() -> Iterator[Claim]:
         note="ours: section 2.5",
         contradicted=f"A30: the caption has {caption:g}, section 2.5 and the cells {P_BELOW:g}",
     )
+
+
+def _tests(run: Run, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
+    """Tests of one cell that have a result."""
+    family = f"two-factor: {error}_error at {joint} against {_AGAINST[kind]}"
+    return tested(run, _TEST[kind], family=family, factor=f"{factor}_{kind}")
+
+
+def claims_of_factors() -> Iterator[Claim]:
+    """Section 3.4."""
+    bound = float(PAPER["friedman"]["p_below"])
+    for factor in ("pose", "stiffness"):
+        yield Claim(
+            f"friedman.{factor}",
+            "section 3.4",
+            f"largest p of Friedman tests of errors between levels of {factor}",
+            "p",
+            None,
+            Range(0.0, bound, f"the paper finds all below {bound:g}"),
+            _friedman(factor),
+            _TREE,
+        )
+    for joint, name in product(MEASURED_JOINTS, FITTED):
+        yield Claim(
+            f"tree.{joint}.{name}",
+            "section 3.4",
+            f"share of the joint pose in the regression tree of the {name} error at {joint}",
+            "share",
+            None,
+            _HALF,
+            _tree(joint, name),
+            _TREE,
+        )
+    for joint, name in product(MEASURED_JOINTS, FITTED):
+        yield Claim(
+            f"variance_share.{joint}.{name}",
+            "section 3.4",
+            f"variance of the {name} error at {joint} due to the joint pose, of that due to pose "
+            "or stiffness alone",
+            "share",
+            None,
+            _HALF,
+            _variance(joint, name),
+            _TREE,
+            "the paper has no such shares; its tree's order is what is compared",
+        )
+
+
+def _friedman(factor: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        rows = tested(run, "friedman", family="friedman", factor=factor)
+        largest, corrected = float(rows["p"].max()), float(rows["p_bonferroni"].max())
+        note = f"ours: {len(rows)} tests; after Bonferroni at most {corrected:.2g}"
+        return Ours(largest, note=note)
+
+    return ours
+
+
+def _tree(joint: str, name: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        rows = run.rows("importance", joint=joint, coordinate=name)
+        known = rows.dropna(subset=["importance"])
+        total = float(known["importance"].sum())
+        if total <= 0.0:
+            raise NotComputed(str(rows.iloc[0]["message"]) or "the pruned tree has no split")
+        pose = float(known.loc[known["factor"] == "pose", "importance"].sum())
+        first = known.iloc[0]
+        return Ours(pose / total, note=f"ours: {int(first['leaves'])} leaves, r2 {first['r2']:.2f}")
+
+    return ours
+
+
+def _variance(joint: str, name: str) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        where = {"joint": joint, "coordinate": name}
+        pose, stiffness = (
+            run.number("variance_shares", "share", factor=factor, **where)
+            for factor in ("pose", "stiffness")
+        )
+        if pose + stiffness == 0.0:
+            raise NotComputed("neither factor alone explains any variance")
+        note = f"ours: pose {pose:.2f}, stiffness {stiffness:.2f}, rest interaction"
+        return Ours(pose / (pose + stiffness), note=note)
+
+    return ours

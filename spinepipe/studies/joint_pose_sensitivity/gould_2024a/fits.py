@@ -1,11 +1,4 @@
-"""Errors of the start-value and damping bootstraps: Tables 2 and 3.
-
-The model in the joint poses of the paper, section 3.1.
-
-Why fits of a bootstrap end apart: what is sampled, and how fast a spine settles.
-
-Ranges of the stiffness fitted in both bootstraps: section 3.1.
-"""
+"""Fits in the joint poses of the paper, section 3.1, and both bootstraps (Tables 2 and 3)."""
 
 from collections.abc import Callable, Iterator
 from itertools import product
@@ -20,63 +13,45 @@ from spinepipe.comparison.claim import (
     factor_of_two,
     within_width,
 )
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import paper as summary
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     MEASURED_JOINTS,
     MOTION_KEY,
-    MOTION_UNIT,
     NO_RAW_DATA,
     PAPER,
     STIFFNESS_KEY,
-    STIFFNESS_UNIT,
     measured,
+    summary_cell,
+    summary_largest,
+    summary_median,
+    summary_value,
 )
+from spinepipe.units import COORDINATE_UNITS, STIFFNESS_UNITS
 
 _SOURCE = {"part": "damping_bootstrap", "loading": "equilibrium", "dataset": "all"}
 """Fits in the cohort's own poses from the study's start; at rest damping does not enter."""
 
 CONTRADICTED_NOMINAL_PERCENT = {"extension": "A11"}
 
+_OPTIMISER = "what spread the paper's optimiser adds cannot be told without its runs"
+TABLE = {"damping": "Table 2", "start": "Table 3"}
 
-def claims_of_nominal() -> Iterator[Claim]:
-    """Largest error of a joint, and the same in percent."""
-    for name in FITTED:
-        where = {**_SOURCE, "quantity": "error", "coordinate": name}
-        paper = float(PAPER["nominal_model_error"][MOTION_KEY[name]])
-        yield Claim(
-            f"nominal_model.{name}.error",
-            "section 3.1",
-            f"{name} error in the cohort's own joint poses, larger of two joints",
-            MOTION_UNIT[name],
-            paper,
-            factor_of_two(paper),
-            summary.largest("median", MEASURED_JOINTS, **where),
-            NO_RAW_DATA,
-        )
-        percent = float(PAPER["nominal_model_error_percent"][name])
-        check = CONTRADICTED_NOMINAL_PERCENT.get(name)
-        yield Claim(
-            f"nominal_model.{name}.error_percent",
-            "section 3.1",
-            f"{name} error in the cohort's own joint poses, larger of two joints",
-            "% of measured",
-            percent,
-            factor_of_two(percent),
-            summary.largest("percent_of_measured", MEASURED_JOINTS, **where),
-            NO_RAW_DATA,
-            contradicted=""
-            if check is None
-            else f"{check}: {_implied_nominal(paper, percent, name)}",
-        )
+SETS = {"damping": "sets of damping", "start": "start values"}
 
+LOADINGS = ("quasi_static", "dynamic")
 
-def _implied_nominal(error: float, percent: float, name: str) -> str:
-    parts = [f"{100.0 * error / measured(joint, name):.1f}" for joint in MEASURED_JOINTS]
-    return (
-        f"{error:g} {MOTION_UNIT[name]} are {' or '.join(parts)} % of the printed motion, "
-        f"not {percent:g} %"
-    )
+CONTRADICTED_PERCENT = {
+    **{(what, load, "anterior"): "A12" for what, load in product(TABLE, LOADINGS)},
+    **{("damping", load, "superior"): "A13" for load in LOADINGS},
+    ("damping", "dynamic", "extension"): "A14",
+}
+"""Printed percentages that the printed errors and motion do not give."""
+
+CLOSE = 0.01
+"""Relative distance from the median within which fits are counted in the notes."""
+
+SAME = 1e-4
+"""Spread relative to the median below which fits count as ended in the same stiffness."""
 
 
 def slowest_s() -> float:
@@ -89,7 +64,6 @@ def slowest_s() -> float:
     )
 
 
-_OPTIMISER = "what spread the paper's optimiser adds cannot be told without its runs"
 SPREAD = {
     ("start", "quasi_static"): "sets differ in the stiffnesses that are not fitted too, so each "
     f"is a problem of its own; {_OPTIMISER}",
@@ -105,15 +79,44 @@ SPREAD = {
 """Reasons by what is sampled and the loading."""
 
 
-TABLE = {"damping": "Table 2", "start": "Table 3"}
-SETS = {"damping": "sets of damping", "start": "start values"}
-LOADINGS = ("quasi_static", "dynamic")
-CONTRADICTED_PERCENT = {
-    **{(what, load, "anterior"): "A12" for what, load in product(TABLE, LOADINGS)},
-    **{("damping", load, "superior"): "A13" for load in LOADINGS},
-    ("damping", "dynamic", "extension"): "A14",
-}
-"""Printed percentages that the printed errors and motion do not give."""
+def claims_of_nominal() -> Iterator[Claim]:
+    """Largest error of a joint, and the same in percent."""
+    for name in FITTED:
+        where = {**_SOURCE, "quantity": "error", "coordinate": name}
+        paper = float(PAPER["nominal_model_error"][MOTION_KEY[name]])
+        yield Claim(
+            f"nominal_model.{name}.error",
+            "section 3.1",
+            f"{name} error in the cohort's own joint poses, larger of two joints",
+            COORDINATE_UNITS[name],
+            paper,
+            factor_of_two(paper),
+            summary_largest("median", MEASURED_JOINTS, **where),
+            NO_RAW_DATA,
+        )
+        percent = float(PAPER["nominal_model_error_percent"][name])
+        check = CONTRADICTED_NOMINAL_PERCENT.get(name)
+        yield Claim(
+            f"nominal_model.{name}.error_percent",
+            "section 3.1",
+            f"{name} error in the cohort's own joint poses, larger of two joints",
+            "% of measured",
+            percent,
+            factor_of_two(percent),
+            summary_largest("percent_of_measured", MEASURED_JOINTS, **where),
+            NO_RAW_DATA,
+            contradicted=""
+            if check is None
+            else f"{check}: {_implied_nominal(paper, percent, name)}",
+        )
+
+
+def _implied_nominal(error: float, percent: float, name: str) -> str:
+    parts = [f"{100.0 * error / measured(joint, name):.1f}" for joint in MEASURED_JOINTS]
+    return (
+        f"{error:g} {COORDINATE_UNITS[name]} are {' or '.join(parts)} % of the printed motion, "
+        f"not {percent:g} %"
+    )
 
 
 def claims_of_bootstraps() -> Iterator[Claim]:
@@ -136,20 +139,20 @@ def _cell(what: str, loading: str, joint: str, name: str) -> Iterator[Claim]:
         f"{key}.median",
         TABLE[what],
         f"median {words}, over {SETS[what]}",
-        MOTION_UNIT[name],
+        COORDINATE_UNITS[name],
         median,
         within_width(median, width, "range"),
-        summary.median(**where),
+        summary_median(**where),
         NO_RAW_DATA,
     )
     yield Claim(
         f"{key}.range",
         TABLE[what],
         f"range of {words}, over {SETS[what]}",
-        MOTION_UNIT[name],
+        COORDINATE_UNITS[name],
         width,
         factor_of_two(width),
-        summary.statistic("range", **where),
+        summary_cell("range", **where),
         SPREAD[what, loading],
     )
 
@@ -170,7 +173,7 @@ def _percent(what: str, loading: str, name: str) -> Claim:
         "% of measured",
         paper,
         factor_of_two(paper),
-        summary.largest(
+        summary_largest(
             "percent_of_measured",
             MEASURED_JOINTS,
             **where_of(what, loading),
@@ -210,10 +213,6 @@ def _lower_when_quasi_static() -> Claim:
     )
 
 
-def _cells() -> Iterator[tuple[str, str, str, str]]:
-    yield from product(TABLE, MEASURED_JOINTS, FITTED, ("median", "range"))
-
-
 def _printed_lower() -> float:
     lower = []
     for what, joint, name, kind in _cells():
@@ -228,16 +227,14 @@ def _share_lower(run: Run) -> Ours:
     for what, joint, name, kind in _cells():
         where = {"quantity": "error", "joint": joint, "coordinate": name}
         quasi_static, dynamic = (
-            summary.value(run, kind, **where_of(what, loading), **where) for loading in LOADINGS
+            summary_value(run, kind, **where_of(what, loading), **where) for loading in LOADINGS
         )
         lower.append(quasi_static < dynamic)
     return Ours(100.0 * sum(lower) / len(lower))
 
 
-CLOSE = 0.01
-"""Relative distance from the median within which fits are counted in the notes."""
-SAME = 1e-4
-"""Spread relative to the median below which fits count as ended in the same stiffness."""
+def _cells() -> Iterator[tuple[str, str, str, str]]:
+    yield from product(TABLE, MEASURED_JOINTS, FITTED, ("median", "range"))
 
 
 def claims_of_stiffness_ranges() -> Iterator[Claim]:
@@ -258,7 +255,7 @@ def _stiffness_ranges(name: str) -> Iterator[Claim]:
             f"stiffness_range.{key}.{name}",
             "section 3.1",
             f"range of fitted {name} stiffness {words}, quasi-static",
-            STIFFNESS_UNIT[name],
+            STIFFNESS_UNITS[name],
             paper,
             factor_of_two(paper),
             _stiffness_range(what, dataset, name),
@@ -272,14 +269,14 @@ def _stiffness_range(what: str, dataset: str, name: str) -> Callable[[Run], Ours
     def ours(run: Run) -> Ours:
         where = {"quantity": "stiffness", "joint": "*", "coordinate": name}
         where |= where_of(what, "quasi_static", dataset)
-        middle = summary.value(run, "median", **where)
+        middle = summary_value(run, "median", **where)
         fits = run.rows("bootstrap", bootstrap=what, loading="quasi_static")
         values = fits.groupby("set")[STIFFNESS_KEY[name]].first().dropna()
         close = int(((values - middle).abs() <= CLOSE * abs(middle)).sum())
         which = "" if dataset == "all" else ", outliers counted,"
         share = f"{100.0 * CLOSE:g} % of the median"
         note = f"ours: {close} of {len(values)} fits{which} within {share}"
-        return Ours(summary.value(run, "range", **where), note=note)
+        return Ours(summary_value(run, "range", **where), note=note)
 
     return ours
 
@@ -303,10 +300,10 @@ def _start_over_damping(name: str) -> Callable[[Run], Ours]:
     def ours(run: Run) -> Ours:
         where = {"quantity": "stiffness", "joint": "*", "coordinate": name}
         start, damping = (
-            summary.value(run, "range", **where_of(what, "quasi_static"), **where)
+            summary_value(run, "range", **where_of(what, "quasi_static"), **where)
             for what in ("start", "damping")
         )
-        middle = summary.value(run, "median", **where_of("damping", "quasi_static"), **where)
+        middle = summary_value(run, "median", **where_of("damping", "quasi_static"), **where)
         if max(start, damping) < SAME * middle or damping == 0.0:
             told = f"their ranges are {start / middle:.1e} and {damping / middle:.1e} of the median"
             raise NotComputed(f"all fits end in the same stiffness, {told}: no ratio has a meaning")

@@ -1,11 +1,4 @@
-"""Stiffness and errors over all sampled poses, section 3.3.
-
-Correlations over the reduced dataset: Table 5 and section 3.3.
-
-Joint frames: Tables 7 and 8.
-
-Which distributions the paper calls not normal: sections 3.4 and 3.5.
-"""
+"""Over all sampled poses, section 3.3: stiffness, errors, normality and correlations (Table 5)."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -17,47 +10,223 @@ from spinepipe.comparison.claim import (
     Ours,
     Range,
     Run,
-    Verdict,
     at_most,
     exactly,
     factor_of_two,
-    half_width,
     insignificant,
-    normal_iqr,
     spearman_interval,
     spearman_threshold,
     tested,
 )
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import paper as summary
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     JOINTS,
     MEASURED_JOINTS,
-    MOTION_KEY,
-    MOTION_UNIT,
     NO_RAW_DATA,
     P_BELOW,
     PAPER,
     REDUCED,
-    SAMPLES,
     STIFFNESS_KEY,
-    STIFFNESS_UNIT,
+    summary_cell,
+    summary_median,
+    summary_percent,
+    summary_value,
 )
-from spinepipe.units import ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATE_UNITS, ROTATIONS, STIFFNESS_UNITS, TRANSLATIONS
 
 _CONFOUNDED = (
     "which errors remain at a best fit hangs on measured motion, weights and joint frames "
     "together; the paper's motion in its own frames is not published"
 )
+
 _ELSEWHERE = (
     "signs and sizes hang on joint frames, load line and motion, of which some are assumed here"
 )
+
 _JUST = "the paper's one pair was just significant, without correction for the number of pairs"
 _THRESHOLD = spearman_threshold(P_BELOW, REDUCED)
+
 OPPOSITE = {
     ("anterior", "anterior"): "A27: Table 6 has the opposite sign, at a fixed pose",
     ("extension", "extension"): "A28: Table 6 has the opposite sign, at a fixed pose",
 }
+
+_AT_LEAST_ONE = "the paper rejects normality without saying of which quantities: one at least"
+ERRORS = tuple(f"{name}_error" for name in FITTED)
+
+FRAMES = (
+    *(f"{joint}_{name}_origin" for joint in JOINTS for name in TRANSLATIONS),
+    *(f"{joint}_{name}_orientation" for joint in JOINTS for name in ROTATIONS),
+)
+
+QUARTILES = ("quartile_25", "median", "quartile_75")
+
+REDUCED_SET = {"part": "poses", "loading": "equilibrium", "dataset": "reduced"}
+
+_ARM = (
+    NO_RAW_DATA + "; flexion stiffness hangs on the lever arm of the load, for which the paper's "
+    "numbers exclude each other (A1, A2)"
+)
+
+
+def claims_of_pose_sampling() -> Iterator[Claim]:
+    """Stiffness of the reduced dataset, its spread, and the bounds of its errors."""
+    for name in FITTED:
+        yield from _stiffness(name)
+    yield _wider()
+    for kind, name_of in (("translation_mm", "translation"), ("rotation_deg", "rotation")):
+        bound = float(PAPER["reduced_error_bound"][kind])
+        names = ("anterior", "superior") if name_of == "translation" else ("extension",)
+        yield Claim(
+            f"reduced.largest_error.{name_of}",
+            "section 3.3, Fig 7",
+            f"largest error of a {name_of} in the reduced dataset",
+            COORDINATE_UNITS[names[0]],
+            bound,
+            at_most(bound),
+            partial(_largest, names),
+            NO_RAW_DATA,
+            "the paper leaves outliers of its figure out; ours are all of the reduced dataset",
+        )
+    for joint in MEASURED_JOINTS:
+        yield Claim(
+            f"reduced.anterior_over_superior_error.{joint}",
+            "section 3.3, Fig 7",
+            f"median anterior error in superior errors at {joint}",
+            "ratio",
+            None,
+            Range(1.0, None, "the paper's medians are largest in the anterior direction: above 1"),
+            partial(_order, joint),
+            NO_RAW_DATA,
+        )
+
+
+def _stiffness(name: str) -> Iterator[Claim]:
+    low, middle, high = _quartiles(name)
+    where = {**REDUCED_SET, "quantity": "stiffness", "joint": "*", "coordinate": name}
+    unit, reason = STIFFNESS_UNITS[name], _ARM if name == "extension" else NO_RAW_DATA
+    yield Claim(
+        f"reduced.stiffness.{name}.median",
+        "section 3.3, Fig 8",
+        f"median {name} stiffness",
+        unit,
+        middle,
+        Range(low, high, "the paper's IQR"),
+        summary_median(**where),
+        reason,
+    )
+    yield Claim(
+        f"reduced.stiffness.{name}.iqr",
+        "section 3.3, Fig 8",
+        f"IQR of {name} stiffness",
+        unit,
+        high - low,
+        factor_of_two(high - low),
+        summary_cell("iqr", **where),
+        reason,
+    )
+    percent = _paper_percent(name)
+    yield Claim(
+        f"reduced.stiffness.{name}.iqr_percent",
+        "section 3.3",
+        f"IQR of {name} stiffness",
+        "% of median",
+        percent,
+        factor_of_two(percent),
+        summary_percent("iqr", **where),
+        NO_RAW_DATA,
+    )
+
+
+def _wider() -> Claim:
+    """Anterior stiffness is found far less precisely than flexion stiffness."""
+    ratio = _paper_percent("anterior") / _paper_percent("extension")
+    return Claim(
+        "reduced.anterior_iqr_percent_over_extension",
+        "section 3.3, Fig 8",
+        "IQR in percent of the median, anterior in extension stiffness",
+        "ratio",
+        ratio,
+        Range(1.0, None, "the paper's anterior stiffness scatters more: above 1"),
+        _wider_by,
+        NO_RAW_DATA,
+    )
+
+
+def _wider_by(run: Run) -> Ours:
+    anterior, extension = (
+        summary_percent("iqr", **REDUCED_SET, quantity="stiffness", joint="*", coordinate=name)(
+            run
+        ).value
+        for name in ("anterior", "extension")
+    )
+    if extension == 0.0:
+        raise NotComputed("the IQR of extension stiffness is 0")
+    return Ours(anterior / extension)
+
+
+def _paper_percent(name: str) -> float:
+    low, middle, high = _quartiles(name)
+    return 100.0 * (high - low) / middle
+
+
+def _quartiles(name: str) -> tuple[float, float, float]:
+    """Lower quartile, median and upper quartile as printed."""
+    printed, key = PAPER["reduced_stiffness"], STIFFNESS_KEY[name]
+    low, middle, high = (float(printed[at][key]) for at in QUARTILES)
+    return low, middle, high
+
+
+def _largest(names: tuple[str, ...], run: Run) -> Ours:
+    return Ours(
+        max(
+            summary_value(
+                run, "maximum", **REDUCED_SET, quantity="error", joint=joint, coordinate=name
+            )
+            for joint in MEASURED_JOINTS
+            for name in names
+        )
+    )
+
+
+def _order(joint: str, run: Run) -> Ours:
+    anterior, superior = (
+        summary_value(run, "median", **REDUCED_SET, quantity="error", joint=joint, coordinate=name)
+        for name in ("anterior", "superior")
+    )
+    if superior == 0.0:
+        raise NotComputed("the median superior error is 0")
+    return Ours(anterior / superior)
+
+
+def claims_of_normality() -> Iterator[Claim]:
+    """Number of rejected distributions."""
+    for key, where, words, responses in (
+        ("errors", "section 3.4", "errors", ERRORS),
+        ("joint_frames", "section 3.5", "coordinates of joint frames, reduced dataset", FRAMES),
+    ):
+        yield Claim(
+            f"normality.{key}",
+            where,
+            f"{words} that are not normal (chi-squared)",
+            "count",
+            None,
+            Range(1.0, None, _AT_LEAST_ONE),
+            _rejected(responses),
+            "the same test finds no departure from a normal distribution in this run",
+        )
+
+
+def _rejected(responses: tuple[str, ...]) -> Callable[[Run], Ours]:
+    def ours(run: Run) -> Ours:
+        rows = tested(run, "chi", family="normality")
+        rows = rows[rows["response"].isin(responses)]
+        if rows.empty:
+            raise NotComputed("no such distribution was tested")
+        rejected = int((rows["p"] < P_BELOW).sum())
+        return Ours(float(rejected), note=f"ours: {rejected} of {len(rows)} tested, uncorrected")
+
+    return ours
 
 
 def claims_of_correlations() -> Iterator[Claim]:
@@ -155,272 +324,3 @@ def _significant(family: str, key: str) -> Callable[[Run], Ours]:
         return Ours(float(found), note=f"{note} with n = {int(rows['n'].max())}")
 
     return ours
-
-
-DATASETS = {"complete": ("all", SAMPLES), "reduced": ("reduced", REDUCED)}
-"""The paper's word to the dataset of the summary and the paper's number of poses."""
-
-TABLES = {
-    "origin": ("Table 7", TRANSLATIONS),
-    "orientation": ("Table 8", ROTATIONS),
-}
-END_JOINTS = ("L1L2", "L3L4")
-
-_PUT_IN = {
-    "complete": "circular: the cohort was built to have it (docs/decisions/0001)",
-    "reduced": "circular: the cohort was built to have it in the complete dataset",
-}
-_FRAME_RULE = (
-    "the middle joint's frame is the mean of two vertebrae's here; the text does not determine "
-    "the paper's construction of frames (A21)"
-)
-_NO_SD = "landmark SDs per landmark and axis are not published"
-_SCATTER = {
-    "origin": f"{_NO_SD}; closed_form.origin_iqr has what this study's SD gives",
-    "orientation": f"{_NO_SD}, and neither is the construction of frames (A21)",
-}
-_CHOSEN = "circular: the cohort's own landmark SD and pedicles were chosen for it"
-_KEPT = "which poses are in the reduced dataset hangs on which fits succeeded"
-
-
-def claims_of_joint_frames() -> Iterator[Claim]:
-    """Median and IQR of each coordinate of each joint frame, of both datasets."""
-    for quantity, (table, names) in TABLES.items():
-        for dataset, joint, name in product(DATASETS, JOINTS, names):
-            yield from _coordinate(quantity, table, dataset, joint, name)
-
-
-def _coordinate(quantity: str, table: str, dataset: str, joint: str, name: str) -> Iterator[Claim]:
-    printed = PAPER[f"joint_{quantity}"][dataset][joint]
-    middle, iqr = (float(printed[kind][MOTION_KEY[name]]) for kind in ("median", "iqr"))
-    ours, n = DATASETS[dataset]
-    where = {
-        **{"part": "poses", "loading": "equilibrium", "dataset": ours},
-        **{"quantity": quantity, "joint": joint, "coordinate": name},
-    }
-    key, unit = f"joint_{quantity}.{dataset}.{joint}.{name}", MOTION_UNIT[name]
-    free = quantity == "orientation" and joint not in END_JOINTS  # nothing was left to choose
-    words = f"of {name} {quantity} of {joint}, {dataset} dataset"
-    yield Claim(
-        f"{key}.median",
-        table,
-        f"median {words}",
-        unit,
-        middle,
-        half_width(middle, iqr),
-        summary.median(**where),
-        _FRAME_RULE if free else _KEPT,
-        "" if free else _PUT_IN[dataset],
-        evidence=Verdict.INSIDE if free else Verdict.CIRCULAR,
-    )
-    yield Claim(
-        f"{key}.iqr",
-        table,
-        f"IQR {words}",
-        unit,
-        iqr,
-        normal_iqr(iqr, n),
-        summary.statistic("iqr", **where),
-        _spread(quantity, dataset),
-        _CHOSEN if _chosen(quantity, joint, name) else "",
-        _copied(quantity, dataset, joint, name),
-        Verdict.CIRCULAR if _chosen(quantity, joint, name) else Verdict.INSIDE,
-    )
-
-
-def _spread(quantity: str, dataset: str) -> str:
-    """Why a spread may differ from the paper's."""
-    return _SCATTER[quantity] if dataset == "complete" else f"{_SCATTER[quantity]}; {_KEPT}"
-
-
-def _chosen(quantity: str, joint: str, name: str) -> bool:
-    """The landmark SD was chosen for origins, the pedicles' distance for the end joints."""
-    return quantity == "origin" or (joint in END_JOINTS and name != "extension")
-
-
-def _copied(quantity: str, dataset: str, joint: str, name: str) -> str:
-    """The printed IQR of extension repeats that of axial rotation at all joints."""
-    if (quantity, dataset, name) != ("orientation", "reduced", "extension"):
-        return ""
-    printed = PAPER["joint_orientation"]["reduced"][joint]["iqr"]
-    return (
-        f"A19: printed is {float(printed['extension_deg']):g} deg, the same as of axial rotation, "
-        "at all three joints: probably a copied column"
-    )
-
-
-_AT_LEAST_ONE = "the paper rejects normality without saying of which quantities: one at least"
-
-ERRORS = tuple(f"{name}_error" for name in FITTED)
-FRAMES = (
-    *(f"{joint}_{name}_origin" for joint in JOINTS for name in TRANSLATIONS),
-    *(f"{joint}_{name}_orientation" for joint in JOINTS for name in ROTATIONS),
-)
-
-
-def claims_of_normality() -> Iterator[Claim]:
-    """Number of rejected distributions."""
-    for key, where, words, responses in (
-        ("errors", "section 3.4", "errors", ERRORS),
-        ("joint_frames", "section 3.5", "coordinates of joint frames, reduced dataset", FRAMES),
-    ):
-        yield Claim(
-            f"normality.{key}",
-            where,
-            f"{words} that are not normal (chi-squared)",
-            "count",
-            None,
-            Range(1.0, None, _AT_LEAST_ONE),
-            _rejected(responses),
-            "the same test finds no departure from a normal distribution in this run",
-        )
-
-
-def _rejected(responses: tuple[str, ...]) -> Callable[[Run], Ours]:
-    def ours(run: Run) -> Ours:
-        rows = tested(run, "chi", family="normality")
-        rows = rows[rows["response"].isin(responses)]
-        if rows.empty:
-            raise NotComputed("no such distribution was tested")
-        rejected = int((rows["p"] < P_BELOW).sum())
-        return Ours(float(rejected), note=f"ours: {rejected} of {len(rows)} tested, uncorrected")
-
-    return ours
-
-
-QUARTILES = ("quartile_25", "median", "quartile_75")
-REDUCED_SET = {"part": "poses", "loading": "equilibrium", "dataset": "reduced"}
-_ARM = (
-    NO_RAW_DATA + "; flexion stiffness hangs on the lever arm of the load, for which the paper's "
-    "numbers exclude each other (A1, A2)"
-)
-
-
-def claims_of_pose_sampling() -> Iterator[Claim]:
-    """Stiffness of the reduced dataset, its spread, and the bounds of its errors."""
-    for name in FITTED:
-        yield from _stiffness(name)
-    yield _wider()
-    for kind, name_of in (("translation_mm", "translation"), ("rotation_deg", "rotation")):
-        bound = float(PAPER["reduced_error_bound"][kind])
-        names = ("anterior", "superior") if name_of == "translation" else ("extension",)
-        yield Claim(
-            f"reduced.largest_error.{name_of}",
-            "section 3.3, Fig 7",
-            f"largest error of a {name_of} in the reduced dataset",
-            MOTION_UNIT[names[0]],
-            bound,
-            at_most(bound),
-            partial(_largest, names),
-            NO_RAW_DATA,
-            "the paper leaves outliers of its figure out; ours are all of the reduced dataset",
-        )
-    for joint in MEASURED_JOINTS:
-        yield Claim(
-            f"reduced.anterior_over_superior_error.{joint}",
-            "section 3.3, Fig 7",
-            f"median anterior error in superior errors at {joint}",
-            "ratio",
-            None,
-            Range(1.0, None, "the paper's medians are largest in the anterior direction: above 1"),
-            partial(_order, joint),
-            NO_RAW_DATA,
-        )
-
-
-def _stiffness(name: str) -> Iterator[Claim]:
-    low, middle, high = _quartiles(name)
-    where = {**REDUCED_SET, "quantity": "stiffness", "joint": "*", "coordinate": name}
-    unit, reason = STIFFNESS_UNIT[name], _ARM if name == "extension" else NO_RAW_DATA
-    yield Claim(
-        f"reduced.stiffness.{name}.median",
-        "section 3.3, Fig 8",
-        f"median {name} stiffness",
-        unit,
-        middle,
-        Range(low, high, "the paper's IQR"),
-        summary.median(**where),
-        reason,
-    )
-    yield Claim(
-        f"reduced.stiffness.{name}.iqr",
-        "section 3.3, Fig 8",
-        f"IQR of {name} stiffness",
-        unit,
-        high - low,
-        factor_of_two(high - low),
-        summary.statistic("iqr", **where),
-        reason,
-    )
-    percent = _paper_percent(name)
-    yield Claim(
-        f"reduced.stiffness.{name}.iqr_percent",
-        "section 3.3",
-        f"IQR of {name} stiffness",
-        "% of median",
-        percent,
-        factor_of_two(percent),
-        summary.ratio_percent("iqr", **where),
-        NO_RAW_DATA,
-    )
-
-
-def _quartiles(name: str) -> tuple[float, float, float]:
-    """Lower quartile, median and upper quartile as printed."""
-    printed, key = PAPER["reduced_stiffness"], STIFFNESS_KEY[name]
-    low, middle, high = (float(printed[at][key]) for at in QUARTILES)
-    return low, middle, high
-
-
-def _wider() -> Claim:
-    """Anterior stiffness is found far less precisely than flexion stiffness."""
-    ratio = _paper_percent("anterior") / _paper_percent("extension")
-    return Claim(
-        "reduced.anterior_iqr_percent_over_extension",
-        "section 3.3, Fig 8",
-        "IQR in percent of the median, anterior in extension stiffness",
-        "ratio",
-        ratio,
-        Range(1.0, None, "the paper's anterior stiffness scatters more: above 1"),
-        _wider_by,
-        NO_RAW_DATA,
-    )
-
-
-def _paper_percent(name: str) -> float:
-    low, middle, high = _quartiles(name)
-    return 100.0 * (high - low) / middle
-
-
-def _wider_by(run: Run) -> Ours:
-    anterior, extension = (
-        summary.ratio_percent(
-            "iqr", **REDUCED_SET, quantity="stiffness", joint="*", coordinate=name
-        )(run).value
-        for name in ("anterior", "extension")
-    )
-    if extension == 0.0:
-        raise NotComputed("the IQR of extension stiffness is 0")
-    return Ours(anterior / extension)
-
-
-def _largest(names: tuple[str, ...], run: Run) -> Ours:
-    return Ours(
-        max(
-            summary.value(
-                run, "maximum", **REDUCED_SET, quantity="error", joint=joint, coordinate=name
-            )
-            for joint in MEASURED_JOINTS
-            for name in names
-        )
-    )
-
-
-def _order(joint: str, run: Run) -> Ours:
-    anterior, superior = (
-        summary.value(run, "median", **REDUCED_SET, quantity="error", joint=joint, coordinate=name)
-        for name in ("anterior", "superior")
-    )
-    if superior == 0.0:
-        raise NotComputed("the median superior error is 0")
-    return Ours(anterior / superior)

@@ -1,7 +1,4 @@
-"""How precise landmarks must be for errors below 1 mm and 1 deg: abstract and section 4.
-
-What follows from the paper's numbers by a formula.
-"""
+"""How precise landmarks must be (abstract, section 4), and what the paper's numbers imply."""
 
 from collections.abc import Callable, Iterator
 from math import sqrt
@@ -21,7 +18,7 @@ from spinepipe.comparison.claim import (
     spearman_threshold,
 )
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.best_models import carried_force
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.counts import BEST, FORCE_N
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.counts import BEST_STIFFNESS, FORCE_N
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     FITTED,
     JOINTS,
@@ -31,13 +28,15 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     REDUCED,
     measured,
 )
-from spinepipe.units import TRANSLATIONS
+from spinepipe.units import MM_PER_M, TRANSLATIONS
 
 RESULTANT_MM = float(PAPER["landmarks"]["largest_resultant_sd_mm"])
+
 PER_AXIS_MM = RESULTANT_MM / sqrt(3.0)
 """SD per axis if 2.9 mm is that of the resultant of three equal axes."""
 
 _ENDS = ("sd_low_mm", "sd_high_mm")
+
 _ENOUGH = "will do"
 """What the message of a run says where even the largest sampled SD keeps the limits."""
 
@@ -46,6 +45,13 @@ _TARGET = (
     "the paper looked at one precision only and left failed fits out; here every pose counts, "
     "without result as above the limit"
 )
+
+_POINTS = 2.0
+_GRAVITY_M_PER_S2 = 9.81
+_STEEP = 0.95
+"""Cosine of the tilt of a joint, about 18 degrees, that the check of the engine allows."""
+
+_FORMULA = "the formula does not give the printed number"
 
 
 def claims_of_precision() -> Iterator[Claim]:
@@ -138,14 +144,6 @@ def _meaning() -> Claim:
     )
 
 
-_MM_PER_M = 1000.0
-_POINTS = 2.0
-_GRAVITY_M_PER_S2 = 9.81
-_STEEP = 0.95
-"""Cosine of the tilt of a joint, about 18 degrees, that the check of the engine allows."""
-_FORMULA = "the formula does not give the printed number"
-
-
 def claims_of_closed_forms() -> Iterator[Claim]:
     """Compression, thresholds, ratios, spread of origins."""
     yield _compression()
@@ -155,33 +153,8 @@ def claims_of_closed_forms() -> Iterator[Claim]:
     yield _origin_spread()
 
 
-def _fixed(
-    name: str,
-    where: str,
-    quantity: str,
-    unit: str,
-    paper: float | None,
-    allowed: Range,
-    ours: float,
-    note: str,
-) -> Claim:
-    """A number that the paper's own numbers give."""
-    return Claim(
-        f"closed_form.{name}",
-        where,
-        quantity,
-        unit,
-        paper,
-        allowed,
-        lambda run: Ours(ours),
-        _FORMULA,
-        note,
-        evidence=Verdict.RECOMPUTED,
-    )
-
-
 def _compression() -> Claim:
-    stiffness = float(BEST["superior_n_per_m"])
+    stiffness = float(BEST_STIFFNESS["superior_n_per_m"])
     errors = (
         float(PAPER["best_model"]["superior_error_of_L2L3"]["error_mm"]),
         float(PAPER["best_model"]["largest_error"]["superior_mm"]),
@@ -197,7 +170,7 @@ def _compression() -> Claim:
         "mm",
         None,
         Range(min(left), max(left), "printed motion of L2L3 and L3L4 less the best model's errors"),
-        _MM_PER_M * FORCE_N / stiffness,
+        MM_PER_M * FORCE_N / stiffness,
         f"ours: {FORCE_N:g} N / {stiffness:g} N/m, without weights and tilt (A4)",
     )
 
@@ -274,6 +247,31 @@ def _ratios() -> Iterator[Claim]:
         Range(times, None, "an order of magnitude or more"),
         outlier / start,
         "A33",
+    )
+
+
+def _fixed(
+    name: str,
+    where: str,
+    quantity: str,
+    unit: str,
+    paper: float | None,
+    allowed: Range,
+    ours: float,
+    note: str,
+) -> Claim:
+    """A number that the paper's own numbers give."""
+    return Claim(
+        f"closed_form.{name}",
+        where,
+        quantity,
+        unit,
+        paper,
+        allowed,
+        lambda run: Ours(ours),
+        _FORMULA,
+        note,
+        evidence=Verdict.RECOMPUTED,
     )
 
 

@@ -1,11 +1,5 @@
-"""Figure: how far every joint moves in every test, and how far specimens differ.
+"""Figures: how far every joint moves in every test, and what that hangs on."""
 
-Panels of range-of-motion figures: one for each test, a row for each joint.
-
-Figure: what the motion of every joint hangs on.
-"""
-
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,47 +11,28 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import BAR_PT, KEY, THIN_BAR_PT, draw_bar
+from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
-from spinepipe.report.words import AXIS, POSITIVE, count
+from spinepipe.report.words import AXIS, POSITIVE, case, count
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.range_of_motion.tables import EVERY
 from spinepipe.units import COORDINATES
 
-EVERY = "*"
-_MOST_ACROSS = 3
 _ABOVE_AND_BELOW_MM, _KEY_MM = 14.0, 17.0
-_LINE_LENGTH = 150
 
 
 def panels(tests: Sequence[str], joints: Sequence[str], row_mm: float) -> tuple[list[Axes], Figure]:
     """A panel for each test with names of joints, caudal to cranial from the bottom up."""
-    down = -(-len(tests) // _MOST_ACROSS)
-    across = -(-len(tests) // down)
+    across = across_of(len(tests))
+    down = -(-len(tests) // across)
     figure = blank(down * (len(joints) * row_mm + _ABOVE_AND_BELOW_MM) + _KEY_MM)
-    axes = figure.subplots(down, across, squeeze=False, sharey=True)
-    found = list(axes.ravel())
-    for spare in found[len(tests) :]:
-        spare.set_visible(False)
-    for number, (axis, test) in enumerate(zip(found, tests, strict=False)):
-        axis.set_title(f"{chr(ord('a') + number)}   {test.replace('_', ' ').capitalize()}")
+    found = side_by_side(figure, len(tests), across, sharey=True)
+    for index, (axis, test) in enumerate(zip(found, tests, strict=True)):
+        head(axis, index, case(test))
         axis.set_ylim(-0.7, len(joints) - 0.3)
         axis.set_yticks(range(len(joints)), joints)
         axis.spines["left"].set_visible(False)
-    return found[: len(tests)], figure
-
-
-def key(figure: Figure, handles: Sequence[Line2D], words: str) -> None:
-    """Below the panels: what is what, and a few words more."""
-    legend = figure.legend(
-        handles=list(handles),
-        title=textwrap.fill(words, _LINE_LENGTH),
-        loc="outside lower center",
-        ncols=len(handles),
-        fontsize=6.5,
-        title_fontsize=6.0,
-        columnspacing=2.0,
-        borderaxespad=0.2,
-    )
-    legend.get_title().set_multialignment("center")
+    return found, figure
 
 
 _LEVEL_MM, _ROW_MM_OF_MANY = 7.0, 4.6
@@ -79,7 +54,8 @@ def levels_figure(
     axes, figure = panels(tests, joints, height)
     for axis, test in zip(axes, tests, strict=True):
         _draw_levels(axis, loaded[loaded["test"] == test], joints, several)
-    key(figure, _handles(several), _words_of_levels(summary, several))
+    handles = _handles(several)
+    explain_marks(figure, handles, _words_of_levels(summary, several), len(handles))
     return figure
 
 
@@ -166,7 +142,7 @@ def variance_figure(
         )
         for name in factors
     ]
-    key(figure, handles, _words_of_shares(shown))
+    explain_marks(figure, handles, _words_of_shares(shown), len(handles))
     return figure
 
 

@@ -229,7 +229,7 @@ def written(structure: Any, **flat: np.ndarray) -> bytes:
         "spinepipe.files:appearing",
         "spinepipe.files:os.system",
         "spinepipe.files:Path",
-        "spinepipe.jobs.discrepancy.codec:import_module",
+        "spinepipe.studies.discrepancy.codec:import_module",
     ],
 )
 def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:

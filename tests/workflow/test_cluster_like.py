@@ -5,6 +5,7 @@ The profile for Slurm is used as it is, with an executor that submits to a shell
 
 import importlib.util
 import re
+import shutil
 from pathlib import Path
 
 import grid_cases
@@ -13,10 +14,13 @@ import yaml
 from lever import lever
 from small_project import Project, copy_project
 
+from spinepipe.studies.registry import kind_names
+
 pytestmark = pytest.mark.slow
 
 PLUGIN = "snakemake-executor-plugin-cluster-generic"
-PROFILE = Path(__file__).parents[3] / "profiles/slurm/config.yaml"
+ROOT = Path(__file__).parents[2]
+PROFILE = ROOT / "profiles/slurm/config.yaml"
 MOVES = 16
 STUDY = (
     "poses: 2\nstiffness_sets: 8\n"
@@ -73,7 +77,7 @@ needs_plugin = pytest.mark.skipif(
 def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) -> None:
     study = ("factors", SAMPLES // 6, "")
     local = lever(tmp_path / "local", study)
-    local.run_all()
+    local.run()
     cluster = with_queue(lever(tmp_path / "cluster", study))
     said = run_on_cluster(cluster)
     assert cluster.contents() == local.contents()
@@ -85,7 +89,7 @@ def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) ->
 @needs_plugin
 def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: Path) -> None:
     local, cluster = new_project(tmp_path / "local"), new_project(tmp_path / "cluster")
-    local.run_all()
+    local.run()
     said = run_on_cluster(cluster)
     assert cluster.contents() == local.contents()
 
@@ -97,14 +101,17 @@ def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: P
     assert submitted < MOVES
     assert len(list(cluster.path("queue").glob("*.start"))) == submitted + 1
 
-    assert "Nothing to be done" in cluster.run_all()
+    assert cluster.planned() == set()
 
 
 def test_the_profile_speaks_of_rules_that_exist(tmp_path: Path) -> None:
     settings = yaml.safe_load(PROFILE.read_text())
-    rules = set(new_project(tmp_path / "project").snakemake("--list-rules").stdout.split())
+    project = new_project(tmp_path / "project")
+    shutil.copytree(ROOT / "config/studies", project.path("config/studies"), dirs_exist_ok=True)
+    rules = set(project.snakemake("--list-rules").stdout.split())
     assert {"move", "respond"} <= rules
     assert set(settings["groups"]) | set(settings["set-resources"]) <= rules
     assert set(settings["group-components"]) <= set(settings["groups"].values())
-    pages = {rule for rule in rules if rule.startswith("figure_") or rule.endswith("_report")}
+    pages = {rule for rule in rules if rule.endswith(("_figure", "_report"))}
+    assert len(pages) == 2 * len(kind_names())
     assert {settings["groups"].get(rule) for rule in pages} == {"pages"}

@@ -1,0 +1,65 @@
+"""Which load steps of a test a study computes, and where its motion begins."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from spinepipe.cohort.load_tests import peak_step
+from spinepipe.model import LoadCase, LoadStep
+
+
+@dataclass(frozen=True)
+class AskedTest:
+    """A test of which some steps are computed.
+
+    Attributes
+    ----------
+    case : the steps to compute.
+    from_first : whether motion counts from the first step of the case, which is step 0; otherwise
+        from the neutral pose.
+    largest : number of the step of the largest load.
+    stored : which steps of the case become rows.
+    """
+
+    case: LoadCase
+    from_first: bool
+    largest: int
+    stored: slice
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """Numbers of the steps that become rows."""
+        return tuple(step.step for step in self.case.steps[self.stored])
+
+
+def asked(case: LoadCase, gravity: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
+    """What is computed of a test: all of its load steps, or that of the largest load only.
+
+    Joints have no memory, so the largest load can be computed without the steps before it.
+
+    Parameters
+    ----------
+    gravity : whether weight acts.
+    subtracted : whether motion counts from step 0. Where nothing acts in it, that is the neutral
+        pose, which need not be computed.
+    """
+    from_first = subtracted and (gravity or _loaded(case.steps[0]))
+    largest = case.steps[peak_step(case)]
+    if all_steps:
+        return AskedTest(case, from_first, largest.step, slice(None))
+    if not from_first or largest is case.steps[0]:
+        return AskedTest(replace(case, steps=(largest,)), from_first, largest.step, slice(None))
+    both = replace(case, steps=(case.steps[0], largest))
+    return AskedTest(both, from_first, largest.step, slice(1, None))
+
+
+def first_cycles(cases: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
+    """The first cycle of each test, in the order of the tests."""
+    first: dict[str, LoadCase] = {}
+    for case in cases:
+        first.setdefault(case.test, case)
+    return tuple(first.values())
+
+
+def _loaded(step: LoadStep) -> bool:
+    """Whether anything acts; loads that balance each other still press and bend."""
+    return any(wrench.force.any() or wrench.moment.any() for wrench in step.wrenches)

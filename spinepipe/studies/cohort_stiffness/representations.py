@@ -1,0 +1,119 @@
+"""Representations of stiffness: each way of describing it is one entry of `EVERY`, and only that.
+
+What studies may ask for, how it is fitted, and how tables, figures and findings speak of it and
+order it, all follow from the entries.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One way of describing the stiffness of a spine's joints.
+
+    Attributes
+    ----------
+    name : in study files, tables and folders of results.
+    words : in figures and findings.
+    sentence : in claims about what it predicts.
+    about : in the description of the tables' column.
+    by_level : whether it starts from the published values of each level, else from one for all.
+    grouping : which joints share an unknown, as in `free_parameters`; None where it is published
+        and nothing is fitted.
+    pooled : whether it is fitted to all specimens at once; one representation is.
+    beats : those that it is claimed to be better than on held-out motion.
+    """
+
+    name: str
+    words: str
+    sentence: str
+    about: str
+    by_level: bool = False
+    grouping: Literal["per_specimen", "per_joint"] | None = None
+    pooled: bool = False
+    beats: tuple[str, ...] = ()
+
+
+EVERY = (
+    Representation(
+        "literature",
+        words="published, one value",
+        sentence="published stiffness",
+        about="one published value for all joints",
+    ),
+    Representation(
+        "literature_levels",
+        words="published, level by level",
+        sentence="published stiffness of the levels",
+        about="published values level by level",
+        by_level=True,
+    ),
+    Representation(
+        "per_specimen",
+        words="one value per specimen",
+        sentence="one stiffness for all joints",
+        about="one stiffness for all joints of a specimen",
+        grouping="per_specimen",
+    ),
+    Representation(
+        "level_ratio",
+        words="published ratio of levels",
+        sentence="the published ratio of levels",
+        about="published ratio of levels times one factor",
+        by_level=True,
+        grouping="per_specimen",
+    ),
+    Representation(
+        "per_joint",
+        words="each joint its own",
+        sentence="a stiffness for each joint",
+        about="each joint its own",
+        grouping="per_joint",
+        beats=("per_specimen", "level_ratio"),
+    ),
+    Representation(
+        "partially_pooled",
+        words="partially pooled",
+        sentence="partially pooled stiffness",
+        about="each joint its own, drawn towards its specimen and its cohort as far as the data "
+        "ask for it",
+        grouping="per_joint",
+        pooled=True,
+        beats=("per_specimen", "level_ratio", "per_joint"),
+    ),
+)
+"""All of them, from what is taken as published to what is free in each joint."""
+
+_NAMED = {one.name: one for one in EVERY}
+
+NAMES = tuple(_NAMED)
+"""Their names, in that order."""
+
+IN_WORDS = {one.name: one.words for one in EVERY}
+"""What figures and findings call them."""
+
+PUBLISHED = tuple(one.name for one in EVERY if one.grouping is None)
+"""Those that are not fitted: one value for all joints first."""
+
+FITTED = tuple(one.name for one in EVERY if one.grouping is not None)
+"""Those that are fitted, among which studies choose."""
+
+SHARED = tuple(one.name for one in EVERY if one.grouping == "per_specimen")
+"""Those of which all joints of a specimen share an unknown."""
+
+OF_JOINTS = tuple(one.name for one in EVERY if one.grouping == "per_joint")
+"""Those with an unknown for each joint."""
+
+(POOLED,) = (one.name for one in EVERY if one.pooled)
+"""The one that is fitted to all specimens at once."""
+
+
+def named(name: str) -> Representation:
+    """The representation of that name."""
+    return _NAMED[name]
+
+
+def start_of(name: str) -> str:
+    """The published set that a representation starts from."""
+    return next(one for one in PUBLISHED if named(one).by_level == named(name).by_level)

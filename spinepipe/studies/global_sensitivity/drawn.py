@@ -1,0 +1,41 @@
+"""The design of a study: drawn from its seed, and read again from its file."""
+
+from functools import lru_cache
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from spinepipe.effects.contract import Array
+from spinepipe.files import Stamp, stamp
+from spinepipe.sensitivity.global_indices import Design, draw
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+
+
+def design_of(study: GlobalSensitivity) -> Design:
+    """The design that the study's seed gives."""
+    own = study.design
+    groups = tuple(factor.group for factor in study.factors)
+    return draw(
+        own.method,
+        tuple(factor.label for factor in study.factors),
+        own.samples,
+        study.seed,
+        groups=groups if any(groups) else None,
+        second_order=own.second_order,
+        levels=own.levels,
+        harmonics=own.harmonics,
+        dummy=study.dummy,
+    )
+
+
+def drawn_values(path: str, study: GlobalSensitivity, part: slice) -> Array:
+    """(n, D) values of some samples of ``design.parquet``, m, rad or multipliers."""
+    result: Array = _values(stamp(path), len(study.factor_names))[part] / np.array(study.per_si)
+    return result
+
+
+@lru_cache(maxsize=2)
+def _values(where: Stamp, factors: int) -> Array:
+    column = pq.read_table(where[0], columns=["value"]).column("value")
+    values: Array = column.to_numpy().reshape(-1, factors)
+    return values

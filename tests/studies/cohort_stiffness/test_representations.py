@@ -1,0 +1,67 @@
+"""Representations of stiffness: one registry, of which all else follows."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from spinepipe.studies.cohort_stiffness.claims_of_errors import CONTESTS
+from spinepipe.studies.cohort_stiffness.representations import (
+    EVERY,
+    FITTED,
+    NAMES,
+    POOLED,
+    PUBLISHED,
+    named,
+    start_of,
+)
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.tables import REPRESENTATION
+
+ROOT = Path(__file__).resolve().parents[3]
+KIND = ROOT / "spinepipe" / "studies" / "cohort_stiffness"
+OF_THE_PAPER = ("claims_of_errors.py", "claims_of_stiffness.py", "significance.py")
+"""Files that name the representations of which Gould et al. 2024b claim something."""
+
+
+def test_settings_and_tables_allow_what_is_registered() -> None:
+    (item, _) = get_args(CohortStiffness.model_fields["representations"].annotation)
+    assert get_args(item) == FITTED
+    assert CohortStiffness.model_fields["representations"].default == FITTED
+    assert REPRESENTATION.allowed == NAMES
+    assert {*PUBLISHED, *FITTED} == set(NAMES)
+    assert len(set(NAMES)) == len(EVERY)
+
+
+def test_every_representation_starts_from_a_published_set_of_its_own_kind() -> None:
+    for name in FITTED:
+        start = named(start_of(name))
+        assert start.grouping is None
+        assert start.by_level == named(name).by_level
+    assert [start_of(name) for name in PUBLISHED] == list(PUBLISHED)
+
+
+def test_what_is_claimed_of_one_is_claimed_over_others_that_are_fitted() -> None:
+    assert CONTESTS
+    for better, worse in CONTESTS:
+        assert better != worse
+        assert {better, worse} <= set(FITTED)
+    assert POOLED in {better for better, _ in CONTESTS}
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "literature"])
+def test_no_other_file_of_the_kind_knows_a_representation_by_name(name: str) -> None:
+    """But for what the paper says of its own two; ``literature`` is a stage and a source too."""
+    knowing = {
+        path.name
+        for path in (*KIND.glob("*.py"), *KIND.glob("figures/*.py"))
+        if re.search(rf"[\"']{name}[\"']", path.read_text(encoding="utf-8"))
+    }
+    assert knowing <= {"representations.py", *OF_THE_PAPER}
+
+
+def test_the_documentation_has_a_line_of_each() -> None:
+    told = (ROOT / "docs" / "studies" / "cohort_stiffness.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f"\n| `{name}` |" in told, name
