@@ -32,12 +32,15 @@ class Share:
 
 
 class CarriedShare(ABC):
-    """A joint law that adds ``share * carried`` on the coordinates at ``columns``."""
+    """A joint law that adds ``share * carried`` on one coordinate, or on the three rotations."""
+
+    coordinate: str
+    """Its name, or `ALL_ROTATIONS`."""
 
     @property
-    @abstractmethod
     def columns(self) -> list[int]:
-        """Which of the six coordinates are scaled."""
+        """Places of what is scaled among the six coordinates."""
+        return columns_of(self.coordinate)
 
     @abstractmethod
     def share(self, q: Array, parameters: Array) -> Share:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
+from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import sign
@@ -42,11 +42,6 @@ class FlexionExtensionAsymmetry(CarriedShare):
         """The asymmetry alone."""
         meaning = f"stiffness gained for positive and lost for negative {self.coordinate}"
         return (Parameter("asymmetry", "1", -0.9, 0.9, 0.2, 0.2, False, meaning, off=0.0),)
-
-    @property
-    def columns(self) -> list[int]:
-        """The one coordinate."""
-        return columns_of(self.coordinate)
 
     def share(self, q: Array, parameters: Array) -> Share:
         """``asymmetry * tanh(q / width)``."""

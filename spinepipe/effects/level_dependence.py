@@ -9,7 +9,6 @@ from spinepipe.effects.carried_share import (
     ALL_ROTATIONS,
     CarriedShare,
     Share,
-    columns_of,
     require,
 )
 from spinepipe.effects.contract import Array, Kind, Parameter
@@ -44,11 +43,6 @@ class LevelDependence(CarriedShare):
         """The ratio alone."""
         meaning = f"stiffness of this level in {self.coordinate} over the model's"
         return (Parameter("ratio", "1", 0.01, 100.0, 1.3, 0.5, True, meaning, off=1.0),)
-
-    @property
-    def columns(self) -> list[int]:
-        """The one coordinate, or the three rotations."""
-        return columns_of(self.coordinate)
 
     def share(self, q: Array, parameters: Array) -> Share:
         """``ratio - 1``, wherever the joint is."""

@@ -9,7 +9,6 @@ from spinepipe.effects.carried_share import (
     ALL_ROTATIONS,
     CarriedShare,
     Share,
-    columns_of,
     require,
 )
 from spinepipe.effects.contract import Array, Kind, Parameter
@@ -44,11 +43,6 @@ class LocalLaxity(CarriedShare):
         """The fraction alone."""
         meaning = f"part of the stiffness in {self.coordinate} that is lost"
         return (Parameter("fraction", "1", 0.0, 0.95, 0.3, 0.3, False, meaning, off=0.0),)
-
-    @property
-    def columns(self) -> list[int]:
-        """The one coordinate, or the three rotations."""
-        return columns_of(self.coordinate)
 
     def share(self, q: Array, parameters: Array) -> Share:
         """``-fraction``, wherever the joint is."""

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
+from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import ramp
@@ -64,11 +64,6 @@ class NeutralZone(CarriedShare):
             return ratio, Parameter("width", "m", 1e-6, 0.02, 1e-4, 1.0, True, meaning)
         width = float(np.deg2rad(_HALF_WIDTH_DEG[self.coordinate]))
         return ratio, Parameter("width", "rad", 1e-4, WIDEST * width, width, 0.7, True, meaning)
-
-    @property
-    def columns(self) -> list[int]:
-        """The one coordinate."""
-        return columns_of(self.coordinate)
 
     def share(self, q: Array, parameters: Array) -> Share:
         """``(ratio - 1) g(q / width)``."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from spinepipe.effects.carried_share import CarriedShare, Share, columns_of, require
+from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import magnitude
@@ -85,11 +85,6 @@ class NonlinearStiffening(CarriedShare):
         name = "rate" if self.shape == "exponential" else "growth"
         meaning = f"how fast resistance in {self.coordinate} grows with the motion"
         return (Parameter(name, unit, 0.0, most, size, size, False, meaning, off=0.0),)
-
-    @property
-    def columns(self) -> list[int]:
-        """The one coordinate."""
-        return columns_of(self.coordinate)
 
     def share(self, q: Array, parameters: Array) -> Share:
         """``factor(strength * size(q)) - 1`` with size |q| or q^2."""

@@ -82,7 +82,7 @@ class _InOrder(BaseModel):
     model_config = FORM
 
     def in_order(self) -> tuple[float, ...]:
-        """N/m and N m/rad of what has a field, in the order of the coordinates."""
+        """The values of the fields, in the order of the coordinates."""
         return tuple(dict(self).values())
 
 
@@ -128,10 +128,8 @@ class Damping(BaseModel):
         return (self.translation_n_s_per_m,) * 3 + (self.rotation_nm_s_per_rad,) * 3
 
 
-class Weights(BaseModel):
+class Weights(_InOrder):
     """Weights of the measured coordinates in the least squares, on mm and degrees."""
-
-    model_config = FORM
 
     anterior: _Weight = Field(default=10.0, description="weight of anterior motion, per mm2")
     superior: _Weight = Field(default=100.0, description="weight of superior motion, per mm2")
@@ -140,10 +138,6 @@ class Weights(BaseModel):
     right_bending: _Weight = Field(default=0.0, description="weight of right bending, per deg2")
     left_rotation: _Weight = Field(default=0.0, description="weight of left rotation, per deg2")
 
-    def in_order(self) -> tuple[float, ...]:
-        """(6,) in the order of the coordinates."""
-        return tuple(dict(self).values())
-
     @model_validator(mode="after")
     def _something_counts(self) -> Self:
         if not any(self.in_order()):
@@ -151,18 +145,12 @@ class Weights(BaseModel):
         return self
 
 
-class Shift(BaseModel):
+class Shift(_InOrder):
     """A shift in ground axes."""
-
-    model_config = FORM
 
     anterior: _Millimetres = Field(default=0.0, description="shift anterior, mm")
     superior: _Millimetres = Field(default=0.0, description="shift superior, mm")
     right: _Millimetres = Field(default=0.0, description="shift to the right, mm")
-
-    def in_order(self) -> tuple[float, ...]:
-        """(3,) mm: x anterior, y superior, z right."""
-        return tuple(dict(self).values())
 
 
 def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
