@@ -5,7 +5,7 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,6 @@ from spinepipe.studies.discrepancy.store import Run, Store
 from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
-    UNIT,
     Answer,
     Estimate,
     Gaps,
@@ -211,12 +210,12 @@ def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> 
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
     final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
     screen = found.stages[0].screen
-    gaps = (
-        found.base_gap,
-        found.final_gap,
-        proof.base and proof.base.against(proof.expected),
-        proof.with_effects and proof.with_effects.against(proof.expected),
-    )
+    gaps = {
+        "base": found.base_gap,
+        "with_effects": found.final_gap,
+        "held_out_base": proof.base and proof.base.against(proof.expected),
+        "held_out_with_effects": proof.with_effects and proof.with_effects.against(proof.expected),
+    }
     return Verdict(
         cohort=cohort.name,
         verdict=ended.verdict,
@@ -225,9 +224,9 @@ def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> 
         candidates_in_set=ended.tied,
         not_testable=told.not_testable,
         noise=_noise(found.base.noise),
-        rms_residual=Sizes(UNIT, *(gap.rms if gap else None for gap in gaps)),
+        rms_residual=Sizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
         gap=Gaps(
-            **asdict(Sizes(UNIT, *(gap.gap if gap else None for gap in gaps))),
+            **{name: gap.gap if gap else None for name, gap in gaps.items()},
             held_out_closed=proof.closed,
         ),
         smallest_detectable=told.smallest_detectable,
