@@ -11,7 +11,8 @@ from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
 from spinepipe.sensitivity.global_indices import values_of
 from spinepipe.statics.many import solve_many
-from spinepipe.studies.global_sensitivity.drawn import design_of, start_of_specimen
+from spinepipe.studies.global_sensitivity.batch import start_of_specimen
+from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
 from spinepipe.studies.global_sensitivity.vary import vary
 from spinepipe.studies.read import check
