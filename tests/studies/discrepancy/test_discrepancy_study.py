@@ -10,6 +10,7 @@ from chain_cases import DEGREES, STUDY, Chains
 
 from spinepipe.effects import Spread, Trial, registry
 from spinepipe.jobs.digest import settings_of
+from spinepipe.jobs.expected import Expected
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
@@ -191,6 +192,11 @@ def test_cycles_of_other_tests_are_no_repeats(tmp_path: Path) -> None:
     assert [problem.column for problem in complaints(tmp_path)] == ["measurement_sd"]
 
 
+def mark_of_search(root: Path) -> str:
+    """What all results of the search must carry."""
+    return Expected(str(root), *studies.check(root, STUDY)).of_job("search", {})
+
+
 def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
     study = model(tmp_path, name="results/other/model_with_effects.yaml")
     written(tmp_path, study)
@@ -198,6 +204,10 @@ def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
     assert isinstance(found, Discrepancy)
     assert found.base.model == "results/other/model_with_effects.yaml"
     assert KIND.job("search").reads_base
+    before = mark_of_search(tmp_path)
+    base = tmp_path / "results/other/model_with_effects.yaml"
+    base.write_text(base.read_text("utf-8") + "# another\n", "utf-8")
+    assert mark_of_search(tmp_path) != before, "the search hangs on this very file"
 
 
 @pytest.mark.parametrize(
