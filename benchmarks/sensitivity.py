@@ -9,7 +9,7 @@ from pyarrow import parquet
 
 from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
-from spinepipe.sensitivity.global_indices import values_of
+from spinepipe.sensitivity.global_indices.spread import values_of
 from spinepipe.statics.many import solve_many
 from spinepipe.studies.global_sensitivity.batch import start_of_specimen
 from spinepipe.studies.global_sensitivity.drawn import design_of

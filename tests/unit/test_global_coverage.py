@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from known_indices import FUNCTIONS, KnownFunction, morris_truth
 
-from spinepipe.sensitivity.global_indices import Settings, convergence, draw, indices
+from spinepipe.sensitivity.global_indices.convergence import convergence
+from spinepipe.sensitivity.global_indices.design import draw
+from spinepipe.sensitivity.global_indices.estimates import Settings
+from spinepipe.sensitivity.global_indices.indices import indices
 
 SEEDS = range(40)
 

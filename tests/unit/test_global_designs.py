@@ -5,15 +5,12 @@ import pytest
 from scipy.special import erf, erfinv
 from scipy.stats import spearmanr
 
-from spinepipe.sensitivity.global_indices import (
-    DUMMY,
+from spinepipe.sensitivity.global_indices.design import DUMMY, design_problems, draw, run_count
+from spinepipe.sensitivity.global_indices.spread import (
     LogNormal,
     LogUniform,
     Normal,
     Uniform,
-    design_problems,
-    draw,
-    run_count,
     values_of,
 )
 

@@ -7,17 +7,9 @@ from SALib.analyze import delta, fast, morris, pawn, rbd_fast, sobol
 from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
 
-from spinepipe.sensitivity.global_indices import (
-    DUMMY,
-    Design,
-    Index,
-    Known,
-    Settings,
-    above_floor,
-    draw,
-    indices,
-    noise_floor,
-)
+from spinepipe.sensitivity.global_indices.design import DUMMY, Design, draw
+from spinepipe.sensitivity.global_indices.estimates import Index, Known, Settings
+from spinepipe.sensitivity.global_indices.indices import above_floor, indices, noise_floor
 
 G = FUNCTIONS["g"]
 QUICK = Settings(bootstraps=20, delta_bootstraps=5)

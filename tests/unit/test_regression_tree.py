@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from sklearn.model_selection import GroupKFold
 
-from spinepipe.sensitivity import regression_tree
-from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _growth
+from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _growth, regression_tree
 from spinepipe.statistics import Ended
 
 MILEAGE = np.array(

@@ -8,7 +8,7 @@ from scipy.stats import t
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
-from spinepipe.sensitivity import mean_squares, variance_shares
+from spinepipe.sensitivity.shares import mean_squares, variance_shares
 from spinepipe.statistics import Ended
 
 PARTS = ("row", "column", "interaction", "total_row", "total_column")

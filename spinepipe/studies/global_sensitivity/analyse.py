@@ -13,14 +13,9 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices import (
-    Index,
-    Settings,
-    above_floor,
-    convergence,
-    indices,
-    noise_floor,
-)
+from spinepipe.sensitivity.global_indices.convergence import convergence
+from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.indices import above_floor, indices, noise_floor
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity

@@ -5,7 +5,7 @@ import pyarrow as pa
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices import values_of
+from spinepipe.sensitivity.global_indices.spread import values_of
 from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
 from spinepipe.studies.global_sensitivity.tables import DESIGN

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
-from spinepipe.sensitivity.global_indices import Design, draw
+from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
 

@@ -10,7 +10,8 @@ import pandas as pd
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.sensitivity import Share, Shares, Tree, regression_tree, variance_shares
+from spinepipe.sensitivity.shares import Share, Shares, variance_shares
+from spinepipe.sensitivity.tree import Tree, regression_tree
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity

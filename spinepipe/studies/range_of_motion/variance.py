@@ -10,8 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.words import count
-from spinepipe.sensitivity import Share, variance_shares
-from spinepipe.sensitivity.shares import nested_shares
+from spinepipe.sensitivity.shares import Share, nested_shares, variance_shares
 from spinepipe.statistics import Ended
 from spinepipe.studies.range_of_motion.grid import Grid, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion

@@ -12,8 +12,8 @@ from cohort_cases import Change, add, both, cell, joints, line, swap, text, with
 from scipy import stats
 
 from spinepipe.problems import InputError, Problem
-from spinepipe.sensitivity.global_indices import INDICES, Known
 from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.sensitivity.global_indices.estimates import INDICES, Known
 from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import change as varied
 from spinepipe.studies.global_sensitivity import settings as study_file
