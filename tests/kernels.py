@@ -82,7 +82,16 @@ def main(options: list[str]) -> int:
             failed.append(kernel)
             continue
         print(f"{kernel}: tests marked numeric", flush=True)
-        tests = [sys.executable, "-m", "pytest", "-m", "numeric", "tests/unit", *options]
+        tests = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-m",
+            "numeric",
+            "tests/unit",
+            "tests/studies",
+            *options,
+        ]
         if subprocess.run(tests, env=environment(kernel), check=False).returncode != 0:
             failed.append(kernel)
     print("failed: " + ", ".join(failed) if failed else "no kernel failed")
