@@ -92,7 +92,7 @@ def tables(*names):
     return lambda wildcards: layout(wildcards.study).table_files(names)
 
 
-def inputs_of(place, kind, names):
+def inputs_of(kind, names):
     """Input of a job that reads tables; a name with a dot is a file with a name of its own."""
     folder = f"{RESULTS}/{kind.files.subfolder}"
     return {

@@ -47,7 +47,7 @@ for kind in KINDS_IN_USE:
             name:
                 f"{kind}_{job.name}"
             input:
-                **inputs_of(place, made, job.reads),
+                **inputs_of(made, job.reads),
             output:
                 **outputs_of(place, made, job),
             log:
