@@ -3,8 +3,13 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
-PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) \
+# A test of a whole run waits now and then: one worker more than cores fills the gaps.
+TESTERS = $(shell expr $(CORES) + 1)
+PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(TESTERS) \
 	--dist loadgroup --no-loadscope-reorder
+
+# Each job is a process: modules are to be compiled once, not at every start.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: all full test test-fast test-kernels lint bench validate report env dev-env lock clean
 

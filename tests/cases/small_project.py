@@ -20,7 +20,6 @@ from spinepipe.studies.registry import place_of
 
 _ROOT = Path(__file__).parents[2]
 _PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
-_SKIPPED = shutil.ignore_patterns("__pycache__")
 _STUDY = """\
 study: {name}
 kind: joint_pose_sensitivity
@@ -38,6 +37,7 @@ settle_time_s: 0.05
 methods: {{poses: 1, sane_step: 0.01, accuracy: 0.1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 """
+_NOT_PASSED_ON = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
 _HANGS_S = 3600
 """A run that takes longer hangs: it does on no machine, however busy."""
 
@@ -92,7 +92,7 @@ class Project:
 
     def environment(self) -> dict[str, str]:
         """Without the path of the original package: the copy must find itself."""
-        return {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        return {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; `stdout` holds both streams."""
@@ -158,7 +158,7 @@ class Project:
 
     def copy(self, folder: Path) -> "Project":
         """The same with its results, to be changed."""
-        shutil.copytree(self.folder, folder, ignore=_SKIPPED)
+        shutil.copytree(self.folder, folder)
         return Project(folder)
 
 
@@ -173,7 +173,7 @@ def copy_project(folder: Path) -> Project:
     for part in _PARTS:
         source = _ROOT / part
         if source.is_dir():
-            shutil.copytree(source, folder / part, ignore=_SKIPPED)
+            shutil.copytree(source, folder / part)
         else:
             shutil.copy2(source, folder / part)
     cohort = Path("config/cohorts/palanca_l1l4")

@@ -123,11 +123,15 @@ def _pairs(indices: pd.DataFrame) -> Iterator[Sortable]:
         yield sortable("indices", "Interactions of two factors", about, clear, columns)
 
 
+_DRAWN = "Indices of the outputs in the figures"
+
+
 def _drawn(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> Sortable:
     """Indices of the outputs that the figures are about, factors in their order."""
     found = outputs(cohort, indices, measures)
+    if not found:  # too few samples: no index of any output
+        return sortable("indices", _DRAWN, INDICES.about, indices[:0], INDICES.columns)
     rows = pd.concat([panel.rows for panel in found])
     order = {name: place for place, name in enumerate(leading(found, measures))}
     ranked = rows.assign(rank=rows["factor"].map(order)).sort_values("rank", kind="stable")
-    title = "Indices of the outputs in the figures"
-    return sortable("indices", title, INDICES.about, ranked, INDICES.columns)
+    return sortable("indices", _DRAWN, INDICES.about, ranked, INDICES.columns)

@@ -546,6 +546,16 @@ def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
     assert "Interactions of two factors" in names
 
 
+def test_a_design_too_small_for_any_index_still_has_a_page(cohort: Cohort) -> None:
+    none = indices().assign(
+        status="too_few", message="2 base samples", estimate=np.nan, ci_low=np.nan, ci_high=np.nan
+    )
+    tables = Tables({"indices": none, "convergence": convergence(none)})
+    assert shown_tables(cohort, Results(tables, {}, {})) == []
+    page = document(study(), cohort, Results(tables, {}, {})).html(study(), cohort)
+    assert "2 base samples" in page
+
+
 def test_the_page_opens_with_the_answer_and_fetches_nothing(cohort: Cohort) -> None:
     found = indices()
     svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
