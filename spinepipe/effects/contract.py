@@ -137,6 +137,25 @@ class Observation:
     by_coordinate: Array
 
 
+@dataclass(frozen=True)
+class Neutral:
+    """Where a chain is in its neutral pose, m, ground; of many chains with axes (...) in front.
+
+    Attributes
+    ----------
+    rotations, origins : (..., J, 3, 3) and (..., J, 3) of the joint frames.
+    centres_of_mass : (..., J, 3) of the vertebrae.
+    """
+
+    rotations: Array
+    origins: Array
+    centres_of_mass: Array
+
+    def part(self, chosen: Indices) -> "Neutral":
+        """Some of many chains."""
+        return Neutral(self.rotations[chosen], self.origins[chosen], self.centres_of_mass[chosen])
+
+
 class Motion(Protocol):
     """The pose of the whole chain, as load effects may ask about it; n = 6 x joints."""
 
@@ -145,12 +164,8 @@ class Motion(Protocol):
         """(n, 3) axis of each rotational coordinate in ground, zero for translations."""
 
     @property
-    def joint_origins(self) -> Array:
-        """(J, 3) origins of the joint frames in ground, neutral pose, m."""
-
-    @property
-    def centres_of_mass(self) -> Array:
-        """(J, 3) centres of mass of the vertebrae in ground, neutral pose, m."""
+    def neutral(self) -> Neutral:
+        """Where the chain is in its neutral pose."""
 
     def displacement(self, body: int) -> Pose:
         """Displacement of a body from the neutral pose, in ground; body -1 is ground itself."""
@@ -218,6 +233,20 @@ class LoadEffect(Effect, Protocol):
 
 
 @runtime_checkable
+class AcrossJoints(LoadEffect, Protocol):
+    """A load effect between the two vertebrae of each joint, which no other joint changes.
+
+    Arrays have any axes (...) in front; parameters (..., P).
+    """
+
+    def across(self, q: Array, neutral: Neutral, parameters: Array) -> JointResponse:
+        """What holds each joint at q (..., J, 6) against it, and the tangents (..., J, 6, 6)."""
+
+    def across_by_parameter(self, q: Array, neutral: Neutral, parameters: Array) -> Array:
+        """(..., J, 6, P) derivative of what holds each joint."""
+
+
+@runtime_checkable
 class GeometryEffect(Effect, Protocol):
     """Where in a joint its laws act."""
 
@@ -230,28 +259,32 @@ class GeometryEffect(Effect, Protocol):
 
 @runtime_checkable
 class PathLaw(Effect, Protocol):
-    """A joint law with an internal state that advances once per load step."""
+    """A joint law with an internal state that advances once per load step.
+
+    ``seconds`` is the duration of the step; of each joint, (J,), where joints of several tests are
+    handed over at once.
+    """
 
     @property
     def n_states(self) -> int: ...
 
     def respond_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> JointResponse:
         """Response in a step of that duration with the state (J, S) as the last step left it."""
 
     def by_parameter_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, P) derivative of the load by the parameters at fixed q and state."""
 
     def by_state(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, S) derivative of the load by the state."""
 
     def advance(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Advance:
         """State after a step of ``seconds`` that ended at q with the laws before it at carried."""
 

@@ -76,7 +76,9 @@ class Creep:
     def _at(self) -> int:
         return COORDINATES.index(self.coordinate)
 
-    def _lag(self, parameters: Array, state: Array, seconds: float, carried: Array) -> "_Lag":
+    def _lag(
+        self, parameters: Array, state: Array, seconds: float | Array, carried: Array
+    ) -> "_Lag":
         fraction, time = parameters.T
         here = carried[:, self._at]
         if self.load == "ramped":
@@ -84,7 +86,7 @@ class Creep:
         return _held(fraction, time, state, seconds, here)
 
     def respond_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> JointResponse:
         """Load (J, 6); state is (z, carried) of each joint at the end of the last step."""
         at, lag = self._at, self._lag(parameters, state, seconds, carried)
@@ -94,7 +96,7 @@ class Creep:
         return JointResponse(load, np.zeros_like(by_carried), by_carried)
 
     def by_parameter_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, 2): what lags, and its slope by the time."""
         lag = self._lag(parameters, state, seconds, carried)
@@ -104,7 +106,7 @@ class Creep:
         return derivative
 
     def by_state(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, 2): by z and carried at the step's start."""
         lag = self._lag(parameters, state, seconds, carried)
@@ -113,7 +115,7 @@ class Creep:
         return derivative
 
     def advance(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Advance:
         """z and carried at the end of the step."""
         here = carried[:, self._at]
@@ -139,7 +141,9 @@ class _Lag:
     by_time: Array
 
 
-def _held(fraction: Array, time: Array, state: Array, seconds: float, carried: Array) -> _Lag:
+def _held(
+    fraction: Array, time: Array, state: Array, seconds: float | Array, carried: Array
+) -> _Lag:
     """What follows carried (J,) while the load is constant."""
     x, z0 = seconds / time, state[:, 0]
     kept = np.exp(-(1.0 - fraction) * x)
@@ -152,7 +156,7 @@ def _held(fraction: Array, time: Array, state: Array, seconds: float, carried: A
     return _Lag(z, (1.0 - kept) / whole, by_state, by_fraction, by_time)
 
 
-def _ramped(time: Array, state: Array, seconds: float, carried: Array) -> _Lag:
+def _ramped(time: Array, state: Array, seconds: float | Array, carried: Array) -> _Lag:
     """What follows a straight line to carried (J,) with a time constant."""
     x = seconds / time
     kept, mean, mean_slope = np.exp(-x), _mean(x), _mean_slope(x)

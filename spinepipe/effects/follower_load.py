@@ -10,27 +10,31 @@ from spinepipe.effects.contract import (
     AppliedLoad,
     Array,
     Indices,
+    JointResponse,
     Kind,
     Motion,
+    Neutral,
     Parameter,
     Wrench,
 )
 from spinepipe.effects.registry import Spread, Trial, register
-from spinepipe.effects.vertebra_points import centres, nothing_applied, upper_ends
+from spinepipe.effects.turning import turning
+from spinepipe.effects.vertebra_points import centres, upper_ends
 
 
-def _at_joints(motion: Motion) -> Array:
-    """(1 + J, 3) guides of ground and of each vertebra, m."""
-    return np.vstack([motion.joint_origins[0], upper_ends(motion)])
+def _at_joints(neutral: Neutral) -> Array:
+    """(..., 1 + J, 3) guides of ground and of each vertebra, m."""
+    return np.concatenate([neutral.origins[..., :1, :], upper_ends(neutral)], axis=-2)
 
 
-def _at_centres(motion: Motion) -> Array:
-    """(1 + J, 3) guides of ground and of each vertebra, m."""
-    points = centres(motion)
-    return np.vstack([2.0 * motion.joint_origins[0] - points[0], points])
+def _at_centres(neutral: Neutral) -> Array:
+    """(..., 1 + J, 3) guides of ground and of each vertebra, m."""
+    points = centres(neutral)
+    ground = 2.0 * neutral.origins[..., :1, :] - points[..., :1, :]
+    return np.concatenate([ground, points], axis=-2)
 
 
-GUIDES: dict[str, Callable[[Motion], Array]] = {"joints": _at_joints, "centres": _at_centres}
+GUIDES: dict[str, Callable[[Neutral], Array]] = {"joints": _at_joints, "centres": _at_centres}
 
 
 @register("follower_load")
@@ -89,9 +93,47 @@ class FollowerLoad:
         """(n, 1, 1): the load is linear in the tension."""
         return self._of_1_n(motion, joints).load[:, None, None]
 
+    def across(self, q: Array, neutral: Neutral, parameters: Array) -> JointResponse:
+        """What holds each joint at q (..., J, 6) against the cable, and its tangent.
+
+        The cable's load on a joint hangs on the joint's own coordinates alone: it is the tension
+        times the slope of the length between the guides of the two vertebrae.
+        """
+        slope, bend = self._length(q, neutral)
+        tension = parameters[..., :1]
+        return JointResponse(tension[..., None] * slope, tension[..., None, None] * bend)
+
+    def across_by_parameter(self, q: Array, neutral: Neutral, parameters: Array) -> Array:
+        """(..., J, 6, 1) derivative of what holds each joint: linear in the tension."""
+        return self._length(q, neutral)[0][..., None]
+
+    def _length(self, q: Array, neutral: Neutral) -> tuple[Array, Array]:
+        """Slope (..., J, 6) and bend (..., J, 6, 6) of the length between guides."""
+        guides = GUIDES[self.guides](neutral)
+        local = neutral.rotations.swapaxes(-1, -2)
+        lower, upper = (
+            (local @ (points - neutral.origins)[..., None])[..., 0]
+            for points in (guides[..., :-1, :], guides[..., 1:, :])
+        )
+        turned = turning(q[..., 3:].reshape(-1, 3))
+        shape, arm = q.shape[:-1], upper.reshape(-1, 3)
+        reach = np.einsum("jxy,jy->jx", turned.rotation, arm).reshape(*shape, 3)
+        line = q[..., :3] + reach - lower
+        length = np.linalg.norm(line, axis=-1)[..., None]
+        moved, bent = np.zeros((*shape, 6, 3)), np.zeros((*shape, 6, 6, 3))
+        moved[..., :3, :] = np.eye(3)
+        moved[..., 3:, :] = np.einsum("jaxy,jy->jax", turned.first, arm).reshape(*shape, 3, 3)
+        twice = np.einsum("jabxy,jy->jabx", turned.second, arm)
+        bent[..., 3:, 3:, :] = twice.reshape(*shape, 3, 3, 3)
+        along = line / length
+        slope = (moved @ along[..., None])[..., 0]
+        across = moved @ moved.swapaxes(-1, -2) - slope[..., None] * slope[..., None, :]
+        return slope, across / length[..., None] + (bent @ along[..., None, :, None])[..., 0]
+
     def _of_1_n(self, motion: Motion, joints: Indices) -> AppliedLoad:
-        load, tangent = nothing_applied(motion)
-        guides = GUIDES[self.guides](motion)
+        n = len(motion.axes)
+        load, tangent = np.zeros(n), np.zeros((n, n))
+        guides = GUIDES[self.guides](motion.neutral)
         for joint in joints.tolist():
             pull = _segment(motion, joint, guides[joint + 1], guides[joint])
             load, tangent = load + pull.load, tangent + pull.tangent

@@ -75,7 +75,7 @@ class Hysteresis:
         return COORDINATES.index(self.coordinate)
 
     def respond_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> JointResponse:
         """Load (J, 6) and tangent (J, 6, 6); state is (q0, h0) of each joint."""
         at, friction = self._at, _friction(q[:, self._at], parameters, state)
@@ -85,7 +85,7 @@ class Hysteresis:
         return JointResponse(load, tangent)
 
     def by_parameter_on_path(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, 2): the friction itself, and its slope by the yield angle."""
         friction = _friction(q[:, self._at], parameters, state)
@@ -95,7 +95,7 @@ class Hysteresis:
         return derivative
 
     def by_state(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
         """(J, 6, 2): by where the step started and by the friction there."""
         friction = _friction(q[:, self._at], parameters, state)
@@ -105,7 +105,7 @@ class Hysteresis:
         return derivative
 
     def advance(
-        self, q: Array, parameters: Array, state: Array, seconds: float, carried: Array
+        self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Advance:
         """Where the step ended and the friction there."""
         friction = _friction(q[:, self._at], parameters, state)

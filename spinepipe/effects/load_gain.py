@@ -3,22 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from spinepipe.effects.contract import (
-    AppliedLoad,
-    Array,
-    Indices,
-    Kind,
-    Motion,
-    Parameter,
-    Wrench,
-)
+from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import register
-from spinepipe.effects.vertebra_points import nothing_applied
 
 
 @register("load_gain")
 @dataclass(frozen=True)
-class LoadGain:
+class LoadGain(DeadLoad):
     """Listed forces and moments act ``1 + gain`` times; weight and other load effects as they are.
 
     Off at 0. A small imperfection that real cohorts have, not itself looked for.
@@ -41,23 +33,15 @@ class LoadGain:
         ),
     )
 
-    def apply(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> AppliedLoad:
-        """The gained share of the listed wrenches, and its tangent."""
-        listed = _listed(motion, wrenches)
-        return AppliedLoad(parameters[0, 0] * listed.load, parameters[0, 0] * listed.tangent)
+    def wrenches(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> Wrenches:
+        """The gained share of the listed wrenches."""
+        gain = parameters[..., None]
+        return Wrenches(listed.bodies, listed.points, gain * listed.forces, gain * listed.moments)
 
-    def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> Array:
-        """(n, 1, 1): linear in the gain."""
-        return _listed(motion, wrenches).load[:, None, None]
-
-
-def _listed(motion: Motion, wrenches: tuple[Wrench, ...]) -> AppliedLoad:
-    load, tangent = nothing_applied(motion)
-    for listed in wrenches:
-        one = motion.wrench(listed.body, listed.point, listed.force, listed.moment)
-        load, tangent = load + one.load, tangent + one.tangent
-    return AppliedLoad(load, tangent)
+    def slopes(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> WrenchSlopes:
+        """Linear in the gain."""
+        return WrenchSlopes(listed.forces[..., None], listed.moments[..., None])

@@ -4,19 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from spinepipe.effects.contract import (
-    AppliedLoad,
-    Array,
-    Indices,
-    Kind,
-    Motion,
-    Parameter,
-    Wrench,
-)
+from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import Spread, Trial, register
-from spinepipe.effects.vertebra_points import nothing_applied
 
 TYPICAL_RAD = float(np.deg2rad(3.0))
 LARGEST_RAD = 0.5
@@ -38,7 +29,7 @@ def _tilt(name: str, which: str) -> Parameter:
 
 @register("load_misalignment")
 @dataclass(frozen=True)
-class LoadMisalignment:
+class LoadMisalignment(DeadLoad):
     """Listed moments act turned: ``R1(tilt_1) R2(tilt_2) moment``; forces as listed. Off at 0.
 
     The main axis is the ground axis with the largest share of a step's moments (sizes summed over
@@ -60,42 +51,37 @@ class LoadMisalignment:
         "so that tilted joint frames do not explain it",
     )
 
-    def apply(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> AppliedLoad:
-        """Turned less listed moments, and their tangent."""
-        load, tangent = nothing_applied(motion)
-        axes = _tilt_axes(wrenches)
-        for listed in wrenches:
-            first, second = _turns(axes, parameters[0])
-            change = first.apply(second.apply(listed.moment)) - listed.moment
-            extra = motion.wrench(listed.body, listed.point, np.zeros(3), change)
-            load, tangent = load + extra.load, tangent + extra.tangent
-        return AppliedLoad(load, tangent)
+    def wrenches(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> Wrenches:
+        """Turned less listed moments."""
+        moments = _tilts(listed, parameters)[1] - listed.moments
+        return Wrenches(listed.bodies, listed.points, np.zeros(moments.shape), moments)
 
-    def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> Array:
-        """(n, 1, 2) by the two tilts."""
-        derivative = np.zeros((len(motion.axes), 1, 2))
-        axes = _tilt_axes(wrenches)
-        first, second = _turns(axes, parameters[0])
-        for listed in wrenches:
-            half = second.apply(listed.moment)
-            by_first = np.cross(axes[0], first.apply(half))
-            by_second = first.apply(np.cross(axes[1], half))
-            angular = motion.angular(listed.body)
-            derivative[:, 0] += angular @ np.column_stack([by_first, by_second])
-        return derivative
+    def slopes(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> WrenchSlopes:
+        """By the two tilts."""
+        axes, turned = _tilts(listed, parameters)
+        first, second = axes[..., :1, :], axes[..., 1:, :]
+        by_first = np.cross(first, turned)
+        by_second = np.cross(_turned(second, first, parameters[..., 0]), turned)
+        moments = np.stack([by_first, by_second], axis=-1)
+        return WrenchSlopes(np.zeros(moments.shape), moments)
 
 
-def _tilt_axes(wrenches: tuple[Wrench, ...]) -> Array:
-    """(2, 3) ground axes of the two tilts; without moments any will do."""
-    sizes = sum((np.abs(wrench.moment) for wrench in wrenches), np.zeros(3))
-    main = int(np.argmax(sizes))
-    return np.eye(3)[[(main + 1) % 3, (main + 2) % 3]]
+def _tilts(listed: Wrenches, tilts: Array) -> tuple[Array, Array]:
+    """(..., 2, 3) ground axes of the two tilts, and the listed moments turned, (..., W, 3)."""
+    sizes = np.abs(listed.moments).sum(axis=-2)
+    main = np.argmax(sizes, axis=-1)  # without moments any will do
+    axes = np.eye(3)[np.stack([(main + 1) % 3, (main + 2) % 3], axis=-1)]
+    half = _turned(listed.moments, axes[..., 1:, :], tilts[..., 1])
+    return axes, _turned(half, axes[..., :1, :], tilts[..., 0])
 
 
-def _turns(axes: Array, tilts: Array) -> tuple[Rotation, Rotation]:
-    first, second = (Rotation.from_rotvec(t * axis) for t, axis in zip(tilts, axes, strict=True))
-    return first, second
+def _turned(vectors: Array, axis: Array, angle: Array) -> Array:
+    """Vectors (..., W, 3) turned about axes (..., 1, 3) by angles (...), by Rodrigues."""
+    cosine, sine = np.cos(angle)[..., None, None], np.sin(angle)[..., None, None]
+    along = np.sum(axis * vectors, axis=-1, keepdims=True) * axis
+    result: Array = along + cosine * (vectors - along) + sine * np.cross(axis, vectors)
+    return result

@@ -5,15 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import (
-    AppliedLoad,
-    Array,
-    Indices,
-    Kind,
-    Motion,
-    Parameter,
-    Wrench,
-)
+from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import Spread, Trial, register
 
 TYPICAL_NM = 0.3
@@ -35,7 +28,7 @@ def _moment(axis: str) -> Parameter:
 
 @register("load_offset")
 @dataclass(frozen=True)
-class LoadOffset:
+class LoadOffset(DeadLoad):
     """A moment fixed in ground on the most cranial vertebra in scope, in every step; off at 0.
 
     It acts in unloaded steps too: all motion is from the pose without it.
@@ -52,14 +45,17 @@ class LoadOffset:
         "or loads large enough to turn the vertebrae in the moment",
     )
 
-    def apply(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> AppliedLoad:
-        """Load of the moment and its tangent."""
-        return motion.wrench(int(joints.max()), np.zeros(3), np.zeros(3), parameters[0])
+    def wrenches(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> Wrenches:
+        """The moment on the most cranial vertebra."""
+        moments = parameters[..., None, :]
+        bodies = np.full(moments.shape[:-1], int(joints.max()))
+        return Wrenches(bodies, np.zeros(moments.shape), np.zeros(moments.shape), moments)
 
-    def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> Array:
-        """(n, 1, 3): angular velocity of the vertebra about each ground axis."""
-        return motion.angular(int(joints.max()))[:, None, :]
+    def slopes(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> WrenchSlopes:
+        """The moment itself is what the parameters are."""
+        shape = (*parameters.shape[:-1], 1, 3, 3)
+        return WrenchSlopes(np.zeros(shape), np.broadcast_to(np.eye(3), shape))

@@ -5,17 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import (
-    AppliedLoad,
-    Array,
-    Indices,
-    Kind,
-    Motion,
-    Parameter,
-    Wrench,
-)
+from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import Spread, Trial, register
-from spinepipe.effects.vertebra_points import centres, nothing_applied
+from spinepipe.effects.vertebra_points import centres
 
 WHERE = ("each", "top")
 
@@ -25,7 +18,7 @@ WEIGHT_OF_1_KG = np.array([0.0, -9.81, 0.0])
 
 @register("segment_weight")
 @dataclass(frozen=True)
-class SegmentWeight:
+class SegmentWeight(DeadLoad):
     """A weight of ``9.81 mass`` N along -y of ground on each vertebra in scope, or the top one.
 
     It acts at the centre of mass, or midway between its joints on a vertebra without a stated mass.
@@ -61,23 +54,23 @@ class SegmentWeight:
         if self.where not in WHERE:
             raise ValueError(f"segment_weight: where {self.where!r}; allowed: {', '.join(WHERE)}")
 
-    def apply(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> AppliedLoad:
-        """Weights of the mass and their tangent."""
-        one = self._of_1_kg(motion, joints)
-        return AppliedLoad(parameters[0, 0] * one.load, parameters[0, 0] * one.tangent)
+    def wrenches(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> Wrenches:
+        """Weights of the mass."""
+        bodies = self._bodies(joints)
+        points = centres(neutral)[..., bodies, :]
+        forces = np.broadcast_to(parameters[..., None] * WEIGHT_OF_1_KG, points.shape)
+        every = np.broadcast_to(bodies, points.shape[:-1])
+        return Wrenches(every, points, forces, np.zeros(points.shape))
 
-    def by_parameter(
-        self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
-    ) -> Array:
-        """(n, 1, 1): the weights are linear in the mass."""
-        return self._of_1_kg(motion, joints).load[:, None, None]
+    def slopes(
+        self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
+    ) -> WrenchSlopes:
+        """Linear in the mass."""
+        shape = (*parameters.shape[:-1], len(self._bodies(joints)), 3, 1)
+        return WrenchSlopes(np.broadcast_to(WEIGHT_OF_1_KG[:, None], shape), np.zeros(shape))
 
-    def _of_1_kg(self, motion: Motion, joints: Indices) -> AppliedLoad:
-        load, tangent = nothing_applied(motion)
-        points = centres(motion)
-        for body in joints if self.where == "each" else [joints.max()]:
-            one = motion.wrench(int(body), points[body], WEIGHT_OF_1_KG, np.zeros(3))
-            load, tangent = load + one.load, tangent + one.tangent
-        return AppliedLoad(load, tangent)
+    def _bodies(self, joints: Indices) -> Indices:
+        """The vertebrae that it acts on."""
+        return joints if self.where == "each" else joints.max(keepdims=True)

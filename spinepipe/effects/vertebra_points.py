@@ -2,34 +2,26 @@
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, Motion
+from spinepipe.effects.contract import Array, Neutral
 
 TOP_HEIGHT_M = 0.03
 """Height of the most cranial vertebra above its joint, as nothing above says where it ends."""
 
 
-def upper_ends(motion: Motion) -> Array:
-    """(J, 3) origin of the joint above each vertebra; of the top one, 30 mm above its own joint.
+def upper_ends(neutral: Neutral) -> Array:
+    """(..., J, 3) origin of the joint above each vertebra; of the top one, 30 mm above its own.
 
-    Above means along the joint's superior axis, which the last rotation leaves as it is.
+    Above means along the joint's superior axis.
     """
-    top = motion.displacement(len(motion.joint_origins) - 1)
-    superior = top.rotation.T @ motion.axes[-1]
-    origins = motion.joint_origins
-    return np.vstack([origins[1:], origins[-1] + TOP_HEIGHT_M * superior])
+    top = neutral.origins[..., -1:, :] + TOP_HEIGHT_M * neutral.rotations[..., -1:, :, 1]
+    return np.concatenate([neutral.origins[..., 1:, :], top], axis=-2)
 
 
-def centres(motion: Motion) -> Array:
-    """(J, 3) centres of mass, or midway between its joints for a vertebra whose mass is unstated.
+def centres(neutral: Neutral) -> Array:
+    """(..., J, 3) centres of mass, or midway between its joints for a vertebra of unstated mass.
 
     A vertebra without a mass has its centre of mass at the origin of ground in the model.
     """
-    stated = motion.centres_of_mass
-    midway = (motion.joint_origins + upper_ends(motion)) / 2.0
-    return np.where(stated.any(axis=1, keepdims=True), stated, midway)
-
-
-def nothing_applied(motion: Motion) -> tuple[Array, Array]:
-    """Load (n,) and tangent (n, n) of no load, to add to."""
-    n = len(motion.axes)
-    return np.zeros(n), np.zeros((n, n))
+    stated = neutral.centres_of_mass
+    midway = (neutral.origins + upper_ends(neutral)) / 2.0
+    return np.where(stated.any(axis=-1, keepdims=True), stated, midway)

@@ -22,7 +22,17 @@ def value_digest(*values: Any) -> str:
 
 
 _LIBRARIES = (
-    *("numpy", "scipy", "pandas", "pyarrow", "pybullet", "SALib", "scikit-learn", "statsmodels"),
+    *(
+        "numpy",
+        "scipy",
+        "numba",
+        "pandas",
+        "pyarrow",
+        "pybullet",
+        "SALib",
+        "scikit-learn",
+        "statsmodels",
+    ),
     *("matplotlib", "plotly", "Jinja2", "spinepipe"),
 )
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from spinepipe.effects import Effect, Wrench
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Neutral
 from spinepipe.frames import Pose
 from spinepipe.units import without_step_0
 
@@ -144,6 +144,15 @@ class SpineModel:
     def n_joints(self) -> int:
         """Number of joints J; the model has 6 J coordinates."""
         return len(self.joints)
+
+    @cached_property
+    def neutral(self) -> Neutral:
+        """Where it is in its neutral pose."""
+        return Neutral(
+            np.array([frame.rotation for frame in self.frames]),
+            np.array([frame.origin for frame in self.frames]),
+            np.array([body.com for body in self.bodies]),
+        )
 
     def with_effects(self, effects: tuple[ScopedEffect, ...]) -> "SpineModel":
         """The same geometry and bodies with other effects."""

@@ -263,7 +263,7 @@ def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
     mass = chain.mass_matrix(q) * scale[:, None] * scale
     if positive and twist * np.linalg.norm(mass) < smallest:
         return Stability(stable=True, symmetric_part_positive=True)
-    return Stability(_decays(mass, scaled), positive)
+    return Stability(decays(mass, scaled), positive)
 
 
 def _smallest_eigenvalue_bound(symmetric: Array) -> float:
@@ -279,7 +279,7 @@ def _smallest_eigenvalue_bound(symmetric: Array) -> float:
     return 1.0 / min(by_square, by_row)
 
 
-def _decays(mass: Array, stiffness: Array) -> bool:
+def decays(mass: Array, stiffness: Array) -> bool:
     """Whether all modes of M x'' + x' + K x = 0 decay; massless chains follow x' + K x = 0.
 
     A growing mode l (m l + 1) = -k has |m l + 1| > 1, hence |l| < |K|: rates beyond are those of

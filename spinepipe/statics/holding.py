@@ -21,11 +21,16 @@ class States:
     Attributes
     ----------
     of : (J, S) state of each path law as the last step left it, by its place in the effects.
-    seconds : duration of the step; zero where the test records no time.
+    seconds : duration of the step; zero where the test records no time. Where steps of several
+        tests are solved at once, (J,) for the joints of each path law, by its place.
     """
 
     of: Mapping[int, Array]
-    seconds: float = 0.0
+    seconds: float | Mapping[int, Array] = 0.0
+
+    def lasting(self, law: int) -> float | Array:
+        """Duration of the step, for a path law; of each of its joints where these differ."""
+        return self.seconds[law] if isinstance(self.seconds, Mapping) else self.seconds
 
 
 NO_STATES = States({})
@@ -63,22 +68,26 @@ class ActivePath:
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
         return self.effect.respond_on_path(
-            q, self.values, states.of[self.index], states.seconds, carried
+            q, self.values, states.of[self.index], states.lasting(self.index), carried
         )
 
     def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, P) derivative by the parameters of each joint in scope."""
         return self.effect.by_parameter_on_path(
-            q, self.values, states.of[self.index], states.seconds, carried
+            q, self.values, states.of[self.index], states.lasting(self.index), carried
         )
 
     def by_state(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, S) derivative by the state of each joint in scope."""
-        return self.effect.by_state(q, self.values, states.of[self.index], states.seconds, carried)
+        return self.effect.by_state(
+            q, self.values, states.of[self.index], states.lasting(self.index), carried
+        )
 
     def advance(self, q: Array, carried: Array, states: States) -> Advance:
         """State of the joints in scope after a step that ended at q (J, 6)."""
-        return self.effect.advance(q, self.values, states.of[self.index], states.seconds, carried)
+        return self.effect.advance(
+            q, self.values, states.of[self.index], states.lasting(self.index), carried
+        )
 
 
 Law = ActiveLaw | ActivePath

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from spinepipe.effects.contract import AppliedLoad, Array
+from spinepipe.effects.contract import AppliedLoad, Array, Neutral
 from spinepipe.frames import Pose, transform_of
 from spinepipe.world import Chain
 
@@ -42,14 +42,9 @@ class ChainMotion:
         return self.chain.mass_velocity(self.q)
 
     @property
-    def joint_origins(self) -> Array:
-        """(J, 3) origins of the joint frames in ground, neutral pose, m."""
-        return np.array([frame.origin for frame in self.chain.model.frames])
-
-    @property
-    def centres_of_mass(self) -> Array:
-        """(J, 3) centres of mass of the vertebrae in ground, neutral pose, m."""
-        return np.array([body.com for body in self.chain.model.bodies])
+    def neutral(self) -> Neutral:
+        """Where the chain is in its neutral pose."""
+        return self.chain.model.neutral
 
     def displacement(self, body: int) -> Pose:
         """Displacement of a body from the neutral pose, in ground; body -1 is ground itself."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from example_effects import ExtraWeight
 
 from spinepipe.effects import create
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
@@ -106,12 +107,12 @@ def test_laws_of_single_joints_act_in_their_order() -> None:
         np.testing.assert_allclose(found.q[number], q, rtol=0, atol=AGREEMENT)
 
 
-def test_other_effects_go_to_the_engine() -> None:
+def test_an_effect_that_takes_no_stack_goes_to_the_engine() -> None:
     rng = np.random.default_rng(8)
     chain = chains.random_chain(rng, 2)
     model = bridge.spine_model(chain)
-    offset = ScopedEffect(create("joint_centre_offset"), (0,), np.array([[1e-3, 0.0, 2e-3]]))
-    spines = Spines.of(model.with_effects((*model.effects, offset)), 3)
+    weight = ScopedEffect(ExtraWeight(((0.0, 0.1, 0.0),)), (0,), np.array([[20.0]]))
+    spines = Spines.of(model.with_effects((*model.effects, weight)), 3)
     found = solve_many(spines, Cases.of(bridge.load_case(chain), 3))
     assert found.by_engine.all()
     q, _, _ = by_engine(spines.model(0), bridge.load_case(chain))

@@ -1,6 +1,19 @@
-"""Many spines of one structure at once, for designs of thousands of samples."""
+"""Many runs at once: stacks of models and tests, and spines that differ in numbers alone."""
 
+from spinepipe.statics.many.derive import answered, poses_by, readings, readings_by
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
+from spinepipe.statics.many.stack import Poses, Stack
 
-__all__ = ["Cases", "ManySolved", "Spines", "solve_many"]
+__all__ = [
+    "Cases",
+    "ManySolved",
+    "Poses",
+    "Spines",
+    "Stack",
+    "answered",
+    "poses_by",
+    "readings",
+    "readings_by",
+    "solve_many",
+]

@@ -8,6 +8,9 @@ from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
+from spinepipe.statics.many.kernel import Chains, Loads
+from spinepipe.statics.many.lanes import Effects
+from spinepipe.statics.many.stack import Stack, durations
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +138,40 @@ class Cases:
             )
             steps.append(replace(step, wrenches=wrenches))
         return replace(self.like, steps=tuple(steps))
+
+
+def stacked(spines: Spines, cases: Cases) -> Stack:
+    """The same test of many spines, a run each."""
+    count, steps = len(spines), len(cases.like.steps)
+    like, test = spines.like, cases.like
+    chain = np.arange(count)
+    chains = Chains(
+        spines.rotations,
+        spines.origins,
+        spines.masses,
+        spines.coms,
+        spines.inertias,
+        spines.damping,
+        np.repeat(like.gravity[None], count, axis=0),
+    )
+    most = cases.points.shape[2]
+    bodies = np.full((steps, most), -1)
+    for row, step in enumerate(test.steps):
+        bodies[row, : len(step.wrenches)] = [wrench.body for wrench in step.wrenches]
+    listed = Loads(
+        np.repeat(chain, steps),
+        np.tile(bodies, (count, 1)),
+        *(part.reshape(-1, most, 3) for part in (cases.points, cases.forces, cases.moments)),
+    )
+    effects = Effects.of([like] * count, [(number, test.test) for number in chain.tolist()])
+    return Stack.made(
+        spines.model,
+        cases.case,
+        Chains(*map(np.ascontiguousarray, chains)),
+        effects.with_values(spines.values),
+        listed,
+        [durations(test)] * count,
+    )
 
 
 def _repeated(one: object, count: int) -> Array:

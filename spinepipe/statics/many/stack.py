@@ -1,0 +1,356 @@
+"""Many tests of many models solved in lockstep: a stack of runs, its poses, readings, derivatives.
+
+A run is one model in one test. Steps of a run without memory stand side by side; where laws
+remember, all runs go from step to step together. What cannot be proven stable here goes to the
+engine of record, and so does a model with an effect that takes no stack.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.effects import Kind
+from spinepipe.effects.contract import Array, Indices, Neutral
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.statics.equilibrium import LARGEST_ROTATION, MOST_ITERATIONS, STEP_TOLERANCE
+from spinepipe.statics.many import kernel
+from spinepipe.statics.many.bound import Bound, PathStates
+from spinepipe.statics.many.dead import with_dead_loads
+from spinepipe.statics.many.kernel import Chains, Loads, part
+from spinepipe.statics.many.lanes import Acting, Effects
+from spinepipe.statics.many.stability import surely_stable
+from spinepipe.statics.path import follow
+from spinepipe.statics.system import System
+from spinepipe.status import Status
+from spinepipe.world import Chain
+
+Flags = NDArray[np.bool_]
+Run = tuple[int, LoadCase]
+"""A model's number, and a test of it."""
+
+CHUNK = 40_000
+"""Numbers in the tangents that are worked on together: they should stay in a core's cache."""
+
+NONE = np.zeros((0, 0, 0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Where the steps of all runs end; a lane is a step of a run.
+
+    Attributes
+    ----------
+    q : (L, J, 6) m and rad; NaN where there is no equilibrium.
+    status : (L,) `Status`. messages : why not, or a warning, by lane.
+    by_engine : (R,) whether the engine of record solved the run.
+    """
+
+    q: Array
+    status: NDArray[np.str_]
+    messages: Mapping[int, str]
+    by_engine: Flags
+
+    @property
+    def trouble(self) -> tuple[int, str] | None:
+        """The first lane without an equilibrium and why, or None."""
+        bad = np.flatnonzero(np.isnan(self.q[:, 0, 0]))
+        return (int(bad[0]), self.messages[int(bad[0])]) if len(bad) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Runs of models with equally many joints.
+
+    Attributes
+    ----------
+    model, case : by number, what the engine of record is given of a model and of a run.
+    chains : their numbers. listed, loads : of every lane, without and with load effects.
+    run, first : (L,) run of each lane, (R + 1,) lanes before each run.
+    seconds : (L,) duration of each step.
+    remembers, alone : (R,) runs with laws that have a state, and those for the engine.
+    """
+
+    model: Callable[[int], SpineModel]
+    case: Callable[[int], LoadCase]
+    chains: Chains
+    effects: Effects
+    listed: Loads
+    loads: Loads
+    run: Indices
+    first: Indices
+    seconds: Array
+    remembers: Flags
+    alone: Flags
+
+    @classmethod
+    def of(cls, models: Sequence[SpineModel], runs: Sequence[Run]) -> "Stack":
+        """Runs of models; ValueError where these differ in their number of joints."""
+        if len({model.n_joints for model in models}) != 1:
+            raise ValueError("models of a stack have equally many joints")
+        return cls.made(
+            tuple(models).__getitem__,
+            [case for _, case in runs].__getitem__,
+            _chains(models),
+            Effects.of(models, [(number, case.test) for number, case in runs]),
+            _listed(runs),
+            [durations(case) for _, case in runs],
+        )
+
+    @classmethod
+    def made(
+        cls,
+        model: Callable[[int], SpineModel],
+        case: Callable[[int], LoadCase],
+        chains: Chains,
+        effects: Effects,
+        listed: Loads,
+        seconds: Sequence[Array],
+    ) -> "Stack":
+        """Runs of chains; ``seconds`` (T,) of each run's steps."""
+        steps = [len(one) for one in seconds]
+        run = np.repeat(np.arange(len(steps)), steps)
+        paths = [law for law in effects.laws if law.effect.kind is Kind.PATH]
+        return cls(
+            model,
+            case,
+            chains,
+            effects,
+            listed,
+            with_dead_loads(effects.dead, chains, listed, run),
+            run,
+            np.concatenate([[0], np.cumsum(steps)]),
+            np.concatenate(seconds),
+            _runs_with(paths, len(steps)),
+            _runs_with(effects.others, len(steps)),
+        )
+
+    @property
+    def joints(self) -> int:
+        """J, of every model."""
+        return self.chains.origins.shape[1]
+
+    def with_models(self, models: Sequence[SpineModel]) -> "Stack":
+        """The same with other values of the models' effects."""
+        effects = self.effects.with_models(models)
+        loads = with_dead_loads(effects.dead, self.chains, self.listed, self.run)
+        return replace(self, model=tuple(models).__getitem__, effects=effects, loads=loads)
+
+    def solve(self, guess: Array | None = None) -> Poses:
+        """Equilibria of all lanes.
+
+        Parameters
+        ----------
+        guess : (L, J, 6) poses near by; without them each run starts from the neutral pose.
+        """
+        q = np.full((len(self.run), self.joints, 6), np.nan)
+        open_ones = ~self.alone
+        if guess is not None:
+            for runs in self.chunks(np.flatnonzero(open_ones & ~self.remembers)):
+                open_ones[runs] = ~self._at_once(runs, guess, q)
+            for runs in self.chunks(np.flatnonzero(open_ones & self.remembers)):
+                open_ones[runs] = ~self._step_by_step(runs, guess, q)
+        for runs in self.chunks(np.flatnonzero(open_ones)):
+            open_ones[runs] = ~self._step_by_step(runs, None, q)
+        status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
+        messages: dict[int, str] = {}
+        by_engine = open_ones | self.alone
+        for number in np.flatnonzero(by_engine).tolist():
+            self._by_engine(number, q, status, messages)
+        return Poses(q, status, messages, by_engine)
+
+    def chunks(self, runs: Indices) -> Iterator[Indices]:
+        """Runs in portions that are worked on together."""
+        if not len(runs):
+            return
+        lanes = np.cumsum(self.first[runs + 1] - self.first[runs])
+        size = max(1, CHUNK // (36 * self.joints))
+        yield from np.split(runs, np.flatnonzero(np.diff(lanes // size)) + 1)
+
+    def lanes(self, runs: Indices) -> Indices:
+        """All lanes of some runs, run by run."""
+        ranges = [np.arange(self.first[run], self.first[run + 1]) for run in runs]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *ranges])
+
+    def _at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
+        """Enter the poses of runs without memory, all steps together; which runs are solved."""
+        lanes = self.lanes(runs)
+        found, good = self._settled(lanes, guess[lanes], self.initial_states())
+        whole: Flags = np.logical_and.reduceat(good, np.searchsorted(self.run[lanes], runs))
+        there = np.repeat(whole, np.diff(self.first)[runs])
+        q[lanes[there]] = found[there]
+        return whole
+
+    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array) -> Flags:
+        """Enter the poses of runs whose steps follow each other; which runs are solved."""
+        good = np.ones(len(runs), dtype=bool)
+        last = np.zeros((len(self.remembers), *q.shape[1:]))
+        states = self.initial_states()
+        for live, lanes in self.steps(runs):
+            going = good[live]
+            live, lanes = live[going], lanes[going]
+            start = last[runs[live]] if guess is None else guess[lanes]
+            found, arrived = self._settled(lanes, start, states)
+            good[live] = arrived
+            q[lanes], last[runs[live]] = found, found
+            if self.remembers[runs].any():
+                bound = self.bound(lanes, states)
+                self.remember(states, bound, bound.after(found))
+        q[self.lanes(runs[~good])] = np.nan
+        return good
+
+    def steps(self, runs: Indices) -> Iterator[tuple[Indices, Indices]]:
+        """Step by step: which of the runs have it, and the lanes of these."""
+        steps = np.diff(self.first)[runs]
+        for number in range(int(steps.max(initial=0))):
+            live = np.flatnonzero(steps > number)
+            yield live, self.first[runs[live]] + number
+
+    def initial_states(self, *unknowns: int) -> dict[int, Array]:
+        """States of all path laws before the first step, zero; or their derivatives."""
+        return {
+            number: np.zeros((len(law.run), law.effect.n_states, *unknowns))  # type: ignore[attr-defined]
+            for number, law in enumerate(self.effects.laws)
+            if law.effect.kind is Kind.PATH
+        }
+
+    @staticmethod
+    def remember(states: dict[int, Array], bound: Bound, after: Mapping[int, Array]) -> None:
+        for number, state in after.items():
+            states[number][bound.places[number]] = state
+
+    def bound(self, lanes: Indices, states: PathStates) -> Bound:
+        """Laws and geometry at work on some lanes."""
+        chain = self.loads.chain[lanes]
+        return Bound(
+            self.effects,
+            self.neutral,
+            (chain, self.run[lanes], self.seconds[lanes]),
+            states,
+        )
+
+    @property
+    def neutral(self) -> Neutral:
+        """Where the M chains are in their neutral pose."""
+        return Neutral(self.chains.rotations, self.chains.origins, self.chains.coms)
+
+    def _settled(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
+        """Poses (N, J, 6) of lanes from poses near by, and which are stable equilibria for sure."""
+        q, tangents, arrived = self._newton(lanes, start, states)
+        there = np.flatnonzero(arrived)
+        loads = part(self.loads, lanes[there])
+        arrived[there] = surely_stable(self.chains, loads, q[there], tangents[there])
+        return q, arrived
+
+    def _newton(
+        self, lanes: Indices, start: Array, states: PathStates
+    ) -> tuple[Array, Array, Flags]:
+        """Poses (N, J, 6), tangents there (N, J, 6, 6), and which lanes have arrived (N,).
+
+        A lane whose steps do not contract, or that leaves joint motion, is given up.
+        """
+        q = start.copy()
+        tangents = np.zeros((*q.shape, 6))
+        arrived = np.zeros(len(lanes), dtype=bool)
+        left: Indices = np.arange(len(lanes))
+        last = np.full(len(lanes), np.inf)
+        bound, loads = self.bound(lanes, states), part(self.loads, lanes)
+        for _ in range(MOST_ITERATIONS):
+            held = bound.held(q[left])
+            step, solved = newton_step(self.chains, loads, q[left], held.load, held.tangent)
+            q[left] += step
+            size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
+            inside = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
+            going = solved & inside & (size < 4.0 * last)
+            there = going & (size < 1.0)
+            arrived[left[there]] = True
+            tangents[left[there]] = held.tangent[there]
+            going &= ~there
+            if not going.any():
+                break
+            last = size[going]
+            if not going.all():
+                left = left[going]
+                bound = self.bound(lanes[left], states)
+                loads = part(self.loads, lanes[left])
+        return q, tangents, arrived
+
+    def _by_engine(
+        self, number: int, q: Array, status: NDArray[np.str_], messages: dict[int, str]
+    ) -> None:
+        """Enter what the engine of record says of one run."""
+        lanes = np.arange(self.first[number], self.first[number + 1])
+        try:
+            model = self.model(int(self.loads.chain[lanes[0]]))
+            solved = follow(System(Chain(model), model, self.case(number)))
+        except RefusedModel as refusal:
+            status[lanes] = Status.REFUSED.value
+            messages |= dict.fromkeys(lanes.tolist(), str(refusal))
+            return
+        for lane, step in zip(lanes.tolist(), solved, strict=True):
+            status[lane] = step.equilibrium.status.value
+            if step.equilibrium.message:
+                messages[lane] = step.equilibrium.message
+            if step.usable:
+                q[lane] = step.equilibrium.q.reshape(-1, 6)
+
+
+def newton_step(
+    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array
+) -> tuple[Array, Flags]:
+    """Newton steps (N, J, 6) from q, and on which lanes there is one."""
+    signs = np.zeros(len(q), dtype=np.int64)
+    rates = np.zeros((*q.shape, 1))
+    source = np.negative(held).reshape(rates.shape)
+    kernel.answers(chains, loads, q, tangents, source, True, NONE, NONE, NONE, rates, signs)
+    step = rates[..., 0]
+    finite = np.isfinite(step).all(axis=(1, 2))
+    good: Flags = (signs != 0) & finite
+    return np.where(good[:, None, None], step, 0.0), good
+
+
+def _chains(models: Sequence[SpineModel]) -> Chains:
+    def numbers(of: Iterator[object]) -> Array:
+        return np.array(list(of), dtype=float)
+
+    return Chains(
+        numbers([frame.rotation for frame in model.frames] for model in models),
+        numbers([frame.origin for frame in model.frames] for model in models),
+        numbers([body.mass for body in model.bodies] for model in models),
+        numbers([body.com for body in model.bodies] for model in models),
+        numbers([body.inertia for body in model.bodies] for model in models),
+        numbers(model.damping for model in models),
+        numbers(model.gravity for model in models),
+    )
+
+
+def _listed(runs: Sequence[Run]) -> Loads:
+    """The loads of every step of every run."""
+    steps = [(number, step) for number, case in runs for step in case.steps]
+    most = max((len(step.wrenches) for _, step in steps), default=0)
+    bodies = np.full((len(steps), most), -1)
+    numbers = np.zeros((3, len(steps), most, 3))
+    for lane, (_, step) in enumerate(steps):
+        for column, wrench in enumerate(step.wrenches):
+            bodies[lane, column] = wrench.body
+            numbers[:, lane, column] = wrench.point, wrench.force, wrench.moment
+    return Loads(np.array([number for number, _ in steps], dtype=np.int64), bodies, *numbers)
+
+
+def durations(case: LoadCase) -> Array:
+    """(T,) duration of each step; zero where the test records no time."""
+    clock, found = 0.0, []
+    for step in case.steps:
+        time = clock if step.time is None else step.time
+        found.append(time - clock)
+        clock = time
+    return np.array(found)
+
+
+def _runs_with(effects: Sequence[Acting], count: int) -> Flags:
+    """(R,) which runs have any of these effects."""
+    found = np.zeros(count, dtype=bool)
+    for one in effects:
+        found[one.run] = True
+    return found

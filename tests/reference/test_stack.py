@@ -1,0 +1,150 @@
+"""Stacks of runs against the engine of record: poses, readings, derivatives, effect by effect."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import random_stacks as draw
+from example_effects import ExtraWeight
+
+from spinepipe.effects import Effect
+from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.statics import (
+    FreeParameter,
+    SolvedStep,
+    System,
+    by_parameters,
+    follow,
+    free_parameters,
+    observe,
+    observed_by_parameters,
+)
+from spinepipe.statics.equilibrium import factor
+from spinepipe.statics.many import Stack, poses_by, readings, readings_by
+from spinepipe.status import Status
+from spinepipe.world import Chain
+
+pytestmark = pytest.mark.numeric
+
+AGREEMENT = 1e-10
+"""m and rad; of derivatives, of the largest by each unknown."""
+
+VARIANTS = draw.variants()
+Run = tuple[SpineModel, LoadCase]
+
+
+def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
+    """All parameters of all effects, joint by joint."""
+    return tuple(
+        unknown
+        for number, here in enumerate(model.effects)
+        for unknown in free_parameters(
+            model, number, [p.name for p in here.effect.parameters], "per_joint"
+        )
+    )
+
+
+def with_tangent_there(system: System, step: SolvedStep) -> SolvedStep:
+    """The step with the tangent at its pose; Newton leaves that of one tiny step before."""
+    q = step.equilibrium.q
+    tangent = system.balance(q, step.loading, step.states).tangent
+    return replace(step, equilibrium=replace(step.equilibrium, factored=factor(tangent)))
+
+
+def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) -> list[np.ndarray]:
+    """Poses (T, J, 6), what is reported, and derivatives of both by the unknowns."""
+    system = System(Chain(model), model, case)
+    solved = [with_tangent_there(system, step) for step in follow(system)]
+    poses, shape = [step.equilibrium.q for step in solved], (len(solved), model.n_joints, 6)
+    dq = by_parameters(system, solved, free)
+    by_x = [observed_by_parameters(system, q, d, free) for q, d in zip(poses, dq, strict=True)]
+    return [
+        np.reshape(poses, shape),
+        np.array([observe(system, q) for q in poses]),
+        np.reshape(dq, (*shape, len(free))),
+        np.array(by_x),
+    ]
+
+
+def standing(drawn: Sequence[Run]) -> tuple[list[Run], np.ndarray]:
+    """The runs that stand in all steps, and which of all runs the engine had to solve."""
+    stack = stack_of(drawn)
+    poses = stack.solve()
+    ends = np.split(poses.status == Status.CONVERGED.value, stack.first[1:-1])
+    return [run for run, good in zip(drawn, ends, strict=True) if good.all()], poses.by_engine
+
+
+def stack_of(runs: Sequence[Run]) -> Stack:
+    return Stack.of([model for model, _ in runs], [(n, case) for n, (_, case) in enumerate(runs)])
+
+
+def compare(runs: Sequence[Run]) -> None:
+    """All that the stack says of the runs is what the engine says of each."""
+    stack, free = stack_of(runs), [unknowns(model) for model, _ in runs]
+    q = stack.solve().q
+    dq = poses_by(stack, q, free)
+    found = (q, readings(stack, q), dq, readings_by(stack, q, dq, free))
+    for number, (model, case) in enumerate(runs):
+        lanes, m = stack.lanes(np.array([number])), len(free[number])
+        expected = by_engine(model, case, free[number])
+        for one, other in zip(found[:2], expected[:2], strict=True):
+            np.testing.assert_allclose(one[lanes], other, rtol=0, atol=AGREEMENT)
+        for one, other in zip(found[2:], expected[2:], strict=True):
+            largest = np.abs(other).max(axis=(0, 1, 2), initial=0.0)
+            tolerance = AGREEMENT * np.maximum(largest, 1e-3)
+            assert (np.abs(one[lanes][..., :m] - other) <= tolerance).all()
+            assert not one[lanes][..., m:].any()
+
+
+@pytest.mark.parametrize("effect", VARIANTS, ids=str)
+def test_each_effect_alone(effect: Effect) -> None:
+    rng = np.random.default_rng(len(str(effect)))
+    runs, by_engine = standing([draw.model(rng, 3, [effect], 0.5) for _ in range(5)])
+    assert len(runs) >= 3
+    assert not by_engine.all()
+    compare(runs[:3])
+
+
+@pytest.mark.parametrize("n_joints", [1, 2, 4, 8, 17])
+def test_random_effects_beside_each_other(n_joints: int) -> None:
+    """Models of one stack differ in effects, joints in scope and order."""
+    rng = np.random.default_rng(n_joints)
+    drawn = []
+    for _ in range(8):
+        chosen = rng.choice(len(VARIANTS), int(rng.integers(1, 5)), replace=False)
+        drawn.append(draw.model(rng, n_joints, [VARIANTS[k] for k in chosen], 3.0 / (n_joints + 5)))
+    runs, _ = standing(drawn)
+    assert len(runs) >= 4
+    compare(runs)
+
+
+def test_guesses_change_nothing() -> None:
+    rng = np.random.default_rng(3)
+    effects = [effect for effect in VARIANTS if effect.name in ("hysteresis", "neutral_zone")]
+    runs, _ = standing([draw.model(rng, 3, [effect]) for effect in effects])
+    stack = stack_of(runs)
+    cold = stack.solve()
+    warm = stack.solve(cold.q + rng.normal(0.0, 1e-4, cold.q.shape))
+    assert not warm.by_engine.any()
+    np.testing.assert_allclose(warm.q, cold.q, rtol=0, atol=AGREEMENT)
+
+
+def test_other_values_in_the_same_stack() -> None:
+    rng = np.random.default_rng(4)
+    (model, case), _ = draw.model(rng, 2, [VARIANTS[0]]), None
+    values = [replace(one, values=one.values * 1.1) for one in model.effects]
+    other = model.with_effects(tuple(values))
+    moved = stack_of([(model, case)]).with_models([other]).solve()
+    np.testing.assert_array_equal(moved.q, stack_of([(other, case)]).solve().q)
+
+
+def test_an_effect_that_takes_no_stack_is_solved_by_the_engine() -> None:
+    rng = np.random.default_rng(5)
+    (model, case), plain = (draw.model(rng, 2, []) for _ in range(2))
+    weight = ScopedEffect(ExtraWeight(((0.0, 0.1, 0.0),)), (0,), np.array([[20.0]]))
+    heavy = model.with_effects((*model.effects, weight))
+    poses = stack_of([(heavy, case), plain]).solve()
+    assert poses.by_engine.tolist() == [True, False]
+    expected = by_engine(heavy, case, ())[0]
+    np.testing.assert_array_equal(poses.q[: len(expected)], expected)
