@@ -26,9 +26,6 @@ TIPPED = "no stable equilibrium up to the upper bounds: the loads tip the segmen
 
 AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
 
-SAME_POSE = 1e-6
-"""Weighted residuals, mm and degrees, of one pose solved twice differ by less."""
-
 AT_BOUND = 1e-6
 
 ROUNDING = 1e-12
@@ -221,9 +218,12 @@ def _least_squares(
     status, message = _verdict(problem, ended.arrived or level, at_bound)
     if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
-    at_rest = problem.course is None
-    if at_rest and status.usable and not on_load_path(evaluator, x, evaluation):
-        status, message = Status.NOT_CONVERGED, OFF_THE_PATH
+    if problem.course is None and status.usable:
+        record = evaluator.on_record(x)
+        if record is None:
+            status, message = Status.NOT_CONVERGED, OFF_THE_PATH
+        else:
+            evaluation = record
     return Optimum(
         x,
         at_bound,
@@ -291,20 +291,6 @@ def stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
         start = np.minimum(start + step, problem.upper)
         stiffened += 1
     return start, stiffened
-
-
-def on_load_path(evaluator: Evaluator, x: Array, evaluation: Evaluation) -> bool:
-    """Whether the poses at a point are those that the loads lead to from the neutral pose.
-
-    During a descent each pose is solved from its neighbour's; where segments snap, that may follow
-    another branch.
-    """
-    evaluator.forget()
-    cold = evaluator.at(x)
-    assert evaluation.residual is not None
-    if cold.residual is None:
-        return False
-    return bool(np.allclose(cold.residual, evaluation.residual, rtol=0.0, atol=SAME_POSE))
 
 
 def on_bounds(problem: Problem, x: Array) -> Array:

@@ -45,7 +45,7 @@ from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 from spinepipe.calibrate.problem import Evaluator, Problem
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep, RefusedModel
-from spinepipe.statics import Course, Loading, System, moved, no_settling
+from spinepipe.statics import Course, Loading, System, moved, no_settling, observe
 from spinepipe.statics.holding import NO_STATES
 from spinepipe.statics.motion import ChainMotion
 from spinepipe.status import Status
@@ -171,7 +171,7 @@ class ForwardCost(Evaluator):
             poses = [end for end in ends if end is not None]
             if len(poses) < len(ends):
                 return LOST
-            residual = self._residual(number, there, np.stack(poses))
+            residual = self._residual(number, np.stack([observe(there, q) for q in poses]))
             total += float(residual @ residual)
         return min(total, LOST)
 

@@ -10,7 +10,6 @@ from spinepipe.calibrate.fit import (
     TIPPED,
     bounds_reached,
     names_at_bound,
-    on_load_path,
     stand_up,
     values,
 )
@@ -131,7 +130,6 @@ class Member:
         """See what there is after a share of the step, or after less where nothing stands there."""
         if self.evaluator is None or self.evaluation is None:
             return
-        self.evaluator.reload()
         self.trial = (self.x, self.evaluation)
         while share > SMALLEST_SHARE:
             x = self.x + share * self.step
@@ -210,10 +208,8 @@ class Member:
             return Status.UNSTABLE, TIPPED
         if not self.arrived:
             return Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
-        if self.problem.course is None:
-            self.evaluator.reload()
-            if not on_load_path(self.evaluator, self.x, self.evaluation):
-                return Status.NOT_CONVERGED, OFF_THE_PATH
+        if self.problem.course is None and self.evaluator.on_record(self.x) is None:
+            return Status.NOT_CONVERGED, OFF_THE_PATH
         if at_bound.any():
             return Status.CONVERGED_AT_BOUND, names_at_bound(self.problem, at_bound)
         return Status.CONVERGED, ""

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, Settling
+from spinepipe.calibrate.solvers import AtRest, Settling, on_record
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
@@ -28,10 +28,12 @@ from spinepipe.statics import (
     moved,
     no_settling,
     observe,
-    observed_by_parameters,
 )
 from spinepipe.units import BORDER_PER_SI, less_step_0
 from spinepipe.world import Chain
+
+SAME_POSE = 1e-7
+"""m and rad: one pose solved from two sides differs by less, two branches of a snap by more."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ class Evaluator:
             raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
         bounds = within_declared(problem.model, problem.free, problem.lower, problem.upper)
         self.problem = problem = replace(problem, lower=bounds[0], upper=bounds[1])
-        self.reload()
+        chain = Chain(problem.model)
+        self._systems = [System(chain, chain.model, case.case) for case in problem.cases]
         refusal = no_settling(self._systems[0]) if problem.course else None
         if refusal:
             raise RefusedModel(refusal)
@@ -116,18 +119,14 @@ class Evaluator:
         self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
         self.sharing = sharing(problem.cases, self._used, problem.correlated)
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
+        loads = [case.case for case in problem.cases]
         self._solver: AtRest | Settling = (
-            Settling(problem.free, problem.course)
+            Settling(self._systems, problem.free, problem.course)
             if problem.course
-            else AtRest(problem.free, problem.scale)
+            else AtRest(problem.model, loads, problem.free, problem.scale)
         )
         self._known: dict[bytes, Evaluation] = {}
         self.evaluations = 0
-
-    def reload(self) -> None:
-        """Load the chain again, after that of another problem took its place in the engine."""
-        chain = Chain(self.problem.model)
-        self._systems = [System(chain, chain.model, case.case) for case in self.problem.cases]
 
     def forget(self) -> None:
         """Solve the next point from the neutral pose, not from its neighbour, nor recall it."""
@@ -143,34 +142,47 @@ class Evaluator:
 
     def _evaluate(self, x: Array) -> Evaluation:
         self.evaluations += 1
-        model = moved(self.problem.model, self.problem.free, x)
-        systems = [system.with_model(model) for system in self._systems]
-        solved = self._solver.solve(x, systems)
-        if isinstance(solved, str):
-            return Evaluation(None, None, (), self.coordinate, self.sharing, solved)
-        numbers = range(len(systems))
-        residual = np.concatenate([self._residual(n, systems[n], solved.poses[n]) for n in numbers])
-        jacobian = np.concatenate(
-            [self._jacobian(n, systems[n], solved.poses[n], solved.by_x[n]) for n in numbers]
+        seen = self._solver.solve(x)
+        if isinstance(seen, str):
+            return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
+        residual = np.concatenate(
+            [self._residual(number, one) for number, one in enumerate(seen.readings)]
         )
-        return Evaluation(residual, jacobian, solved.poses, self.coordinate, self.sharing)
+        jacobian = np.concatenate(
+            [self._jacobian(number, one) for number, one in enumerate(seen.by_x)]
+        )
+        return Evaluation(residual, jacobian, seen.poses, self.coordinate, self.sharing)
 
-    def _residual(self, number: int, system: System, poses: Array) -> Array:
-        """(N,) weighted residuals of the readings of one case that enter the cost."""
+    def on_record(self, x: Array) -> Evaluation | None:
+        """The point at rest as the engine of record has it; None where loads lead elsewhere.
+
+        Raises
+        ------
+        Disagreement
+            Where the engine differs by more than rounding.
+        """
+        found, problem = self.at(x), self.problem
+        model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
+        poses = on_record(model, cases, found.poses, SAME_POSE)
+        if poses is None:
+            return None
+        chain = self._systems[0].chain
+        seen = [
+            np.stack([observe(System(chain, model, case), q) for q in ends])
+            for case, ends in zip(cases, poses, strict=True)
+        ]
+        residual = np.concatenate([self._residual(n, one) for n, one in enumerate(seen)])
+        return replace(found, residual=residual, poses=poses)
+
+    def _residual(self, number: int, seen: Array) -> Array:
+        """(N,) weighted residuals of the readings (T, J, 6) of one case that enter the cost."""
         measured = self.problem.cases[number]
-        seen = np.stack([observe(system, q) for q in poses])
         errors = less_step_0(seen, measured.zeroed) - measured.measured
         return self._entering(number, errors * self._scale)
 
-    def _jacobian(self, number: int, system: System, poses: Array, by_x: Array) -> Array:
-        """(N, m) derivative of the residuals of one case by the unknowns."""
-        seen = np.stack(
-            [
-                observed_by_parameters(system, q, dq, self.problem.free)
-                for q, dq in zip(poses, by_x, strict=True)
-            ]
-        )
-        seen = less_step_0(seen, self.problem.cases[number].zeroed)
+    def _jacobian(self, number: int, by_x: Array) -> Array:
+        """(N, m) derivative of the residuals of one case, from that of its readings."""
+        seen = less_step_0(by_x, self.problem.cases[number].zeroed)
         return self._entering(number, seen * self._scale[:, None])
 
     def _entering(self, number: int, errors: Array) -> Array:

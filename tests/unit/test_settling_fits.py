@@ -122,7 +122,7 @@ def test_a_chain_that_tips_over_has_no_solution() -> None:
     model, case = tipping()
     system = System(Chain(model), model, case)
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
-    found = Settling(free, Course(3.0)).solve(np.zeros(3), [system])
+    found = Settling([system], free, Course(3.0)).solve(np.zeros(3))
     assert isinstance(found, str)
     assert "tips over" in found
 

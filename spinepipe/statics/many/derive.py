@@ -16,7 +16,10 @@ from spinepipe.statics.many.dead import pushes
 from spinepipe.statics.many.kernel import part
 from spinepipe.statics.many.lanes import Acting
 from spinepipe.statics.many.stack import NONE, Stack
-from spinepipe.statics.sensitivity import FreeParameter
+from spinepipe.statics.path import follow
+from spinepipe.statics.sensitivity import FreeParameter, by_parameters
+from spinepipe.statics.system import System
+from spinepipe.world import Chain
 
 Unknowns = Sequence[Sequence[FreeParameter]]
 """For each model of a stack, what moves."""
@@ -40,15 +43,27 @@ def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
     moved = _Moved(stack, unknowns)
     found = np.zeros((*q.shape, moved.m))
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
-    for runs in stack.chunks(np.flatnonzero(~stack.remembers)):
+    for runs in stack.chunks(np.flatnonzero(~stack.remembers & ~stack.alone)):
         lanes = stack.lanes(runs)
         bound = stack.bound(lanes, states)
         before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
         found[lanes] = moved.poses(lanes, bound, q[lanes], moved.on(bound), before)
-    remembering = np.flatnonzero(stack.remembers)
+    remembering = np.flatnonzero(stack.remembers & ~stack.alone)
     if len(remembering):
         _step_by_step(stack, remembering, q, moved, found)
+    for run in np.flatnonzero(stack.alone).tolist():
+        _by_engine(stack, run, unknowns, found)
     return found
+
+
+def _by_engine(stack: Stack, run: int, unknowns: Unknowns, found: Array) -> None:
+    """Enter the derivatives of a run with an effect that takes no stack."""
+    owner = int(stack.loads.chain[stack.first[run]])
+    model, free = stack.model(owner), unknowns[owner]
+    system = System(Chain(model), model, stack.case(run))
+    by_x = by_parameters(system, follow(system), free)
+    for lane, dq in enumerate(by_x, int(stack.first[run])):
+        found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
 
 
 def _step_by_step(stack: Stack, runs: Indices, q: Array, moved: "_Moved", found: Array) -> None:
@@ -136,7 +151,7 @@ def readings(stack: Stack, q: Array) -> Array:
 
 def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
     """(L, J, 6, m) derivative of what is reported, from that of the poses (L, J, 6, m)."""
-    seen, by_x = q.reshape(-1, 6).copy(), dq.reshape(-1, *dq.shape[2:]).copy()
+    seen, by_x = q.reshape(-1, 6).copy(), dq.reshape(q.size // 6, *dq.shape[2:]).copy()
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
         flat, rows = stack.joints * lanes + one.joint[places], one.row[places]

@@ -11,15 +11,17 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
 from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS, Hypothesis, Unknown
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Predicted, Simulated
+from spinepipe.studies.discrepancy.search.prediction import (
+    NoEquilibrium,
+    Predicted,
+    Subject,
+    Together,
+)
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 SETTLED = Settled(cost=1e-5, step=1e-6, slope=1e-10, evaluations=40)
 """Chi2 settles to a share at which a log evidence is right to 0.01 or so."""
-
-SAME = 1e-3
-"""Noise SDs by which a reading may differ when it is predicted afresh from the neutral pose."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +81,11 @@ class _Points:
 
     def __init__(self, hypothesis: Hypothesis, setting: Setting) -> None:
         self.hypothesis, self.setting = hypothesis, setting
-        self.simulated = {
-            name: Simulated(member.model, setting.readings[name].cases, setting.zeroed, member.free)
+        subjects = {
+            name: Subject(member.model, setting.readings[name].cases, member.free)
             for name, member in hypothesis.members.items()
         }
+        self.together = Together(subjects, setting.zeroed)
         self.sd = np.array([u.sd for u in hypothesis.unknowns])
         self.mean = np.array([u.mean for u in hypothesis.unknowns])
         self.known: dict[
@@ -106,9 +109,9 @@ class _Points:
     def _evaluated(
         self, x: Array
     ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]:
-        residuals, jacobians, predictions = {}, {}, {}
-        for name, member in self.hypothesis.members.items():
-            predicted = self.simulated[name].at(x[list(member.numbers)])
+        residuals, jacobians = {}, {}
+        predictions = self.together.at(self.own(x))
+        for name, predicted in predictions.items():
             white = self.setting.whitenings[name]
             measured = [test.mean for test in self.setting.readings[name].tests]
             errors = [
@@ -116,8 +119,11 @@ class _Points:
                 for seen, mean in zip(predicted.readings, measured, strict=True)
             ]
             residuals[name], jacobians[name] = white(errors), white(predicted.by_x)
-            predictions[name] = predicted
         return residuals, jacobians, predictions
+
+    def own(self, x: Array) -> dict[str, Array]:
+        """The unknowns of each specimen."""
+        return {name: x[list(one.numbers)] for name, one in self.hypothesis.members.items()}
 
     def compressed(self, x: Array) -> tuple[Array, Array] | None:
         """Residual and Jacobian of the same cost, a few rows per specimen, priors behind."""
@@ -159,12 +165,9 @@ def _scale(unknown: Unknown) -> float:
 
 def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
     found = points.at(x)
-    cold = _Points(points.hypothesis, points.setting).at(x)
-    if found is None or cold is None:
+    if found is None or not points.together.on_record(points.own(x), found[2]):
         return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     residuals, jacobians, predicted = found
-    if any(np.abs(cold[0][n] - r).max() > SAME for n, r in residuals.items()):
-        return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     models = {
         name: moved(member.model, member.free, x[list(member.numbers)])
         for name, member in points.hypothesis.members.items()

@@ -17,10 +17,9 @@ from scipy.special import logsumexp
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import SolvedStep, System
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import BUSHING
-from spinepipe.studies.discrepancy.search.prediction import solved_steps
+from spinepipe.studies.discrepancy.search.prediction import Solved
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -31,7 +30,6 @@ from spinepipe.studies.discrepancy.search.projected import (
 )
 from spinepipe.studies.discrepancy.search.screen import Group
 from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
-from spinepipe.world import Chain
 
 SIZE = 0.1
 """Prior size of a term at the largest motion, as a share of the joint's load there."""
@@ -70,12 +68,8 @@ def generic_columns(
 ) -> GenericColumns:
     """The generic basis of a specimen where its model stands."""
     rotations = [name for name in coordinates if name in ROTATIONS]
-    chain = Chain(model)
-    systems = [System(chain, model, case) for case in cases]
-    solved = [solved_steps(system, None) for system in systems]
-    poses = [np.stack([step.equilibrium.q for step in steps]) for steps in solved]
-    shape = (-1, model.n_joints, 6)
-    motions = [q.reshape(shape) for q in poses]
+    solved = Solved(model, cases, zeroed)
+    motions = solved.poses
     reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
     stiffness = _stiffness(model)
     terms: list[Term] = []
@@ -89,10 +83,11 @@ def generic_columns(
                 for joint in range(model.n_joints)
             ]
         size = SIZE * stiffness[:, at] * reach[:, at]
+        loads = [_loads(motion / reach, at, rotations) * size[:, None] for motion in motions]
+        by_load = solved.by_loads([_alone(one, at) for one in loads])
         for place, motion in enumerate(motions):
-            loads = _loads(motion / reach, at, rotations) * size[:, None]
             drift = _drift(len(motion), SIZE * reach[:, at], at)
-            moved[place].append(np.concatenate([_motion(solved[place], loads, at), drift], axis=-1))
+            moved[place].append(np.concatenate([by_load[place], drift], axis=-1))
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
     seen = [less_step_0(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
@@ -129,17 +124,13 @@ def _loads(u: Array, at: int, rotations: Sequence[str]) -> Array:
     return np.stack([*found, above, below], axis=-1)
 
 
-def _motion(solved: Sequence[SolvedStep], loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) motion by each term's load at each joint alone, terms first."""
-    _, joints, count = loads.shape
-    moved = []
-    for step, load in zip(solved, loads, strict=True):
-        unit = np.zeros((6 * joints, joints))
-        unit[6 * np.arange(joints) + at, np.arange(joints)] = 1.0
-        by_load = -step.factored.solve(unit)
-        columns = by_load[:, None, :] * load.T[None]
-        moved.append(columns.reshape(joints, 6, count * joints))
-    return np.stack(moved)
+def _alone(loads: Array, at: int) -> Array:
+    """(T, J, 6, K x J) each term's load (T, J, K) at each joint alone, terms first."""
+    steps, joints, count = loads.shape
+    alone = np.zeros((steps, joints, 6, count, joints))
+    every = np.arange(joints)
+    alone[:, every, at, :, every] = loads.swapaxes(0, 1)
+    return alone.reshape(steps, joints, 6, count * joints)
 
 
 def _drift(steps: int, size: Array, at: int) -> Array:

@@ -1,25 +1,19 @@
-"""One specimen under a model: its predicted readings and their derivatives by unknowns."""
+"""Specimens under models: their predicted readings and derivatives by unknowns, in one stack."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects.contract import Array
+from spinepipe.calibrate.solvers import on_record
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import (
-    FreeParameter,
-    SolvedStep,
-    System,
-    by_parameters,
-    carried_over,
-    follow,
-    moved,
-    observe,
-    observed_by_parameters,
-)
+from spinepipe.statics import FreeParameter, moved
+from spinepipe.statics.many import Poses, Stack, answered, poses_by, readings, readings_by
 from spinepipe.units import less_step_0
-from spinepipe.world import Chain
+
+SAME = 1e-7
+"""m and rad by which a pose may differ when it is solved afresh from the neutral pose."""
 
 
 class NoEquilibrium(RuntimeError):
@@ -28,14 +22,110 @@ class NoEquilibrium(RuntimeError):
 
 @dataclass(frozen=True)
 class Predicted:
-    """Predicted readings of each test, (T, J, 6), and their derivatives, (T, J, 6, m)."""
+    """Predicted readings of each test, (T, J, 6), and their derivatives, (T, J, 6, m).
+
+    ``poses`` : (T, n) that they are read at.
+    """
 
     readings: tuple[Array, ...]
     by_x: tuple[Array, ...]
+    poses: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A specimen's model, its tests, and what may move of the model."""
+
+    model: SpineModel
+    cases: Sequence[LoadCase]
+    free: Sequence[FreeParameter]
+
+
+class Together:
+    """Specimens under a model each, solved again and again from near poses."""
+
+    def __init__(self, subjects: Mapping[str, Subject], zeroed: bool) -> None:
+        self.subjects, self.zeroed = dict(subjects), zeroed
+        members = list(self.subjects.values())
+        runs = [(number, case) for number, one in enumerate(members) for case in one.cases]
+        self._runs = np.cumsum([0, *(len(one.cases) for one in members)])
+        self._free = [one.free for one in members]
+        self._stack = Stack.of([one.model for one in members], runs)
+        self._last: tuple[Array, Array, Array] | None = None
+
+    def at(self, x: Mapping[str, Array]) -> dict[str, Predicted]:
+        """Prediction of each with its unknowns moved by x (m,) from its model's values.
+
+        Raises
+        ------
+        NoEquilibrium
+            When a load step has no stable pose.
+        """
+        names = list(self.subjects)
+        models = [self.model(name, x[name]) for name in names]
+        stack = self._stack.with_models(models)
+        every = self._padded([x[name] for name in names])
+        found = stack.solve(self._guess(every))
+        _must_stand(found, stack, models)
+        q = found.q
+        dq = poses_by(stack, q, self._free)
+        self._last = (every, q, dq)
+        seen, by_x = readings(stack, q), readings_by(stack, q, dq, self._free)
+        return {
+            name: self._predicted(stack, number, q, seen, by_x[..., : len(x[name])])
+            for number, name in enumerate(names)
+        }
+
+    def model(self, name: str, x: Array) -> SpineModel:
+        """The model of a specimen with its unknowns moved by x (m,)."""
+        one = self.subjects[name]
+        return moved(one.model, one.free, x)
+
+    def _predicted(
+        self, stack: Stack, number: int, q: Array, seen: Array, by_x: Array
+    ) -> Predicted:
+        tests = [
+            slice(stack.first[run], stack.first[run + 1])
+            for run in range(self._runs[number], self._runs[number + 1])
+        ]
+        return Predicted(
+            tuple(less_step_0(seen[lanes], self.zeroed) for lanes in tests),
+            tuple(less_step_0(by_x[lanes], self.zeroed) for lanes in tests),
+            tuple(q[lanes].reshape(len(q[lanes]), -1) for lanes in tests),
+        )
+
+    def _padded(self, x: Sequence[Array]) -> Array:
+        """(M, m) unknowns of each specimen, those that it does not have zero."""
+        found = np.zeros((len(x), max((len(one) for one in x), default=0)))
+        for row, one in zip(found, x, strict=True):
+            row[: len(one)] = one
+        return found
+
+    def _guess(self, x: Array) -> Array | None:
+        """(L, J, 6) poses to start from, to first order from the last ones."""
+        if self._last is None:
+            return None
+        there, q, dq = self._last
+        change = (x - there)[self._stack.loads.chain]
+        guess: Array = q + (dq @ change[:, None, :, None])[..., 0]
+        return guess
+
+    def on_record(self, x: Mapping[str, Array], predicted: Mapping[str, Predicted]) -> bool:
+        """Whether the engine of record leads to the same poses from the neutral one.
+
+        Raises
+        ------
+        Disagreement
+            For a small difference that is no rounding error.
+        """
+        return all(
+            on_record(self.model(name, x[name]), one.cases, predicted[name].poses, SAME) is not None
+            for name, one in self.subjects.items()
+        )
 
 
 class Simulated:
-    """A specimen's tests under one model, solved again and again from near poses."""
+    """One specimen's tests under one model."""
 
     def __init__(
         self,
@@ -44,8 +134,8 @@ class Simulated:
         zeroed: bool,
         free: Sequence[FreeParameter],
     ) -> None:
-        self.model, self.cases, self.zeroed, self.free = model, tuple(cases), zeroed, tuple(free)
-        self._last: tuple[Array, list[list[Array]], list[list[Array]]] | None = None
+        self._together = Together({model.specimen: Subject(model, tuple(cases), free)}, zeroed)
+        self._name = model.specimen
 
     def at(self, x: Array) -> Predicted:
         """Prediction with the unknowns moved by x (m,) from the model's values.
@@ -55,45 +145,11 @@ class Simulated:
         NoEquilibrium
             When a load step has no stable pose.
         """
-        model = moved(self.model, self.free, x)
-        chain = Chain(model)
-        guesses = self._guesses(x)
-        poses, slopes, readings, by_x = [], [], [], []
-        for number, case in enumerate(self.cases):
-            system = System(chain, model, case)
-            solved = solved_steps(system, guesses[number])
-            dq = by_parameters(system, solved, self.free)
-            poses.append([step.equilibrium.q for step in solved])
-            slopes.append(dq)
-            readings.append(self._seen([observe(system, q) for q in poses[-1]]))
-            seen = zip(poses[-1], dq, strict=True)
-            by_x.append(
-                self._seen([observed_by_parameters(system, q, d, self.free) for q, d in seen])
-            )
-        self._last = (x.copy(), poses, slopes)
-        return Predicted(tuple(readings), tuple(by_x))
-
-    def _guesses(self, x: Array) -> list[list[Array] | None]:
-        """Poses to start from, to first order from the last ones."""
-        if self._last is None:
-            return [None] * len(self.cases)
-        there, poses, slopes = self._last
-        change = x - there
-        return [
-            [q + d @ change for q, d in zip(qs, ds, strict=True)]
-            for qs, ds in zip(poses, slopes, strict=True)
-        ]
-
-    def _seen(self, rows: list[Array]) -> Array:
-        """(T, ...) by load step, less step 0 where readings were zeroed."""
-        return less_step_0(np.stack(rows), self.zeroed)
+        return self._together.at({self._name: x})[self._name]
 
 
 class Solved:
-    """A specimen's tests solved under one model, for derivatives by effects that it lacks.
-
-    Good for as long as no other model is loaded into the process's engine.
-    """
+    """A specimen's tests solved under one model, for derivatives by what it lacks."""
 
     def __init__(self, model: SpineModel, cases: Sequence[LoadCase], zeroed: bool) -> None:
         """Solve all tests.
@@ -104,8 +160,15 @@ class Solved:
             When a load step has no stable pose.
         """
         self.model, self.cases, self.zeroed = model, tuple(cases), zeroed
-        self._chain = Chain(model)
-        self.steps = [solved_steps(System(self._chain, model, case), None) for case in cases]
+        self._stack = Stack.of([model], [(0, case) for case in self.cases])
+        found = self._stack.solve()
+        _must_stand(found, self._stack, [model])
+        self._q = found.q
+
+    @property
+    def poses(self) -> tuple[Array, ...]:
+        """(T, J, 6) of each test."""
+        return self._by_test(self._q)
 
     def by(self, full: SpineModel, free: Sequence[FreeParameter]) -> tuple[Array, ...]:
         """(T, J, 6, m) derivatives of each test's readings by unknowns of idle effects.
@@ -115,29 +178,26 @@ class Solved:
         full : the solved model with further effects behind its own, all of them off.
         free : unknowns of ``full``.
         """
-        found = []
-        for case, solved in zip(self.cases, self.steps, strict=True):
-            system = System(self._chain, full, case)
-            steps = carried_over(system, solved)
-            seen = [
-                observed_by_parameters(system, step.equilibrium.q, dq, free)
-                for step, dq in zip(steps, by_parameters(system, steps, free), strict=True)
-            ]
-            found.append(less_step_0(np.stack(seen), self.zeroed))
-        return tuple(found)
+        stack = Stack.of([full], [(0, case) for case in self.cases])
+        dq = poses_by(stack, self._q, [free])
+        found = self._by_test(readings_by(stack, self._q, dq, [free]))
+        return tuple(less_step_0(one, self.zeroed) for one in found)
+
+    def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:
+        """(T, J, 6, m) motion by loads (T, J, 6, m) that hold the joints besides their laws."""
+        sources = np.negative(np.concatenate(list(loads)))
+        return self._by_test(answered(self._stack, self._q, sources))
+
+    def _by_test(self, of_lanes: Array) -> tuple[Array, ...]:
+        return tuple(np.split(of_lanes, self._stack.first[1:-1]))
 
 
-def solved_steps(system: System, guesses: list[Array] | None) -> list[SolvedStep]:
-    """All steps of a case, each with an equilibrium.
-
-    Raises
-    ------
-    NoEquilibrium
-        When one has no stable pose.
-    """
-    solved = follow(system, guesses)
-    for step in solved:
-        if not step.usable:
-            place = f"{system.model.specimen}, test {system.case.test}, step {step.step.step}"
-            raise NoEquilibrium(f"{place}: {step.equilibrium.message}")
-    return solved
+def _must_stand(found: Poses, stack: Stack, models: Sequence[SpineModel]) -> None:
+    """Refuse poses of which one is missing, with the first that is and why."""
+    if found.trouble is None:
+        return
+    lane, why = found.trouble
+    run: Indices = stack.run[lane]
+    model, case = models[int(stack.loads.chain[lane])], stack.case(int(run))
+    step = case.steps[lane - int(stack.first[run])]
+    raise NoEquilibrium(f"{model.specimen}, test {case.test}, step {step.step}: {why}")
