@@ -18,7 +18,7 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.design.seen import Design, Seen, candidates
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.model_files import border
-from spinepipe.studies.discrepancy.search.screen import Group, Places
+from spinepipe.studies.discrepancy.search.screen import Group, Places, sides
 
 NO_TRACE = 1e-6
 """A typical effect whose squared signature sums to less, in noise SD, leaves no trace at all."""
@@ -264,7 +264,7 @@ def typical(design: Design, number: int, form: Form) -> Typical:
     middle = (0.0,) * len(form.variant.shapes)
     places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
     count = len(strengths)
-    signs = index.signs(form, places, count)
+    signs = sides(form, strengths)
     sizes = typical_strengths(form.variant)
     away = np.array([sizes[column] for column in strengths])
     raw, refitted, left = (np.zeros((count, count)) for _ in range(3))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from spinepipe.effects.contract import Array
@@ -68,16 +69,14 @@ class Gap:
         return float(np.sqrt(max(0.0, excess / self.dof))) if self.dof > 0.0 else 0.0
 
     def _noncentrality(self, share: float) -> float:
-        """Noncentrality at which chi2 or less has that probability, by bisection."""
+        """Noncentrality at which chi2 or less has that probability; 0 where none has."""
         if self.dof <= 0.0 or ncx2.cdf(self.chi2, self.dof, 1e-12) <= share:
             return 0.0
-        low, high = 0.0, 2.0 * self.chi2 + 100.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (
-                (middle, high) if ncx2.cdf(self.chi2, self.dof, middle) > share else (low, middle)
-            )
-        return low
+        most = 2.0 * self.chi2 + 100.0
+        found: float = brentq(
+            lambda size: ncx2.cdf(self.chi2, self.dof, size) - share, 1e-12, most, xtol=1e-12
+        )
+        return found
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """An investigation from beginning to end: readings, base, search, data errors, proof, verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     trials,
 )
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
     estimated_noise,
@@ -25,6 +26,7 @@ from spinepipe.studies.discrepancy.search.noise import (
 )
 from spinepipe.studies.discrepancy.search.nuisance import as_si
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
+from spinepipe.studies.discrepancy.search.prediction import recorded
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy
@@ -101,11 +103,26 @@ def investigate(ready: Prepared, run: Run) -> Investigation:
     study, rules = ready.study, _rules(ready)
     grounds = _laid(ready, run)
     found = search(grounds, rules, run)
+    for fit in (found.base.fit, found.final.fit):
+        run(on_record, fit, grounds.readings)
     errors = suspected_errors(grounds, ready.measured, run)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     ended = outcome(found, study.margin, proof, errors)
     return Investigation(grounds, rules, found, errors, proof, ended)
+
+
+def on_record(fit: JointFit, readings: Mapping[str, SpecimenReadings]) -> int:
+    """Solve all that a fit predicts by the engine of record; how many specimens agree.
+
+    Raises
+    ------
+    Disagreement
+        Where it differs by more than rounding.
+    """
+    for name, model in fit.models.items():
+        recorded(model, readings[name].cases)
+    return len(fit.models)
 
 
 def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:

@@ -165,7 +165,7 @@ def _scale(unknown: Unknown) -> float:
 
 def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
     found = points.at(x)
-    if found is None or not points.together.on_record(points.own(x), found[2]):
+    if found is None or not points.together.leads_to(points.own(x), found[2]):
         return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     residuals, jacobians, predicted = found
     models = {

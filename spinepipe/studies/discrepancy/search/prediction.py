@@ -110,18 +110,30 @@ class Together:
         guess: Array = q + (dq @ change[:, None, :, None])[..., 0]
         return guess
 
-    def on_record(self, x: Mapping[str, Array], predicted: Mapping[str, Predicted]) -> bool:
-        """Whether the engine of record leads to the same poses from the neutral one.
+    def leads_to(self, x: Mapping[str, Array], predicted: Mapping[str, Predicted]) -> bool:
+        """Whether the loads lead to the same poses from the neutral one."""
+        names = list(self.subjects)
+        found = self._stack.with_models([self.model(name, x[name]) for name in names]).solve()
+        if found.trouble:
+            return False
+        there = np.concatenate([q for name in names for q in predicted[name].poses])
+        return bool(np.abs(found.q.reshape(there.shape) - there).max() <= SAME)
 
-        Raises
-        ------
-        Disagreement
-            For a small difference that is no rounding error.
-        """
-        return all(
-            on_record(self.model(name, x[name]), one.cases, predicted[name].poses, SAME) is not None
-            for name, one in self.subjects.items()
-        )
+
+def recorded(model: SpineModel, cases: Sequence[LoadCase]) -> None:
+    """Solve a specimen's tests by the engine of record beside the stack.
+
+    Raises
+    ------
+    NoEquilibrium
+        Where the engine of record finds none, or another.
+    Disagreement
+        For a small difference that is no rounding error.
+    """
+    solved = Solved(model, cases, zeroed=False)
+    poses = [q.reshape(len(q), -1) for q in solved.poses]
+    if on_record(model, cases, poses, SAME) is None:
+        raise NoEquilibrium(f"{model.specimen}: the engine of record finds no such motion")
 
 
 class Simulated:

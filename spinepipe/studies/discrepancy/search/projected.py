@@ -9,6 +9,7 @@ and is taken out of the sums.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -79,6 +80,10 @@ class Linearised:
     gram_shared: Array
     moments_shared: Array
 
+    @cached_property
+    def _inverse_shared(self) -> Array:
+        return pinvh(self.gram_shared, rcond=1e-10)
+
     def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
         """Products (k, k), (k, 1 + D) of k strengths less what shared unknowns take of them.
 
@@ -86,7 +91,7 @@ class Linearised:
         """
         if not coupled.shape[1]:
             return gram, moments
-        gain = coupled @ pinvh(self.gram_shared, rcond=1e-10)
+        gain = coupled @ self._inverse_shared
         return gram - gain @ coupled.T, moments - gain @ self.moments_shared
 
 

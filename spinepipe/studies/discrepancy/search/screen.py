@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects import Spread
@@ -30,6 +30,13 @@ Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
 
 LEAST_THRESHOLD = 5.0
 """Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
+
+
+def log_sum(logs: Array) -> Array:
+    """(...) logarithm of the sum of exp(logs) over the first axis; none is infinite."""
+    largest = logs.max(axis=0)
+    result: Array = largest + np.log(np.sum(np.exp(logs - largest), axis=0))
+    return result
 
 
 @dataclass(frozen=True)
@@ -52,23 +59,27 @@ class Group:
     def log_evidence(self, moments: Array) -> Array:
         """(D,) evidence for F'r of each draw, (k, D)."""
         components = self.vectors.T @ moments
-        found = []
-        for size in SIZES:
-            variance = 1.0 / (size**-2.0 + self.eigenvalues)
-            gain = 0.5 * np.sum(variance[:, None] * components**2, axis=0)
-            cost = 0.5 * np.sum(np.log1p(size**2 * self.eigenvalues))
-            found.append(gain - cost + self._one_sided(variance, components))
-        return np.asarray(logsumexp(np.stack(found), axis=0) - np.log(len(SIZES)))
+        variance = 1.0 / (SIZES[:, None] ** -2.0 + self.eigenvalues)
+        gain = 0.5 * variance @ components**2
+        cost = 0.5 * np.sum(np.log1p(SIZES[:, None] ** 2 * self.eigenvalues), axis=1)
+        found = gain - cost[:, None] + self._one_sided(variance, components)
+        return log_sum(found) - float(np.log(len(SIZES)))
 
     def _one_sided(self, variance: Array, components: Array) -> Array:
-        """(D,) what the signs add: twice the posterior's share on the allowed side, each."""
+        """(S, D) what the signs add: twice the posterior's share on the allowed side, each.
+
+        Parameters
+        ----------
+        variance : (S, k) at each size. components : (k, D).
+        """
         there = self.signs != 0.0
         if not there.any():
-            return np.zeros(components.shape[1])
-        mean = (self.vectors @ (variance[:, None] * components))[there]
-        sd = np.sqrt(np.einsum("ij,j,ij->i", self.vectors, variance, self.vectors))[there]
-        sides = self.signs[there, None] * mean / sd[:, None]
-        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=0))
+            return np.zeros((len(variance), components.shape[1]))
+        vectors = self.vectors[there]
+        mean = vectors @ (variance[:, :, None] * components)
+        sd = np.sqrt(variance @ (vectors**2).T)
+        sides = self.signs[there, None] * mean / sd[:, :, None]
+        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=1))
 
     def estimate(self, moments: Array) -> Array:
         """(k,) strengths, in prior SDs, that explain most, shrunk a little where nothing tells."""
@@ -98,9 +109,10 @@ class Index:
     """Columns of one effect by variant, shape, test and joint."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
-        self._at: dict[tuple[object, ...], list[int]] = {}
+        self._at: dict[tuple[object, ...], dict[tuple[object, ...], list[int]]] = {}
         for number, c in enumerate(columns):
-            self._at.setdefault((c.variant, c.sds, c.test, c.joint, c.strength), []).append(number)
+            places = self._at.setdefault((c.variant, c.sds), {})
+            places.setdefault((c.test, c.joint, c.strength), []).append(number)
         self.columns = tuple(columns)
 
     def places(
@@ -127,8 +139,8 @@ class Index:
         by_joint = spread in (Spread.BY_JOINT, Spread.EACH)
         wanted = tests if spread is Spread.BY_TEST else (EVERY_TEST,)
         found: list[tuple[int, tuple[object, ...]]] = []
-        for (variant, at, test, joint, strength), numbers in self._at.items():
-            if (variant, at) != (form.variant, sds) or test not in wanted:
+        for (test, joint, strength), numbers in self._at.get((form.variant, sds), {}).items():
+            if test not in wanted:
                 continue
             if form.joint is None or joint == form.joint:
                 key = (
@@ -139,15 +151,6 @@ class Index:
                 )
                 found += [(number, key) for number in numbers]
         return found
-
-    def signs(self, form: Form, places: Places, count: int) -> Array:
-        """(k,) side of off that each strength's bounds allow."""
-        parameters = form.variant.create().parameters
-        signs = np.zeros(count)
-        for _, columns, owners in places:
-            for column, owner in zip(columns, owners, strict=True):
-                signs[owner] = parameters[self.columns[column].strength].side
-        return signs
 
 
 @dataclass(frozen=True)
@@ -216,10 +219,10 @@ def screened(
         found = [summed(index, problem, form, sds, specimens, tests) for sds in grid]
         logs = np.stack([one.group.log_evidence(one.moments) for one in found])
         share = trials.log_share(form)
-        totals.append(logsumexp(logs, axis=0) - np.log(len(grid)) + share)
+        totals.append(log_sum(logs) - np.log(len(grid)) + share)
         best = int(np.argmax(logs[:, 0]))
         tried.append(_tried(found[best], float(logs[best, 0]) + share))
-    whole = logsumexp(np.stack(totals), axis=0)
+    whole = log_sum(np.stack(totals))
     order = sorted(tried, key=lambda one: -one.log_evidence)
     return Screened(trials.effect, float(whole[0]), whole[1:], tuple(order))
 
@@ -253,8 +256,14 @@ def summed(
         moments += onto @ part.moments[columns]
         coupled += onto @ part.shared[columns]
     gram, moments = problem.without_shared(gram, moments, coupled)
-    signs = index.signs(form, places, count)
-    return Summed(form, sds, strengths, gram, moments, Group.of(gram, signs))
+    group = Group.of(gram, sides(form, strengths))
+    return Summed(form, sds, strengths, gram, moments, group)
+
+
+def sides(form: Form, strengths: Sequence[int]) -> Array:
+    """(k,) side of off that the bounds of each strength allow, a column of the effect's values."""
+    parameters = form.variant.create().parameters
+    return np.array([parameters[column].side for column in strengths])
 
 
 def exceeded(values: Array, share: float) -> float:
