@@ -19,6 +19,9 @@ from spinepipe.units import COORDINATE_COLUMNS, from_si, less_step_0
 TABLE = RESPONSES.without("specimen")
 """A job file: the specimen is in its folder's name."""
 
+HANDED_OVER = "share_by_engine_of_record"
+"""In a file's metadata: runs whose stability nothing simpler proves."""
+
 LOADS = tuple(c.name for c in RESPONSES.columns if c.name.startswith("load_"))
 
 
@@ -26,14 +29,14 @@ def run(root: str, study: str, design: str, specimen: str, batch: str, output: s
     """Write the rows of a batch: sample by sample, test by test, step by step, joint by joint."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     one = batch_of(root, settings, cohort, design, specimen, int(batch), settings.steps == "all")
-    solved = [
-        _rows(one, test, solve_many(one.varied.spines, cases))
-        for test, cases in zip(one.start.tests, one.varied.cases, strict=True)
-    ]
+    found = [solve_many(one.varied.spines, cases) for cases in one.varied.cases]
+    solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
     columns = _columns(one, cohort.joint_names, solved)
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
     made_by = provenance("respond", settings, cohort, [specimen], size)
-    write(to_arrow(TABLE, columns), output, made_by)
+    by_engine = np.concatenate([many.by_engine for many in found])
+    handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
+    write(to_arrow(TABLE, columns), output, made_by | handed)
 
 
 class _Rows:
