@@ -7,8 +7,8 @@ import numpy as np
 
 from spinepipe.effects.contract import Array, Indices, Neutral
 from spinepipe.effects.dead_load import DeadLoad, Wrenches
-from spinepipe.statics.many.kernel import Chains, Loads
 from spinepipe.statics.many.lanes import Acting
+from spinepipe.statics.many.survey import Chains, Loads
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,12 @@ import numpy as np
 
 from spinepipe.effects import MeasurementEffect
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.many import kernel
 from spinepipe.statics.many.bound import Bound, Slopes
 from spinepipe.statics.many.dead import pushes
-from spinepipe.statics.many.kernel import part
+from spinepipe.statics.many.elimination import Changes, answers
 from spinepipe.statics.many.lanes import Acting
-from spinepipe.statics.many.stack import NONE, Stack
+from spinepipe.statics.many.stack import Stack
+from spinepipe.statics.many.survey import part, survey
 from spinepipe.statics.path import follow
 from spinepipe.statics.sensitivity import FreeParameter, by_parameters
 from spinepipe.statics.system import System
@@ -34,7 +34,9 @@ def answered(stack: Stack, q: Array, sources: Array) -> Array:
     for runs in stack.chunks(np.arange(len(stack.remembers))):
         lanes = stack.lanes(runs)
         bound = stack.bound(lanes, stack.initial_states())
-        found[lanes] = _rates(stack, lanes, bound, q[lanes], sources[lanes], NONE)
+        tangents = bound.held(q[lanes]).tangent
+        seen = survey(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
+        found[lanes], _ = answers(seen, Changes(sources[lanes]))
     return found
 
 
@@ -115,22 +117,12 @@ class _Moved:
         """(N, J, 6, m) derivative of the poses of some lanes."""
         stack = self.stack
         sources = np.negative(bound.held_by(q, slopes, states_by_x))
+        seen = survey(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
         if not self.dead:
-            return _rates(stack, lanes, bound, q, sources, NONE)
-        seen = kernel.surveyed(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
+            return answers(seen, Changes(sources))[0]
         run, listed = stack.run[lanes], part(stack.listed, lanes)
         pushed = pushes(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
-        return _rates(stack, lanes, bound, q, sources, pushed)
-
-
-def _rates(
-    stack: Stack, lanes: Indices, bound: Bound, q: Array, sources: Array, pushed: Array
-) -> Array:
-    rates, signs = np.zeros(sources.shape), np.zeros(len(q), dtype=np.int64)
-    tangents, loads = bound.held(q).tangent, part(stack.loads, lanes)
-    changes = (sources, False, pushed, NONE, NONE)
-    kernel.answers(stack.chains, loads, q, tangents, *changes, rates, signs)
-    return rates
+        return answers(seen, Changes(sources, pushed))[0]
 
 
 def observing(one: Acting) -> MeasurementEffect:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.statics.many.kernel import Survey, compiled
+from spinepipe.statics.many.survey import Survey, compiled
 
 Flags = NDArray[np.bool_]
 
@@ -146,13 +146,20 @@ def _least_beyond(pivot: Array, cross: Array, least: Array, axes: Array, joined:
 
 @compiled
 def apart(
-    seen: Survey, damping: Array, low: Array, high: Array, weight: Array, proven: Flags
+    seen: Survey,
+    inertia: Array,
+    damping: Array,
+    low: Array,
+    high: Array,
+    weight: Array,
+    proven: Flags,
 ) -> None:
     """Fill (N,): whether S - high^2 M + weight (low - i A) is positive definite.
 
     Parameters
     ----------
-    damping : (N, J, 6). low, high, weight : (N,); without weight the form is real.
+    inertia : (N, J, 6, 6) of each vertebra by its twist. damping : (N, J, 6).
+    low, high, weight : (N,); without weight the form is real.
     """
     joints = seen.axes.shape[1]
     towards, own = np.empty((6, 6)), np.empty((6, 6))
@@ -161,12 +168,12 @@ def apart(
         size = 12 if w > 0.0 else 6
         pivot, cross = np.zeros((size, size)), np.zeros((size, size))
         least, joined = np.zeros((size, size)), np.empty((size, size))
-        slopes, inertia = seen.slopes[lane], seen.inertia[lane]
+        slopes = seen.slopes[lane]
         proven[lane] = True
         for j in range(joints - 1, -1, -1):
             axes, rows, blocks = seen.axes[lane, j], seen.rows[lane, j], seen.blocks[lane, j]
             for at in range(0, size, 6):
-                _add_bodies(least, slopes, inertia, j, high[lane] ** 2, at)
+                _add_bodies(least, slopes, inertia[lane], j, high[lane] ** 2, at)
                 for r in range(6):
                     for c in range(6):
                         pivot[at + r, at + c] = 0.5 * (blocks[r, c] + blocks[c, r])

@@ -8,9 +8,9 @@ from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
-from spinepipe.statics.many.kernel import Chains, Loads
 from spinepipe.statics.many.lanes import Effects
 from spinepipe.statics.many.stack import Stack, durations
+from spinepipe.statics.many.survey import Chains, Loads
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,13 +14,16 @@ c = 0 proves nearly all spines of up to ten joints; others are proven interval b
 the rest by the rates of all their modes.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import decays
-from spinepipe.statics.many.kernel import Chains, Loads, Survey, surveyed
 from spinepipe.statics.many.proofs import apart, twists
+from spinepipe.statics.many.survey import Chains, Loads, Survey, survey
 
 Flags = NDArray[np.bool_]
 
@@ -35,41 +38,74 @@ MOST_INTERVALS = 12
 
 def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     """(N,) which lanes are stable at q (N, J, 6) with the joints' tangents (N, J, 6, 6)."""
-    seen = surveyed(chains, loads, q, tangents)
-    damping = chains.damping[loads.chain]
+    seen = survey(chains, loads, q, tangents)
+    lanes = _Lanes(seen, _inertia(chains, loads.chain, seen), chains.damping[loads.chain])
     square = np.zeros(len(q))
-    twists(seen, damping, square)
-    top = np.sqrt(square)
-    proven = _apart(seen, damping, 0.0 * top, top, 0.0 * top)
+    twists(seen, lanes.damping, square)
+    top, nothing = np.sqrt(square), np.zeros(len(q))
+    proven = lanes.apart(nothing, top, nothing)
     doubt = np.flatnonzero(~proven)
     if len(doubt):
-        proven[doubt] = _by_intervals(_part(seen, doubt), damping[doubt], top[doubt])
+        proven[doubt] = _by_intervals(lanes.part(doubt), top[doubt])
     for lane in np.flatnonzero(~proven):
-        proven[lane] = _modes_decay(_part(seen, np.array([lane])), damping[lane])
+        proven[lane] = _modes_decay(lanes.part(np.array([lane])))
     return proven
 
 
-def _part(seen: Survey, lanes: Indices) -> Survey:
-    """Some of the lanes."""
-    return Survey(*(numbers[lanes] for numbers in seen))
+@dataclass(frozen=True, eq=False)
+class _Lanes:
+    """Lanes with the inertia (N, J, 6, 6) of each vertebra by its twist, and damping (N, J, 6)."""
+
+    seen: Survey
+    inertia: Array
+    damping: Array
+
+    def part(self, lanes: Indices) -> "_Lanes":
+        """Some of them."""
+        return _Lanes(self.seen.part(lanes), self.inertia[lanes], self.damping[lanes])
+
+    def apart(self, low: Array, high: Array, weight: Array) -> Flags:
+        """(N,) whether no mode lies between two rates; see `proofs.apart`."""
+        found = np.zeros(len(low), dtype=bool)
+        apart(self.seen, self.inertia, self.damping, low, high, weight, found)
+        return found
+
+    @cached_property
+    def momenta(self) -> Array:
+        """(N, J, 6, 6) momentum by each axis of all that its joint carries."""
+        result: Array = self.seen.axes @ np.cumsum(self.inertia[:, ::-1], axis=1)[:, ::-1]
+        return result
 
 
-def _apart(seen: Survey, damping: Array, low: Array, high: Array, weight: Array) -> Flags:
-    """(N,) whether no mode lies between two rates; see `apart`."""
-    found = np.zeros(len(low), dtype=bool)
-    apart(seen, damping, low, high, weight, found)
+def _inertia(chains: Chains, chain: Indices, seen: Survey) -> Array:
+    """(N, J, 6, 6) inertia of each vertebra by its twist, about the origin of ground."""
+    centres = (seen.turned @ chains.coms[chain][..., None])[..., 0] + seen.shifted
+    mass, arms = chains.masses[chain][..., None, None], _crosses(centres)
+    found = np.zeros((*centres.shape[:2], 6, 6))
+    own = seen.turned @ chains.inertias[chain] @ seen.turned.swapaxes(2, 3)
+    found[..., :3, :3] = own - mass * arms @ arms
+    found[..., :3, 3:] = mass * arms
+    found[..., 3:, :3] = -mass * arms
+    found[..., 3:, 3:] = mass * np.eye(3)
     return found
 
 
-def _by_intervals(seen: Survey, damping: Array, top: Array) -> Flags:
+def _crosses(vectors: Array) -> Array:
+    """(..., 3, 3) matrices W with W u = vector x u."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    nothing = np.zeros_like(x)
+    rows = [[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _by_intervals(lanes: _Lanes, top: Array) -> Flags:
     """(N,) interval by interval up to top (N,)."""
     reached, nothing = np.zeros(len(top)), np.zeros(len(top))
     for share in FIRST:
         left = np.flatnonzero(reached == 0.0)
-        some = (_part(seen, left), damping[left], nothing[left])
-        good = _apart(*some, share * top[left], nothing[left])
+        good = lanes.part(left).apart(nothing[left], share * top[left], nothing[left])
         reached[left[good]] = share * top[left[good]]
-    inertia = _trace(seen, damping)
+    trace = np.sum(np.sum(lanes.momenta * lanes.seen.axes, axis=3) / lanes.damping, axis=(1, 2))
     for _ in range(MOST_INTERVALS):
         going = np.flatnonzero((reached > 0.0) & (reached < top))
         before = reached.copy()
@@ -77,57 +113,38 @@ def _by_intervals(seen: Survey, damping: Array, top: Array) -> Flags:
             for share in WEIGHTS:
                 left = going[reached[going] == before[going]]
                 low = reached[left]
-                high, weight = np.minimum(factor * low, top[left]), share * low * inertia[left]
-                good = _apart(_part(seen, left), damping[left], low, high, weight)
+                high, weight = np.minimum(factor * low, top[left]), share * low * trace[left]
+                good = lanes.part(left).apart(low, high, weight)
                 reached[left[good]] = high[good]
         if not (reached > before).any():
             break
-    found: Flags = reached >= top
-    return found & (reached > 0.0)
-
-
-def _trace(seen: Survey, damping: Array) -> Array:
-    """(N,) trace of the mass matrix where damping is one."""
-    momenta = seen.axes @ _and_beyond(seen.inertia)
-    return np.sum(np.sum(momenta * seen.axes, axis=3) / damping, axis=(1, 2))
-
-
-def _and_beyond(values: Array) -> Array:
-    """Sums over a joint's vertebra and all those cranial to it, along axis 1."""
-    result: Array = np.cumsum(values[:, ::-1], axis=1)[:, ::-1]
-    return result
-
-
-def masses(seen: Survey) -> Array:
-    """(N, n, n) mass matrices, kg, kg m and kg m2."""
-    count = len(seen.axes)
-    momenta = (seen.axes @ _and_beyond(seen.inertia)).reshape(count, -1, 6)
-    lower = np.tril(momenta @ seen.axes.reshape(count, -1, 6).swapaxes(1, 2))
-    result: Array = lower + np.tril(lower, -1).swapaxes(1, 2)
-    return result
-
-
-def stiffnesses(seen: Survey) -> Array:
-    """(N, n, n) tangents."""
-    count, joints = seen.axes.shape[:2]
-    n = 6 * joints
-    axes = seen.axes.reshape(count, n, 6).swapaxes(1, 2)
-    turned = seen.axes[..., :3] @ seen.slopes
-    down = (turned + seen.rows).reshape(count, n, 6) @ axes
-    moments = (seen.slopes @ seen.axes.swapaxes(2, 3)).swapaxes(2, 3)  # L s of each axis s
-    up = (moments.reshape(count, n, 3) @ axes[:, :3]).swapaxes(1, 2)
-    joint = np.repeat(np.arange(joints), 6)
-    found = -np.where(joint[:, None] > joint, down, up)
-    within = seen.blocks - turned @ seen.axes.swapaxes(2, 3)
-    for j in range(joints):
-        found[:, 6 * j : 6 * j + 6, 6 * j : 6 * j + 6] = within[:, j]
+    found: Flags = (reached >= top) & (reached > 0.0)
     return found
 
 
-def _modes_decay(seen: Survey, damping: Array) -> bool:
+def _modes_decay(lane: _Lanes) -> bool:
     """Of one lane, mode by mode."""
-    scale = 1.0 / np.sqrt(damping.ravel())
+    scale = 1.0 / np.sqrt(lane.damping.ravel())
     both = scale[:, None] * scale
-    mass, stiffness = masses(seen)[0] * both, stiffnesses(seen)[0] * both
+    n = len(scale)
+    lower = np.tril(lane.momenta.reshape(n, 6) @ lane.seen.axes.reshape(n, 6).T)
+    mass = (lower + np.tril(lower, -1).T) * both
+    stiffness = tangent(lane.seen) * both
     sign, _ = np.linalg.slogdet(stiffness)
     return bool(sign > 0.0 and decays(mass, stiffness))
+
+
+def tangent(seen: Survey) -> Array:
+    """(n, n) of one lane."""
+    joints = seen.axes.shape[1]
+    every = seen.axes[0].reshape(-1, 6).T
+    turned = seen.axes[0][..., :3] @ seen.slopes[0]
+    down = (turned + seen.rows[0]).reshape(-1, 6) @ every
+    moments = (seen.slopes[0] @ seen.axes[0].swapaxes(1, 2)).swapaxes(1, 2)  # L s of each axis s
+    up = (moments.reshape(-1, 3) @ every[:3]).T
+    joint = np.repeat(np.arange(joints), 6)
+    found = -np.where(joint[:, None] > joint, down, up)
+    within = seen.blocks[0] - turned @ seen.axes[0].swapaxes(1, 2)
+    for j in range(joints):
+        found[6 * j : 6 * j + 6, 6 * j : 6 * j + 6] = within[j]
+    return found

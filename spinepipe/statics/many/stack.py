@@ -15,12 +15,12 @@ from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array, Indices, Neutral
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.statics.equilibrium import LARGEST_ROTATION, MOST_ITERATIONS, STEP_TOLERANCE
-from spinepipe.statics.many import kernel
 from spinepipe.statics.many.bound import Bound, PathStates
 from spinepipe.statics.many.dead import with_dead_loads
-from spinepipe.statics.many.kernel import Chains, Loads, part
+from spinepipe.statics.many.elimination import Changes, answers
 from spinepipe.statics.many.lanes import Acting, Effects
 from spinepipe.statics.many.stability import surely_stable
+from spinepipe.statics.many.survey import Chains, Loads, part, survey
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
 from spinepipe.status import Status
@@ -32,8 +32,6 @@ Run = tuple[int, LoadCase]
 
 CHUNK = 40_000
 """Numbers in the tangents that are worked on together: they should stay in a core's cache."""
-
-NONE = np.zeros((0, 0, 0, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,14 +298,9 @@ def newton_step(
     chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array
 ) -> tuple[Array, Flags]:
     """Newton steps (N, J, 6) from q, and on which lanes there is one."""
-    signs = np.zeros(len(q), dtype=np.int64)
-    rates = np.zeros((*q.shape, 1))
-    source = np.negative(held).reshape(rates.shape)
-    kernel.answers(chains, loads, q, tangents, source, True, NONE, NONE, NONE, rates, signs)
-    step = rates[..., 0]
-    finite = np.isfinite(step).all(axis=(1, 2))
-    good: Flags = (signs != 0) & finite
-    return np.where(good[:, None, None], step, 0.0), good
+    seen = survey(chains, loads, q, tangents)
+    rates, good = answers(seen, Changes((seen.applied - held)[..., None]))
+    return rates[..., 0], good
 
 
 def _chains(models: Sequence[SpineModel]) -> Chains:

@@ -1,0 +1,305 @@
+"""Chains of joints at one pose each, in compiled loops: where they are and what their loads do.
+
+A vertebra's small displacement is a twist xi = (omega, v at the origin of ground). A joint moves by
+its six axes S. W_b is the wrench (moment about the origin, force) on vertebra b, and L_b its
+derivative by xi_b: forces do not turn and moments do not move, so that it has three rows that are
+not zero. With all wrenches beyond joint j added up, its axes' loads change by C xi when they turn
+with the twist below.
+
+What PyBullet does for one chain is done here for many; tests hold the two against each other.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, ParamSpec, TypeVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array, Indices
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Flags = NDArray[np.bool_]
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """The function as machine code, kept beside this file; division by zero is no exception."""
+    result: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
+    return result
+
+
+class Chains(NamedTuple):
+    """M chains of J joints; SI, ground axes, neutral pose.
+
+    Attributes
+    ----------
+    rotations, origins : (M, J, 3, 3) and (M, J, 3) m, joint frames.
+    masses, coms, inertias : (M, J) kg, (M, J, 3) m, (M, J, 3, 3) kg m2 about it.
+    damping : (M, J, 6) N s/m and N m s/rad. gravity : (M, 3) m/s2.
+    """
+
+    rotations: Array
+    origins: Array
+    masses: Array
+    coms: Array
+    inertias: Array
+    damping: Array
+    gravity: Array
+
+
+class Loads(NamedTuple):
+    """What acts on each of N lanes; a lane is a chain under one set of loads.
+
+    Attributes
+    ----------
+    chain : (N,) which chain it is.
+    bodies : (N, W) vertebra of each wrench, -1 for none. points : (N, W, 3) m, neutral pose.
+    forces, moments : (N, W, 3) N and N m, fixed in ground.
+    """
+
+    chain: Indices
+    bodies: Indices
+    points: Array
+    forces: Array
+    moments: Array
+
+
+def part(loads: Loads, lanes: Indices) -> Loads:
+    """The loads of some lanes."""
+    chain, bodies, points, forces, moments = loads
+    return Loads(chain[lanes], bodies[lanes], points[lanes], forces[lanes], moments[lanes])
+
+
+@compiled
+def cross_into(a: Array, b: Array, out: Array) -> None:
+    """out = a x b, (3,) each."""
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def turned_into(matrix: Array, vector: Array, out: Array) -> None:
+    """out = matrix (3, 3) times vector (3,)."""
+    for r in range(3):
+        out[r] = matrix[r, 0] * vector[0] + matrix[r, 1] * vector[1] + matrix[r, 2] * vector[2]
+
+
+@compiled
+def move(
+    rotations: Array, origins: Array, q: Array, axes: Array, turned: Array, shifted: Array
+) -> None:
+    """One chain at q (J, 6), m and rad.
+
+    Parameters
+    ----------
+    axes : (J, 6, 6), filled with the twist of each coordinate by row.
+    turned, shifted : (J, 3, 3) and (J, 3), filled with the displacement of each vertebra.
+    """
+    below, final = np.empty((3, 3)), np.empty((3, 3))
+    slid, pivot, back = np.empty(3), np.empty(3), np.empty(3)
+    for j in range(len(q)):
+        if j:
+            turned_into(turned[j - 1], origins[j], pivot)
+            for r in range(3):
+                turned_into(turned[j - 1], rotations[j, :, r], below[:, r])
+        else:
+            below[:] = rotations[j]
+            pivot[:] = origins[j]
+        turned_into(below, q[j, :3], slid)
+        for r in range(3):
+            pivot[r] += slid[r] + (shifted[j - 1, r] if j else 0.0)
+        _turn(below, q[j, 3:], pivot, axes[j], final)
+        for r in range(3):
+            for c in range(3):
+                turned[j, r, c] = 0.0
+                for i in range(3):
+                    turned[j, r, c] += final[r, i] * rotations[j, c, i]
+        turned_into(turned[j], origins[j], back)
+        for r in range(3):
+            shifted[j, r] = pivot[r] - back[r]
+
+
+@compiled
+def _turn(below: Array, angles: Array, pivot: Array, axes: Array, final: Array) -> None:
+    """Twists (6, 6) of a joint's coordinates and its frame (3, 3) after turning by Z, X', Y''."""
+    cz, sz = np.cos(angles[0]), np.sin(angles[0])
+    cx, sx = np.cos(angles[1]), np.sin(angles[1])
+    cy, sy = np.cos(angles[2]), np.sin(angles[2])
+    for r in range(3):
+        x, y, z = below[r, 0], below[r, 1], below[r, 2]
+        by_z, across = cz * x + sz * y, cz * y - sz * x
+        by_x, along = cx * across + sx * z, cx * z - sx * across
+        axes[3, r], axes[4, r], axes[5, r] = z, by_z, by_x
+        final[r, 0], final[r, 1], final[r, 2] = cy * by_z - sy * along, by_x, sy * by_z + cy * along
+        for k in range(3):
+            axes[k, r], axes[k, 3 + r] = 0.0, below[r, k]
+    for k in range(3, 6):
+        cross_into(pivot, axes[k, :3], axes[k, 3:])
+
+
+@compiled
+def _push(
+    turned: Array, shifted: Array, neutral: Array, force: Array, wrench: Array, slope: Array
+) -> None:
+    """Add a force at a vertebra's point (3,) to its wrench (6,) and the slope (3, 6) of that."""
+    point, moment = np.empty(3), np.empty(3)
+    turned_into(turned, neutral, point)
+    for r in range(3):
+        point[r] += shifted[r]
+    cross_into(point, force, moment)
+    inner = point[0] * force[0] + point[1] * force[1] + point[2] * force[2]
+    for r in range(3):
+        wrench[r] += moment[r]
+        wrench[3 + r] += force[r]
+        for c in range(3):
+            slope[r, c] += point[r] * force[c]
+        slope[r, r] -= inner
+    slope[0, 4] += force[2]
+    slope[0, 5] -= force[1]
+    slope[1, 3] -= force[2]
+    slope[1, 5] += force[0]
+    slope[2, 3] += force[1]
+    slope[2, 4] -= force[0]
+
+
+@compiled
+def _load(
+    gravity: Array,
+    masses: Array,
+    coms: Array,
+    bodies: Indices,
+    points: Array,
+    forces: Array,
+    moments: Array,
+    turned: Array,
+    shifted: Array,
+    wrenches: Array,
+    slopes: Array,
+) -> None:
+    """Wrench on each vertebra (J, 6) and its slope by the vertebra's twist, (J, 3, 6)."""
+    wrenches[:] = 0.0
+    slopes[:] = 0.0
+    if gravity[0] != 0.0 or gravity[1] != 0.0 or gravity[2] != 0.0:
+        weight = np.empty(3)
+        for b in range(len(turned)):
+            for r in range(3):
+                weight[r] = masses[b] * gravity[r]
+            _push(turned[b], shifted[b], coms[b], weight, wrenches[b], slopes[b])
+    for w in range(len(bodies)):
+        b = bodies[w]
+        if b >= 0:
+            if forces[w, 0] != 0.0 or forces[w, 1] != 0.0 or forces[w, 2] != 0.0:
+                _push(turned[b], shifted[b], points[w], forces[w], wrenches[b], slopes[b])
+            for r in range(3):
+                wrenches[b, r] += moments[w, r]
+
+
+@compiled
+def _turning_rows(axes: Array, beyond: Array, rows: Array) -> None:
+    """C (6, 6): what turning a joint under the wrench beyond (6,) adds to its axes' loads."""
+    m0, m1, m2 = beyond[0], beyond[1], beyond[2]
+    f0, f1, f2 = beyond[3], beyond[4], beyond[5]
+    for k in range(6):
+        a0, a1, a2 = axes[k, 0], axes[k, 1], axes[k, 2]
+        v0, v1, v2 = axes[k, 3], axes[k, 4], axes[k, 5]
+        rows[k, 0] = a1 * m2 - a2 * m1 + v1 * f2 - v2 * f1
+        rows[k, 1] = a2 * m0 - a0 * m2 + v2 * f0 - v0 * f2
+        rows[k, 2] = a0 * m1 - a1 * m0 + v0 * f1 - v1 * f0
+        rows[k, 3] = a1 * f2 - a2 * f1
+        rows[k, 4] = a2 * f0 - a0 * f2
+        rows[k, 5] = a0 * f1 - a1 * f0
+
+
+class Survey(NamedTuple):
+    """N lanes at one pose each: what the tangents and the mass matrices are made of.
+
+    Attributes
+    ----------
+    axes : (N, J, 6, 6) twist of each coordinate, by row.
+    applied : (N, J, 6) what the loads do to each axis.
+    rows : (N, J, 6, 6) C. blocks : (N, J, 6, 6) tangent of what the joint holds, with how its own
+        axes turn each other.
+    slopes : (N, J, 3, 6) sum of L_b over the joint's vertebra and those beyond.
+    turned, shifted : (N, J, 3, 3) and (N, J, 3) displacement of each vertebra.
+    """
+
+    axes: Array
+    applied: Array
+    rows: Array
+    blocks: Array
+    slopes: Array
+    turned: Array
+    shifted: Array
+
+    def part(self, lanes: Indices) -> "Survey":
+        """Some of the lanes."""
+        return Survey(*(numbers[lanes] for numbers in self))
+
+
+@compiled
+def _add_up(
+    axes: Array,
+    tangents: Array,
+    wrenches: Array,
+    slopes: Array,
+    applied: Array,
+    rows: Array,
+    blocks: Array,
+) -> None:
+    """From the top down: loads of the axes, C and blocks; slopes become sums."""
+    beyond = np.zeros(6)
+    for j in range(len(axes) - 1, -1, -1):
+        s = axes[j]
+        for r in range(6):
+            beyond[r] += wrenches[j, r]
+        if j + 1 < len(axes):
+            for r in range(3):
+                for c in range(6):
+                    slopes[j, r, c] += slopes[j + 1, r, c]
+        _turning_rows(s, beyond, rows[j])
+        for k in range(6):
+            applied[j, k] = 0.0
+            for i in range(6):
+                applied[j, k] += s[k, i] * beyond[i]
+            for c in range(6):
+                value = tangents[j, k, c]
+                if c < k:
+                    for i in range(6):
+                        value -= rows[j, k, i] * s[c, i]
+                blocks[j, k, c] = value
+
+
+@compiled
+def _look(chains: Chains, loads: Loads, q: Array, tangents: Array, found: Survey) -> None:
+    wrenches = np.empty((q.shape[1], 6))
+    for lane in range(len(q)):
+        chain = loads.chain[lane]
+        axes, slopes = found.axes[lane], found.slopes[lane]
+        turned, shifted = found.turned[lane], found.shifted[lane]
+        move(chains.rotations[chain], chains.origins[chain], q[lane], axes, turned, shifted)
+        _load(
+            chains.gravity[chain],
+            chains.masses[chain],
+            chains.coms[chain],
+            loads.bodies[lane],
+            loads.points[lane],
+            loads.forces[lane],
+            loads.moments[lane],
+            turned,
+            shifted,
+            wrenches,
+            slopes,
+        )
+        applied, rows, blocks = found.applied[lane], found.rows[lane], found.blocks[lane]
+        _add_up(axes, tangents[lane], wrenches, slopes, applied, rows, blocks)
+
+
+def survey(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Survey:
+    """Lanes at q (N, J, 6) whose joints hold with tangents (N, J, 6, 6)."""
+    shapes = ((6, 6), (6,), (6, 6), (6, 6), (3, 6), (3, 3), (3,))
+    found = Survey(*(np.empty((*q.shape[:2], *shape)) for shape in shapes))
+    _look(chains, loads, q, tangents, found)
+    return found
