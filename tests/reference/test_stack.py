@@ -17,11 +17,19 @@ from spinepipe.statics import (
     by_parameters,
     follow,
     free_parameters,
+    given_sensitivity,
     observe,
     observed_by_parameters,
 )
 from spinepipe.statics.equilibrium import factor
-from spinepipe.statics.many import Stack, poses_by, readings, readings_by
+from spinepipe.statics.many import (
+    Stack,
+    by_joint_pose,
+    by_load,
+    poses_by,
+    readings,
+    readings_by,
+)
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -148,3 +156,34 @@ def test_an_effect_that_takes_no_stack_is_solved_by_the_engine() -> None:
     assert poses.by_engine.tolist() == [True, False]
     expected = by_engine(heavy, case, ())[0]
     np.testing.assert_array_equal(poses.q[: len(expected)], expected)
+
+
+def test_derivatives_by_loads_and_joint_poses() -> None:
+    rng = np.random.default_rng(6)
+    shapes = [effect for effect in VARIANTS if effect.name in ("axes_tilt", "neutral_zone")]
+    runs, _ = standing([draw.model(rng, 4, [effect], 0.5) for effect in shapes])
+    stack = stack_of(runs)
+    q = stack.solve().q
+    by_frames, by_wrench = by_joint_pose(stack, q), by_load(stack, q, 1)
+    lane = 0
+    for model, case in runs:
+        system = System(Chain(model), model, case)
+        for step in follow(system):
+            there = with_tangent_there(system, step)
+            frames = given_sensitivity.by_joint_pose(system, there)
+            load = given_sensitivity.by_load(system, there, 1)
+            wrench = np.hstack([load.by_force, load.by_moment, load.by_point])
+            for one, other in (
+                (by_frames[lane].reshape(frames.shape), frames),
+                (by_wrench[lane].reshape(wrench.shape), wrench),
+            ):
+                np.testing.assert_allclose(one, other, rtol=0, atol=AGREEMENT * np.abs(other).max())
+            lane += 1
+
+
+def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it() -> None:
+    rng = np.random.default_rng(7)
+    gain = next(effect for effect in VARIANTS if effect.name == "load_gain")
+    stack = stack_of([draw.model(rng, 2, [gain])])
+    with pytest.raises(ValueError, match="load and path effects"):
+        by_joint_pose(stack, np.zeros((6, 2, 6)))

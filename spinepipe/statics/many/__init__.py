@@ -1,6 +1,7 @@
 """Many runs at once: stacks of models and tests, and spines that differ in numbers alone."""
 
 from spinepipe.statics.many.derive import answered, poses_by, readings, readings_by
+from spinepipe.statics.many.given import by_joint_pose, by_load
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
 from spinepipe.statics.many.stack import Poses, Stack
@@ -12,6 +13,8 @@ __all__ = [
     "Spines",
     "Stack",
     "answered",
+    "by_joint_pose",
+    "by_load",
     "poses_by",
     "readings",
     "readings_by",
