@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.many.survey import Survey, compiled
+from spinepipe.statics.many.survey import Plain, Survey, compiled
 
 Flags = NDArray[np.bool_]
 
@@ -131,15 +131,16 @@ def _add_product(matrix: Array, vectors: Array, out: Array) -> None:
 
 
 @compiled
-def _carry(seen: Survey, changes: Changes, rates: Array, signs: Indices) -> None:
+def _carry(seen: Plain, changes: Plain, rates: Array, signs: Indices) -> None:
     """Fill rates (N, J, 6, m) and the signs (N,) of the tangents' determinants, 0 for no answer."""
+    every_axes, _, rows, blocks, every_slopes, _, _ = seen
     sources, pushes, lower, upper = changes
     joints, m = sources.shape[1], sources.shape[3]
     pushed, displaced = pushes.shape[3] > 0, lower.shape[3] > 0
     matrix, gains = np.empty((6, 6)), np.empty((joints, 6, 6 + m))  # u = gains (xi, 1)
     slope, passed, twist = np.empty((3, 6)), np.empty((6, m)), np.empty((6, m))
     for lane in range(len(sources)):
-        axes, slopes = seen.axes[lane], seen.slopes[lane]
+        axes, slopes = every_axes[lane], every_slopes[lane]
         slope[:] = 0.0
         passed[:] = 0.0
         sign = 1
@@ -154,7 +155,7 @@ def _carry(seen: Survey, changes: Changes, rates: Array, signs: Indices) -> None
                 passed += pushes[lane, j]
             if displaced:
                 _add_product(slope, upper[lane, j], passed)
-            _below(axes[j], seen.rows[lane, j], seen.blocks[lane, j], slope, matrix, right)
+            _below(axes[j], rows[lane, j], blocks[lane, j], slope, matrix, right)
             right[:, 6:] = sources[lane, j]
             _add_product(axes[j], passed, right[:, 6:])
             sign *= _eliminate(matrix, right)
@@ -183,7 +184,7 @@ def _carry(seen: Survey, changes: Changes, rates: Array, signs: Indices) -> None
 def answers(seen: Survey, changes: Changes) -> tuple[Array, Flags]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; where there is."""
     rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
-    _carry(seen, changes, rates, signs)
+    _carry(tuple(seen), tuple(changes), rates, signs)
     good: Flags = (signs != 0) & np.isfinite(rates).all(axis=(1, 2, 3))
     rates[~good] = 0.0
     return rates, good

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.statics.many.survey import Survey, compiled
+from spinepipe.statics.many.survey import Plain, compiled
 
 Flags = NDArray[np.bool_]
 
@@ -79,11 +79,11 @@ def _twist(axes: Array, rows: Array, blocks: Array, slopes: Array, damping: Arra
 
 
 @compiled
-def twists(seen: Survey, damping: Array, found: Array) -> None:
+def twists(seen: Plain, damping: Array, found: Array) -> None:
     """Fill (N,): no less than |A|^2; damping (N, J, 6)."""
+    axes, _, rows, blocks, slopes, _, _ = seen
     for lane in range(len(found)):
-        axes, rows, blocks = seen.axes[lane], seen.rows[lane], seen.blocks[lane]
-        found[lane] = _twist(axes, rows, blocks, seen.slopes[lane], damping[lane])
+        found[lane] = _twist(axes[lane], rows[lane], blocks[lane], slopes[lane], damping[lane])
 
 
 @compiled
@@ -146,7 +146,7 @@ def _least_beyond(pivot: Array, cross: Array, least: Array, axes: Array, joined:
 
 @compiled
 def apart(
-    seen: Survey,
+    seen: Plain,
     inertia: Array,
     damping: Array,
     low: Array,
@@ -161,17 +161,18 @@ def apart(
     inertia : (N, J, 6, 6) of each vertebra by its twist. damping : (N, J, 6).
     low, high, weight : (N,); without weight the form is real.
     """
-    joints = seen.axes.shape[1]
+    every_axes, _, every_rows, every_blocks, every_slopes, _, _ = seen
+    joints = every_axes.shape[1]
     towards, own = np.empty((6, 6)), np.empty((6, 6))
     for lane in range(len(proven)):
         w = weight[lane]
         size = 12 if w > 0.0 else 6
         pivot, cross = np.zeros((size, size)), np.zeros((size, size))
         least, joined = np.zeros((size, size)), np.empty((size, size))
-        slopes = seen.slopes[lane]
+        slopes = every_slopes[lane]
         proven[lane] = True
         for j in range(joints - 1, -1, -1):
-            axes, rows, blocks = seen.axes[lane, j], seen.rows[lane, j], seen.blocks[lane, j]
+            axes, rows, blocks = every_axes[lane, j], every_rows[lane, j], every_blocks[lane, j]
             for at in range(0, size, 6):
                 _add_bodies(least, slopes, inertia[lane], j, high[lane] ** 2, at)
                 for r in range(6):

@@ -41,7 +41,7 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
     seen = survey(chains, loads, q, tangents)
     lanes = _Lanes(seen, _inertia(chains, loads.chain, seen), chains.damping[loads.chain])
     square = np.zeros(len(q))
-    twists(seen, lanes.damping, square)
+    twists(tuple(seen), lanes.damping, square)
     top, nothing = np.sqrt(square), np.zeros(len(q))
     proven = lanes.apart(nothing, top, nothing)
     doubt = np.flatnonzero(~proven)
@@ -67,7 +67,7 @@ class _Lanes:
     def apart(self, low: Array, high: Array, weight: Array) -> Flags:
         """(N,) whether no mode lies between two rates; see `proofs.apart`."""
         found = np.zeros(len(low), dtype=bool)
-        apart(self.seen, self.inertia, self.damping, low, high, weight, found)
+        apart(tuple(self.seen), self.inertia, self.damping, low, high, weight, found)
         return found
 
     @cached_property

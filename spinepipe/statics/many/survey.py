@@ -10,13 +10,17 @@ What PyBullet does for one chain is done here for many; tests hold the two again
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
+
+Plain = tuple[NDArray[Any], ...]
+"""Arrays as compiled code takes them: what is kept of a compilation must not name our classes,
+for it is read again before one knows whether they have changed."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -273,33 +277,34 @@ def _add_up(
 
 
 @compiled
-def _look(chains: Chains, loads: Loads, q: Array, tangents: Array, found: Survey) -> None:
+def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) -> None:
+    """Fill the parts of a survey."""
+    rotations, origins, masses, coms, _, _, gravity = chains
+    chain_of, bodies, points, forces, moments = loads
+    axes, applied, rows, blocks, slopes, turned, shifted = found
     wrenches = np.empty((q.shape[1], 6))
-    for lane in range(len(q)):
-        chain = loads.chain[lane]
-        axes, slopes = found.axes[lane], found.slopes[lane]
-        turned, shifted = found.turned[lane], found.shifted[lane]
-        move(chains.rotations[chain], chains.origins[chain], q[lane], axes, turned, shifted)
+    for n in range(len(q)):
+        chain = chain_of[n]
+        move(rotations[chain], origins[chain], q[n], axes[n], turned[n], shifted[n])
         _load(
-            chains.gravity[chain],
-            chains.masses[chain],
-            chains.coms[chain],
-            loads.bodies[lane],
-            loads.points[lane],
-            loads.forces[lane],
-            loads.moments[lane],
-            turned,
-            shifted,
+            gravity[chain],
+            masses[chain],
+            coms[chain],
+            bodies[n],
+            points[n],
+            forces[n],
+            moments[n],
+            turned[n],
+            shifted[n],
             wrenches,
-            slopes,
+            slopes[n],
         )
-        applied, rows, blocks = found.applied[lane], found.rows[lane], found.blocks[lane]
-        _add_up(axes, tangents[lane], wrenches, slopes, applied, rows, blocks)
+        _add_up(axes[n], tangents[n], wrenches, slopes[n], applied[n], rows[n], blocks[n])
 
 
 def survey(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Survey:
     """Lanes at q (N, J, 6) whose joints hold with tangents (N, J, 6, 6)."""
     shapes = ((6, 6), (6,), (6, 6), (6, 6), (3, 6), (3, 3), (3,))
     found = Survey(*(np.empty((*q.shape[:2], *shape)) for shape in shapes))
-    _look(chains, loads, q, tangents, found)
+    _look(tuple(chains), tuple(loads), q, tangents, tuple(found))
     return found

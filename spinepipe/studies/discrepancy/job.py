@@ -4,8 +4,10 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 """
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,7 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import fitted_values, model_file
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store
@@ -111,7 +114,7 @@ def run(
     """Write the verdict, its tables and the two model files of a study."""
     settings, cohort = study_of_kind(Discrepancy, root, study)
     store = Store(Path(verdict).parent / STORE, __name__)
-    results = searched(settings, cohort, root, store)
+    results = searched(settings, cohort, root, store, Progress(partial(_say, study)))
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
     files = {
         gap: GAP,
@@ -130,12 +133,18 @@ def run(
     store.forget_the_rest()
 
 
-def searched(study: Discrepancy, cohort: Cohort, root: str, run: Run) -> Results:
+def _say(study: str, line: str) -> None:
+    print(f"{study}: {line}", file=sys.stderr, flush=True)
+
+
+def searched(
+    study: Discrepancy, cohort: Cohort, root: str, run: Run, progress: Progress | None = None
+) -> Results:
     """All that the files of a study hold, whether or not its base has a fit."""
     file = None if study.base.model is None else read_model(Path(root) / study.base.model)
     ready = prepared(study, cohort, file)
     try:
-        ended = investigate(ready, run)
+        ended = investigate(ready, run, progress)
     except NoBase as trouble:
         return _without_base(ready, trouble)
     return _with_base(ready, ended, run)

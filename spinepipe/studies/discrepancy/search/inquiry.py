@@ -11,6 +11,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import Supposed, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -155,8 +156,8 @@ def linearised_for(
 class Inquiry:
     """Looks, refits and fits by the rules, from the base alone on; ``stages`` is the log."""
 
-    def __init__(self, base: Grounds, rules: Rules, run: Run) -> None:
-        self.base, self.rules, self.run = base, rules, run
+    def __init__(self, base: Grounds, rules: Rules, run: Run, progress: Progress) -> None:
+        self.base, self.rules, self.run, self.progress = base, rules, run, progress
         self.stages: list[Stage] = []
 
     @property
@@ -177,6 +178,11 @@ class Inquiry:
             screen, tried = self.first.screen, self.first.refits
         else:
             screen = self._look(grounds)
+            best = screen.effects[0]
+            self.progress.round(
+                f"round {len(self.stages) + 1}: {best.effect} leads {len(screen.effects)} effects "
+                f"with log evidence {best.log_evidence:.1f}, {screen.threshold:.1f} are needed"
+            )
             evident = not screen.effects[0].log_evidence <= screen.threshold
             tried = self._refits(grounds, screen) if place or evident else ()
         number = 1 + sum(one.in_place == place for one in self.stages)
@@ -198,7 +204,7 @@ class Inquiry:
 
     def _refits(self, grounds: Grounds, screen: Screen) -> tuple[Refit, ...]:
         """The forms that lead a screen, refitted; best first."""
-        return refits(grounds, screen, self.rules.trials, self.run)
+        return refits(grounds, screen, self.rules.trials, self.run, self.progress)
 
     def refit(self, grounds: Grounds, one: Supposed) -> Refit:
         """One form beside those of the grounds' fit."""

@@ -27,6 +27,7 @@ from spinepipe.studies.discrepancy.search.noise import (
 from spinepipe.studies.discrepancy.search.nuisance import as_si
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.search.prediction import recorded
+from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy
@@ -92,7 +93,7 @@ def prepared(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prep
     return Prepared(study, cohort, file, coordinates, measured, readings, noise, declared)
 
 
-def investigate(ready: Prepared, run: Run) -> Investigation:
+def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> Investigation:
     """All that decides the verdict of a study.
 
     Raises
@@ -102,7 +103,7 @@ def investigate(ready: Prepared, run: Run) -> Investigation:
     """
     study, rules = ready.study, _rules(ready)
     grounds = _laid(ready, run)
-    found = search(grounds, rules, run)
+    found = search(grounds, rules, run, progress)
     for fit in (found.base.fit, found.final.fit):
         run(on_record, fit, grounds.readings)
     errors = suspected_errors(grounds, ready.measured, run)

@@ -18,6 +18,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Variant,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
+from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, Tried
 from spinepipe.studies.discrepancy.store import Run
 
@@ -62,15 +63,19 @@ class Refit:
 
 
 def refits(
-    grounds: Grounds, screen: Screen, trials: Sequence[Trials], run: Run
+    grounds: Grounds,
+    screen: Screen,
+    trials: Sequence[Trials],
+    run: Run,
+    progress: Progress,
 ) -> tuple[Refit, ...]:
     """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
     by_name = {one.effect: one for one in trials}
     there = {one.form.variant for one in standing(grounds.fit)}
+    new = [tried for tried in leading(screen) if tried.form.variant not in there]
     found = [
         refit(grounds, started(tried), by_name[tried.form.name], run)
-        for tried in leading(screen)
-        if tried.form.variant not in there
+        for tried in progress.through(new, "refits")
     ]
     found += [
         refit(grounds, simple, by_name[simple.form.name], run)

@@ -25,6 +25,7 @@ from spinepipe.studies.discrepancy.search.inquiry import (
     Standing,
 )
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
+from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.refit import Refit, standing
 from spinepipe.studies.discrepancy.search.screen import Screen, exceeded
 from spinepipe.studies.discrepancy.store import Run
@@ -52,9 +53,9 @@ LEVELS = "level_dependence"
 """The effect by which joints differ in stiffness."""
 
 
-def search(base: Grounds, rules: Rules, run: Run) -> Found:
+def search(base: Grounds, rules: Rules, run: Run, progress: Progress | None = None) -> Found:
     """Effects that the base lacks; none where rivals keep taking each other's place."""
-    inquiry = Inquiry(base, rules, run)
+    inquiry = Inquiry(base, rules, run, progress or Progress())
     base_gap = whole_gap(base, base.fit)
     lack_of_base = inquiry.lack(base)
     current = _forward(base, inquiry, base_gap)
