@@ -38,31 +38,44 @@ MOST_INTERVALS = 12
 
 def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     """(N,) which lanes are stable at q (N, J, 6) with the joints' tangents (N, J, 6, 6)."""
-    seen = survey(chains, loads, q, tangents)
-    lanes = _Lanes(seen, _inertia(chains, loads.chain, seen), chains.damping[loads.chain])
-    square = np.zeros(len(q))
-    twists(tuple(seen), lanes.damping, square)
-    top, nothing = np.sqrt(square), np.zeros(len(q))
+    lanes = lanes_of(chains, loads, q, tangents)
+    proven = proven_by_forms(lanes)
+    for lane in np.flatnonzero(~proven):
+        mass, stiffness = matrices(lanes.part(np.array([lane])))
+        sign, _ = np.linalg.slogdet(stiffness)
+        proven[lane] = sign > 0.0 and decays(mass, stiffness)
+    return proven
+
+
+def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "Lanes":
+    """Lanes at q (N, J, 6) with all that decides their stability."""
+    seen, chain = survey(chains, loads, q, tangents), loads.chain
+    return Lanes(seen, _inertia(chains, chain, seen), chains.damping[chain])
+
+
+def proven_by_forms(lanes: "Lanes") -> Flags:
+    """(N,) which lanes are proven stable without the rates of their modes."""
+    square = np.zeros(len(lanes.damping))
+    twists(tuple(lanes.seen), lanes.damping, square)
+    top, nothing = np.sqrt(square), np.zeros(len(square))
     proven = lanes.apart(nothing, top, nothing)
     doubt = np.flatnonzero(~proven)
     if len(doubt):
         proven[doubt] = _by_intervals(lanes.part(doubt), top[doubt])
-    for lane in np.flatnonzero(~proven):
-        proven[lane] = _modes_decay(lanes.part(np.array([lane])))
     return proven
 
 
 @dataclass(frozen=True, eq=False)
-class _Lanes:
+class Lanes:
     """Lanes with the inertia (N, J, 6, 6) of each vertebra by its twist, and damping (N, J, 6)."""
 
     seen: Survey
     inertia: Array
     damping: Array
 
-    def part(self, lanes: Indices) -> "_Lanes":
+    def part(self, lanes: Indices) -> "Lanes":
         """Some of them."""
-        return _Lanes(self.seen.part(lanes), self.inertia[lanes], self.damping[lanes])
+        return Lanes(self.seen.part(lanes), self.inertia[lanes], self.damping[lanes])
 
     def apart(self, low: Array, high: Array, weight: Array) -> Flags:
         """(N,) whether no mode lies between two rates; see `proofs.apart`."""
@@ -98,7 +111,7 @@ def _crosses(vectors: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _by_intervals(lanes: _Lanes, top: Array) -> Flags:
+def _by_intervals(lanes: Lanes, top: Array) -> Flags:
     """(N,) interval by interval up to top (N,)."""
     reached, nothing = np.zeros(len(top)), np.zeros(len(top))
     for share in FIRST:
@@ -122,19 +135,15 @@ def _by_intervals(lanes: _Lanes, top: Array) -> Flags:
     return found
 
 
-def _modes_decay(lane: _Lanes) -> bool:
-    """Of one lane, mode by mode."""
+def matrices(lane: Lanes) -> tuple[Array, Array]:
+    """Mass matrix and tangent (n, n) of one lane, where damping is one."""
     scale = 1.0 / np.sqrt(lane.damping.ravel())
-    both = scale[:, None] * scale
-    n = len(scale)
+    both, n = scale[:, None] * scale, len(scale)
     lower = np.tril(lane.momenta.reshape(n, 6) @ lane.seen.axes.reshape(n, 6).T)
-    mass = (lower + np.tril(lower, -1).T) * both
-    stiffness = tangent(lane.seen) * both
-    sign, _ = np.linalg.slogdet(stiffness)
-    return bool(sign > 0.0 and decays(mass, stiffness))
+    return (lower + np.tril(lower, -1).T) * both, _tangent(lane.seen) * both
 
 
-def tangent(seen: Survey) -> Array:
+def _tangent(seen: Survey) -> Array:
     """(n, n) of one lane."""
     joints = seen.axes.shape[1]
     every = seen.axes[0].reshape(-1, 6).T

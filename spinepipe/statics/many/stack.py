@@ -235,13 +235,13 @@ class Stack:
 
     def _settled(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """Poses (N, J, 6) of lanes from poses near by, and which are stable equilibria for sure."""
-        q, tangents, arrived = self._newton(lanes, start, states)
+        q, tangents, arrived = self.newton(lanes, start, states)
         there = np.flatnonzero(arrived)
         loads = part(self.loads, lanes[there])
         arrived[there] = surely_stable(self.chains, loads, q[there], tangents[there])
         return q, arrived
 
-    def _newton(
+    def newton(
         self, lanes: Indices, start: Array, states: PathStates
     ) -> tuple[Array, Array, Flags]:
         """Poses (N, J, 6), tangents there (N, J, 6, 6), and which lanes have arrived (N,).

@@ -25,7 +25,7 @@ class Progress:
     """
 
     say: Callable[[str], None] = silent
-    _last: float = field(default_factory=time.monotonic)
+    _last: float = field(default_factory=lambda: time.monotonic())
 
     def round(self, line: str) -> None:
         """A line of its own."""

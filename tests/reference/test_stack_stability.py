@@ -1,0 +1,92 @@
+"""What a stack takes for stable, against PyBullet's mass matrix and the rates of all modes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinepipe.effects.contract import Array
+from spinepipe.statics import System
+from spinepipe.statics.equilibrium import decays
+from spinepipe.statics.many import stability
+from spinepipe.statics.many.stack import Stack
+from spinepipe.statics.many.survey import part
+from spinepipe.world import Chain
+from tests.reference import bridge
+from tests.reference.peers import chain as chains
+
+pytestmark = pytest.mark.numeric
+
+Matrices = tuple[Array, Array]
+
+
+def loaded(rng: np.random.Generator, n_joints: int, size: float, soft: float) -> chains.Chain:
+    """A random chain with so many times its usual loads and share of its stiffness."""
+    chain = chains.random_chain(rng, n_joints)
+    loads = [replace(one, force=size * one.force, moment=size * one.moment) for one in chain.loads]
+    return chain.with_loads(*loads).with_stiffness(soft * np.asarray(chain.stiffness))
+
+
+def stack_of(made: list[chains.Chain]) -> Stack:
+    models = [bridge.spine_model(chain) for chain in made]
+    return Stack.of(models, [(n, bridge.load_case(chain)) for n, chain in enumerate(made)])
+
+
+def by_pybullet(chain: chains.Chain, q: Array) -> Matrices:
+    """Mass matrix and tangent at q (J, 6), where damping is one."""
+    model = bridge.spine_model(chain)
+    system = System(Chain(model), model, bridge.load_case(chain))
+    loading = system.slots.loading(system.case.steps[0].wrenches)
+    tangent = system.balance(q.ravel(), loading, system.initial_states()).tangent
+    scale = 1.0 / np.sqrt(model.damping.ravel())
+    both = scale[:, None] * scale
+    return system.chain.mass_matrix(q.ravel()) * both, tangent * both
+
+
+@pytest.mark.parametrize("n_joints", [1, 3, 6, 17])
+def test_tangents_and_mass_matrices_are_pybullet_s(n_joints: int) -> None:
+    rng = np.random.default_rng(n_joints)
+    chain = loaded(rng, n_joints, 1.0, 1.0)
+    stack = stack_of([chain])
+    q = rng.normal(0.0, 0.05, (1, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
+    tangents = stack.bound(np.array([0]), {}).held(q).tangent
+    lanes = stability.lanes_of(stack.chains, stack.loads, q, tangents)
+    mass, tangent = stability.matrices(lanes)
+    expected_mass, expected_tangent = by_pybullet(chain, q[0])
+    np.testing.assert_allclose(
+        mass, expected_mass, rtol=0, atol=1e-11 * np.abs(expected_mass).max()
+    )
+    largest = np.abs(expected_tangent).max()
+    np.testing.assert_allclose(tangent, expected_tangent, rtol=0, atol=1e-11 * largest)
+
+
+@pytest.mark.parametrize(
+    ("n_joints", "size", "softest", "unstable"),
+    [
+        (1, 4.0, 0.02, 0),
+        (3, 1.5, 0.1, 0),
+        (6, 1.0, 0.1, 0),
+        (12, 0.3, 0.05, 0),
+        (20, 0.12, 0.05, 5),
+    ],
+)
+def test_what_is_proven_is_what_decays(
+    n_joints: int, size: float, softest: float, unstable: int
+) -> None:
+    """Chains that stand well and such as tip over; nearly all proofs do without eigenvalues."""
+    rng = np.random.default_rng(100 + n_joints)
+    made = [loaded(rng, n_joints, size, soft) for soft in np.linspace(softest, 1.0, 24)]
+    stack = stack_of(made)
+    everything = np.arange(len(made))
+    q, tangents, arrived = stack.newton(everything, np.zeros((len(made), n_joints, 6)), {})
+    there = np.flatnonzero(arrived)
+    loads = part(stack.loads, there)
+    stands = np.array([decays(*by_pybullet(made[n], q[n])) for n in there.tolist()])
+    assert len(there) > 10
+    assert (~stands).sum() >= unstable
+    proven = stability.surely_stable(stack.chains, loads, q[there], tangents[there])
+    assert proven.tolist() == stands.tolist()
+    lanes = stability.lanes_of(stack.chains, loads, q[there], tangents[there])
+    by_forms = stability.proven_by_forms(lanes)
+    assert not (by_forms & ~stands).any()
+    assert by_forms.sum() >= 0.9 * stands.sum()

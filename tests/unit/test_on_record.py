@@ -1,0 +1,39 @@
+"""Final poses against the engine of record: rounding passes, an error is told, a snap is a snap."""
+
+import numpy as np
+import pytest
+from example_effects import loaded, spine
+
+from spinepipe.calibrate.solvers import Disagreement, by_record, on_record
+
+
+def poses() -> tuple[object, list[object], list[np.ndarray]]:
+    model = spine(2)
+    cases = [loaded(model)]
+    record = by_record(model, cases)
+    assert record is not None
+    return model, cases, [q.copy() for q in record]
+
+
+def test_what_agrees_is_handed_back_as_recorded() -> None:
+    model, cases, own = poses()
+    own[0] += 1e-15
+    record = on_record(model, cases, own, same=1e-7)  # type: ignore[arg-type]
+    assert record is not None
+    assert (record[0] != own[0]).any()
+
+
+def test_a_small_difference_is_an_error_with_both_numbers() -> None:
+    model, cases, own = poses()
+    right = own[0][1, 9]
+    own[0][1, 9] += 2e-8
+    with pytest.raises(Disagreement) as told:
+        on_record(model, cases, own, same=1e-7)  # type: ignore[arg-type]
+    assert f"{right:.17g}" in str(told.value)
+    assert f"{own[0][1, 9]:.17g}" in str(told.value)
+
+
+def test_a_large_difference_is_another_pose() -> None:
+    model, cases, own = poses()
+    own[0][1, 9] += 1e-3
+    assert on_record(model, cases, own, same=1e-7) is None  # type: ignore[arg-type]
