@@ -24,8 +24,8 @@ from spinepipe.calibrate.forward_runs import (
     relative_error,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadStep, SpineModel
-from spinepipe.statics import Course, Program, System, settle
+from spinepipe.model import LoadCase, LoadStep, SpineModel
+from spinepipe.statics import Course, Program, settle
 from spinepipe.studies.joint_pose_sensitivity import bootstrap
 from spinepipe.studies.joint_pose_sensitivity import poses as build_models
 from spinepipe.studies.joint_pose_sensitivity import poses as sample_landmarks
@@ -89,13 +89,14 @@ class OpenSimCost(ForwardCost):
         super().__init__(problem, SECONDS, ACCURACY, MOST_EVALUATIONS)
         self._built: dict[tuple[str, int, int], opensim_peer.OpenSimChain] = {}
 
-    def end(self, system: System, step: LoadStep) -> Array | None:
+    def end(self, model: SpineModel, case: LoadCase) -> Array | None:
         """(n,) pose at the end of OpenSim's run; None when CPodes stops early."""
-        key = (system.case.test, system.case.cycle, step.step)
+        (step,) = case.steps
+        key = (case.test, case.cycle, step.step)
         if key not in self._built:
-            self._built[key] = opensim_peer.build(peer_chain(system.model, step))
+            self._built[key] = opensim_peer.build(peer_chain(model, step))
         built = self._built[key]
-        opensim_peer.set_stiffness(built, system.model.effects[0].values)
+        opensim_peer.set_stiffness(built, model.effects[0].values)
         try:
             return opensim_peer.settle_of(built, self.duration_s, accuracy=self.accuracy).ravel()
         except RuntimeError:

@@ -3,7 +3,8 @@
 from spinepipe.calibrate.fit import Fit, Optimum, fit
 from spinepipe.calibrate.pooled_specimen import PooledSpecimen
 from spinepipe.calibrate.pooling import CohortSpread, Pooled, pool
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, needed
+from spinepipe.calibrate.solvers import by_record
 from spinepipe.calibrate.uncertainty import Uncertainty
 from spinepipe.model import MeasuredCase
 
@@ -18,6 +19,8 @@ __all__ = [
     "PooledSpecimen",
     "Problem",
     "Uncertainty",
+    "by_record",
     "fit",
+    "needed",
     "pool",
 ]

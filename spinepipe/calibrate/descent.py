@@ -52,7 +52,6 @@ def descend(
     scale: Array,
     size: int,
     settled: Settled,
-    look: Callable[[Array], None] | None = None,
 ) -> Descent:
     """Least squares from a start that has an equilibrium.
 
@@ -60,7 +59,6 @@ def descend(
     ----------
     start : (m,), inside the bounds (m,) each. scale : (m,) size of a first step.
     size : number of residuals.
-    look : called with each point that is taken; stops the descent by `StopIteration`.
     """
     nowhere = np.full(size, np.nan)
 
@@ -83,6 +81,5 @@ def descend(
         xtol=settled.step,
         gtol=settled.slope,
         max_nfev=settled.evaluations,
-        callback=look,
     )
     return Descent(result.x, float(result.cost), bool(result.success), int(result.nfev))

@@ -4,20 +4,25 @@ An optimum counts only where the cost is level, or held by a bound, and where th
 poses from the neutral pose.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
+from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.statics import moved
 from spinepipe.status import Status
+
+At = Callable[[Array], Evaluation]
+"""What there is with the unknowns at x (m,)."""
 
 STIFFENING = 2.0
 """Factor by which a start without a stable equilibrium is stiffened, again and again."""
@@ -41,9 +46,6 @@ START_SPREAD = 30.0
 
 SAME_OPTIMUM = 1e-3
 """Optima whose identifiable unknowns agree to this (logarithms, or prior SDs) are one."""
-
-ARRIVED = 1e-4
-"""A descent this close to a known optimum, in all unknowns, would end in it."""
 
 CLOSE = 10.0
 """An optimum this many last steps away, by slope and curvature, is reached."""
@@ -127,9 +129,9 @@ def fit(
         refuse_correlated(problem)
     evaluator = Evaluator(problem)
     problem = evaluator.problem
-    optima: list[Optimum] = []
-    for x in _start_points(problem, starts, seed):
-        optima.append(_descend(evaluator, x, optima))
+    points = _start_points(problem, starts, seed)
+    descents = [partial(_descend, evaluator, start) for start in points]
+    optima = _on_record(evaluator, in_lockstep(descents, evaluator.together))
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
     return Fit(
@@ -153,7 +155,7 @@ def _best(optima: Sequence[Optimum]) -> Optimum:
     """The optimum of least cost; of equal ones the first, so that extra starts change nothing."""
     usable = [optimum for optimum in optima if optimum.status.usable] or list(optima)
     least = min(optimum.cost for optimum in usable)
-    return next(o for o in usable if not o.cost > least * (1.0 + COST_TIE) + 1e-12)
+    return next(optimum for optimum in usable if not _worse(optimum, least))
 
 
 def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
@@ -168,38 +170,26 @@ def _start_points(problem: Problem, starts: int, seed: int) -> list[Array]:
     return points
 
 
-def _descend(evaluator: Evaluator, start: Array, known: Sequence[Optimum]) -> Optimum:
-    """Least squares from one start; the start is stiffened until it has a stable equilibrium.
-
-    A descent that has come so close to a known optimum that both count as one ends there.
-    """
+def _descend(evaluator: Evaluator, start: Array, at: At) -> Optimum:
+    """Least squares from one start; the start is stiffened until it has a stable equilibrium."""
     problem = evaluator.problem
-    standing, stiffened = stand_up(evaluator, start)
+    standing, stiffened = stand_up(problem, at, start)
     if standing is None:
         nowhere = Evaluation(None, None, (), evaluator.coordinate, evaluator.sharing)
         x = problem.upper.copy()
         at_bound = np.ones(len(x), dtype=int)
         return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, TIPPED, 0, stiffened)
-    return _least_squares(evaluator, standing, stiffened, known)
+    return _least_squares(evaluator, at, standing, stiffened)
 
 
-def _least_squares(
-    evaluator: Evaluator, start: Array, stiffened: int, known: Sequence[Optimum]
-) -> Optimum:
+def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -> Optimum:
     problem = evaluator.problem
-    arrived: list[Optimum] = []
 
     def point(x: Array) -> tuple[Array, Array] | None:
-        found = evaluator.at(on_bounds(problem, x))
+        found = at(on_bounds(problem, x))
         if found.residual is None or found.jacobian is None:
             return None
         return found.residual, found.jacobian
-
-    def stop_where_known(x: Array) -> None:
-        for optimum in known:
-            if np.abs((x - optimum.x) / problem.scale).max() < ARRIVED:
-                arrived.append(optimum)
-                raise StopIteration
 
     ended = descend(
         point,
@@ -208,22 +198,13 @@ def _least_squares(
         problem.scale,
         len(evaluator.coordinate),
         _settled(problem),
-        stop_where_known,
     )
-    if arrived:
-        return replace(arrived[0], stiffened=stiffened)
     x = on_bounds(problem, ended.x)
-    at_bound, evaluation = bounds_reached(problem, x), evaluator.at(x)
+    at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)
     status, message = _verdict(problem, ended.arrived or level, at_bound)
     if status.usable and not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
-    if problem.course is None and status.usable:
-        record = evaluator.on_record(x)
-        if record is None:
-            status, message = Status.NOT_CONVERGED, OFF_THE_PATH
-        else:
-            evaluation = record
     return Optimum(
         x,
         at_bound,
@@ -234,6 +215,33 @@ def _least_squares(
         ended.evaluations,
         stiffened,
     )
+
+
+def _on_record(evaluator: Evaluator, optima: Sequence[Optimum]) -> list[Optimum]:
+    """The optima as the engine of record has them; one that an earlier one ties with goes by it."""
+    found: list[Optimum] = []
+    for optimum in optima:
+        twin = next((one for one in found if _ties(one, optimum, evaluator.problem.scale)), None)
+        if twin is not None:
+            found.append(replace(optimum, status=twin.status, message=twin.message))
+            continue
+        record = evaluator.on_record(optimum.x) if optimum.status.usable else optimum.evaluation
+        if record is None:
+            lost = Status.NOT_CONVERGED
+            found.append(replace(optimum, status=lost, message=OFF_THE_PATH))
+        else:
+            found.append(replace(optimum, evaluation=record))
+    return found
+
+
+def _ties(one: Optimum, other: Optimum, scale: Array) -> bool:
+    """Whether one would be taken for the best in place of another that is the same."""
+    close = np.abs(one.x - other.x).max(initial=0.0) < SAME_OPTIMUM * scale.min(initial=1.0)
+    return other.status.usable and close and not _worse(one, other.cost)
+
+
+def _worse(optimum: Optimum, least: float) -> bool:
+    return optimum.cost > least * (1.0 + COST_TIE) + 1e-12
 
 
 def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bool:
@@ -280,12 +288,12 @@ def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_], scale: 
     return bool(close.all()) and tie
 
 
-def stand_up(evaluator: Evaluator, start: Array) -> tuple[Array | None, int]:
+def stand_up(problem: Problem, at: At, start: Array) -> tuple[Array | None, int]:
     """The start, stiffened by factors of two until it stands; None when the bounds do not help."""
-    problem, stiffened = evaluator.problem, 0
+    stiffened = 0
     stiffness = np.array([parameter.logarithmic for parameter in problem.free])
     step = np.where(stiffness, np.log(STIFFENING), 0.0)
-    while evaluator.at(start).residual is None:
+    while at(start).residual is None:
         if np.all(start[stiffness] >= problem.upper[stiffness]):
             return None, stiffened
         start = np.minimum(start + step, problem.upper)

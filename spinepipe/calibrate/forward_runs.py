@@ -39,15 +39,14 @@ from typing import Any
 import numpy as np
 from scipy.differentiate import jacobian
 from scipy.integrate import ode
-from scipy.linalg.lapack import dpotrf, dpotrs
 from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
 from spinepipe.calibrate.problem import Evaluator, Problem
+from spinepipe.calibrate.solvers import steps_alone
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadStep, RefusedModel
-from spinepipe.statics import Course, Loading, System, moved, no_settling, observe
-from spinepipe.statics.holding import NO_STATES
-from spinepipe.statics.motion import ChainMotion
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.statics import Course, moved, no_settling, observe
+from spinepipe.statics.many import Moving, Stack, survey
 from spinepipe.status import Status
 
 ABSOLUTE_SHARE = 0.1
@@ -58,13 +57,17 @@ MOST_STEPS = 5000
 
 
 def forward_run(
-    system: System, loading: Loading, duration_s: float, accuracy: float
+    model: SpineModel, case: LoadCase, duration_s: float, accuracy: float
 ) -> Array | None:
     """(n,) pose after a time under constant load, from rest in the neutral pose; None if lost.
 
     The caller sees to it that the chain has inertia and no path effects.
+
+    Parameters
+    ----------
+    case : of one load step.
     """
-    motion = _Motion(system, loading)
+    motion = _Motion(Stack.of([model], [(0, case)]))
     integrator = ode(motion.rate).set_integrator(
         "lsoda",
         rtol=accuracy,
@@ -72,40 +75,39 @@ def forward_run(
         nsteps=MOST_STEPS,
         with_jacobian=True,  # its own, by differences: no user of these tools has an exact one
     )
-    integrator.set_initial_value(np.zeros(2 * system.chain.n), 0.0)
+    integrator.set_initial_value(np.zeros(2 * motion.n), 0.0)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # why a run is lost: the caller learns that it is
         end: Array = integrator.integrate(duration_s)
-    pose = end[: system.chain.n]
+    pose = end[: motion.n]
     return pose if integrator.successful() and np.isfinite(pose).all() else None
 
 
 class _Motion:
-    """The damped equations of motion under a constant load, as a first-order system."""
+    """The damped equations of motion of a stack's one lane, as a first-order system."""
 
-    def __init__(self, system: System, loading: Loading) -> None:
-        self.system, self.loading = system, loading
-        self.damping = system.model.damping.ravel()
-        self.gravity = loading.share * system.model.gravity
-        self._pose, self._held, self._lower = b"", np.empty(0), np.empty(0)
+    def __init__(self, stack: Stack) -> None:
+        self.stack, self.n = stack, 6 * stack.joints
+        self.bound = stack.bound(np.zeros(1, dtype=np.int64), {})
+        self.damping = stack.chains.damping.reshape(1, -1, 6)
+        self._pose = b""
 
     def rate(self, _time: float, state: Array) -> Array:
         """(2n,) rate of change of pose and rate."""
-        q, rate = state[: self.system.chain.n], state[self.system.chain.n :]
+        q, rate = state.reshape(2, 1, -1, 6)
         self._place(q)
-        inertia_and_weight = self.system.chain.bias(q, rate, self.gravity)
-        force = -self._held - inertia_and_weight - self.damping * rate
-        acceleration, _ = dpotrs(self._lower, force, lower=True)
-        return np.concatenate([rate, acceleration])
+        force = self._missing - self._moving.inertial(rate) - self.damping * rate
+        acceleration = self._moving.accelerations(force.reshape(1, -1))
+        return np.concatenate([state[self.n :], acceleration[0]])
 
     def _place(self, q: Array) -> None:
         """What depends on the pose alone; asked for again when only rates have been varied."""
         if q.tobytes() == self._pose:
             return
-        chain = self.system.chain
-        motion = ChainMotion(chain, q)
-        self._held = self.system.weightless_residual(motion, self.loading, NO_STATES)
-        self._lower, _ = dpotrf(chain.mass_matrix(q), lower=True)
+        held = self.bound.held(q)
+        seen = survey(self.stack.chains, self.stack.loads, q, held.tangent)
+        self._missing = seen.applied - held.load
+        self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)
         self._pose = q.tobytes()
 
 
@@ -150,23 +152,20 @@ class ForwardCost(Evaluator):
             self.costs[point] = self._run(x)
         return self.costs[point]
 
-    def end(self, system: System, step: LoadStep) -> Array | None:
-        """(n,) pose at the end of the run under a load step; None when the run is lost."""
-        loading = system.slots.loading(step.wrenches)
-        return forward_run(system, loading, self.duration_s, self.accuracy)
+    def end(self, model: SpineModel, case: LoadCase) -> Array | None:
+        """(n,) pose at the end of the run under a case's one step; None when the run is lost."""
+        return forward_run(model, case, self.duration_s, self.accuracy)
 
     def _run(self, x: Array) -> float:
         model = moved(self.problem.model, self.problem.free, x)
-        known: dict[tuple[object, ...], Array | None] = {}  # cycles repeat their loads
+        known: dict[bytes, Array | None] = {}  # cycles repeat their loads
         total = 0.0
         for number, system in enumerate(self._systems):
             there = system.with_model(model)
             ends = []
-            for step in there.case.steps:
-                loading = there.slots.loading(step.wrenches)
-                key = (there.case.test, there.slots, loading.key)
+            for key, case in steps_alone(system.case):
                 if key not in known:
-                    known[key] = self.end(there, step)
+                    known[key] = self.end(model, case)
                 ends.append(known[key])
             poses = [end for end in ends if end is not None]
             if len(poses) < len(ends):

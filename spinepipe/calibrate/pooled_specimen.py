@@ -88,7 +88,7 @@ class Member:
             self.refusal = str(refused)
             return
         self.problem = self.evaluator.problem
-        standing, _ = stand_up(self.evaluator, self.clipped(start))
+        standing, _ = stand_up(self.problem, self.evaluator.at, self.clipped(start))
         if standing is not None:
             self.x, self.evaluation = standing, self.evaluator.at(standing)
             self.trial = (self.x, self.evaluation)
@@ -208,7 +208,7 @@ class Member:
             return Status.UNSTABLE, TIPPED
         if not self.arrived:
             return Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
-        if self.problem.course is None and self.evaluator.on_record(self.x) is None:
+        if self.evaluator.on_record(self.x) is None:
             return Status.NOT_CONVERGED, OFF_THE_PATH
         if at_bound.any():
             return Status.CONVERGED_AT_BOUND, names_at_bound(self.problem, at_bound)

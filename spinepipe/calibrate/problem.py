@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, Settling, on_record
+from spinepipe.calibrate.solvers import AtRest, Seen, Settling, held_against
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
@@ -102,12 +102,7 @@ class Evaluator:
             When nothing that was measured has a weight, or the engine refuses the model, or a
             course is asked of a model that cannot move in time.
         """
-        cases = (_needed(problem, case) for case in problem.cases)
-        problem = replace(
-            problem, cases=tuple(case for case in cases if _used(case, problem.weights).any())
-        )
-        if not problem.cases:
-            raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
+        problem = replace(problem, cases=needed(problem))
         bounds = within_declared(problem.model, problem.free, problem.lower, problem.upper)
         self.problem = problem = replace(problem, lower=bounds[0], upper=bounds[1])
         chain = Chain(problem.model)
@@ -121,7 +116,7 @@ class Evaluator:
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         loads = [case.case for case in problem.cases]
         self._solver: AtRest | Settling = (
-            Settling(self._systems, problem.free, problem.course)
+            Settling(problem.model, loads, problem.free, problem.course)
             if problem.course
             else AtRest(problem.model, loads, problem.free, problem.scale)
         )
@@ -135,14 +130,18 @@ class Evaluator:
 
     def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,); known points are recalled."""
-        point = x.tobytes()
-        if point not in self._known:
-            self._known[point] = self._evaluate(x)
-        return self._known[point]
+        return self.together([(0, x)])[0]
 
-    def _evaluate(self, x: Array) -> Evaluation:
-        self.evaluations += 1
-        seen = self._solver.solve(x)
+    def together(self, points: Sequence[tuple[int, Array]]) -> list[Evaluation]:
+        """The same at x (m,) of several searches, each with its number."""
+        new = [(number, x) for number, x in points if x.tobytes() not in self._known]
+        if new:
+            self.evaluations += len(new)
+            for (_, x), seen in zip(new, self._solver.solve(new), strict=True):
+                self._known[x.tobytes()] = self._evaluation(seen)
+        return [self._known[x.tobytes()] for _, x in points]
+
+    def _evaluation(self, seen: Seen | str) -> Evaluation:
         if isinstance(seen, str):
             return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
         residual = np.concatenate(
@@ -154,7 +153,7 @@ class Evaluator:
         return Evaluation(residual, jacobian, seen.poses, self.coordinate, self.sharing)
 
     def on_record(self, x: Array) -> Evaluation | None:
-        """The point at rest as the engine of record has it; None where loads lead elsewhere.
+        """The point as the engine of record has it; None where the loads lead elsewhere.
 
         Raises
         ------
@@ -163,7 +162,7 @@ class Evaluator:
         """
         found, problem = self.at(x), self.problem
         model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
-        poses = on_record(model, cases, found.poses, SAME_POSE)
+        poses = held_against(self._solver.record(x), model, cases, found.poses, SAME_POSE)
         if poses is None:
             return None
         chain = self._systems[0].chain
@@ -205,7 +204,21 @@ def sharing(
     return np.concatenate(numbers)
 
 
-def _needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
+def needed(problem: Problem) -> tuple[MeasuredCase, ...]:
+    """The cases with readings that enter the cost, and the load steps that these need.
+
+    Raises
+    ------
+    RefusedModel
+        When nothing that was measured has a weight.
+    """
+    read = [case for case in problem.cases if _used(case, problem.weights).any()]
+    if not read:
+        raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
+    return tuple(_steps_needed(problem, case) for case in read)
+
+
+def _steps_needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
     """The case without the steps that neither carry a reading nor a path to those that do."""
     if measured.zeroed or any(s.effect.kind is Kind.PATH for s in problem.model.effects):
         return measured

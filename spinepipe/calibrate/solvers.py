@@ -1,29 +1,18 @@
 """Where the loads bring a model, what is read there, and how that depends on the unknowns.
 
-At rest the stack of all load steps is solved; runs that settle are followed one by one.
+All load steps are solved together; those that settle, with the runs that tell the derivatives.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import (
-    END_ONLY,
-    Course,
-    FreeParameter,
-    Loading,
-    System,
-    follow,
-    move,
-    moved,
-    observe,
-    observed_by_parameters,
-    settled_by_parameters,
-)
-from spinepipe.statics.many import Stack, poses_by, readings, readings_by
+from spinepipe.statics import Course, FreeParameter, System, follow, moved, retrace
+from spinepipe.statics.many import Stack, poses_by, readings, readings_by, settle
+from spinepipe.statics.settling import STEP
 from spinepipe.world import Chain
 
 
@@ -43,7 +32,7 @@ class Seen:
 
 
 class AtRest:
-    """Stable equilibria; each point starts from the last one, corrected to first order."""
+    """Stable equilibria; each search starts from its last point, corrected to first order."""
 
     def __init__(
         self,
@@ -54,82 +43,149 @@ class AtRest:
     ) -> None:
         """``reach`` (m,): how far from a point first order is trusted."""
         self._model, self._free, self._reach = model, free, reach
-        self._stack = Stack.of([model], [(0, case) for case in cases])
-        self._last: tuple[Array, Array, Array] | None = None
+        self._cases = tuple(cases)
+        self._stacks = _Stacks(model, self._cases)
+        self._last: dict[int, tuple[Array, Array, Array]] = {}
 
     def forget(self) -> None:
-        """Start the next point from the neutral pose."""
-        self._last = None
+        """Start the next points from the neutral pose."""
+        self._last.clear()
 
-    def solve(self, x: Array) -> Seen | str:
-        """What is seen with the unknowns at x (m,), or why there is nothing."""
-        stack = self._stack.with_models([moved(self._model, self._free, x)])
-        found = stack.solve(self._guess(x))
-        if found.trouble:
-            return found.trouble[1]
-        q = found.q
-        dq = poses_by(stack, q, [self._free])
-        self._last = (x.copy(), q, dq)
-        ends = stack.first[1:-1]
-        return Seen(
-            tuple(np.split(q.reshape(len(q), -1), ends)),
-            tuple(np.split(readings(stack, q), ends)),
-            tuple(np.split(readings_by(stack, q, dq, [self._free]), ends)),
-        )
+    def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
+        """What is seen with the unknowns at x (m,), or why there is nothing.
 
-    def _guess(self, x: Array) -> Array | None:
-        """(L, J, 6) poses to start from at another point, to first order."""
-        if self._last is None:
+        Parameters
+        ----------
+        points : x of each of some searches, with the search's number.
+        """
+        models = [moved(self._model, self._free, x) for _, x in points]
+        stack, unknowns = self._stacks.of(models), [self._free] * len(points)
+        found = stack.solve(self._guesses(points, stack), why=False)
+        q = np.where(np.isnan(found.q), 0.0, found.q)
+        dq = poses_by(stack, q, unknowns)
+        seen, by_x = readings(stack, q), readings_by(stack, q, dq, unknowns)
+        ends, each = stack.first[1 : len(self._cases)], len(q) // len(points)
+        result: list[Seen | str] = []
+        for at, (number, x) in enumerate(points):
+            own = slice(each * at, each * (at + 1))
+            bad = np.flatnonzero(np.isnan(found.q[own, 0, 0]))
+            if len(bad):
+                result.append(found.messages[own.start + int(bad[0])])
+                continue
+            self._last[number] = (x.copy(), q[own], dq[own])
+            poses = q[own].reshape(each, -1)
+            parts = (tuple(np.split(one, ends)) for one in (poses, seen[own], by_x[own]))
+            result.append(Seen(*parts))
+        return result
+
+    def _guesses(self, points: Sequence[tuple[int, Array]], stack: Stack) -> Array | None:
+        """(L, J, 6) poses to start from, to first order; NaN for searches that have none."""
+        if not self._last:
             return None
-        there, q, dq = self._last
-        guess: Array = q + dq @ np.clip(x - there, -self._reach, self._reach)
-        return guess
+        nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
+        guesses = []
+        for number, x in points:
+            if number not in self._last:
+                guesses.append(nothing)
+                continue
+            there, q, dq = self._last[number]
+            guesses.append(q + dq @ np.clip(x - there, -self._reach, self._reach))
+        return np.concatenate(guesses)
+
+    def record(self, x: Array) -> tuple[Array, ...] | str:
+        """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
+        return by_record(moved(self._model, self._free, x), self._cases)
+
+
+class _Stacks:
+    """Stacks of so many models that differ from one in values only, in the same cases."""
+
+    def __init__(self, model: SpineModel, cases: Sequence[LoadCase]) -> None:
+        self._model, self._cases = model, cases
+        self._known: dict[int, Stack] = {}
+
+    def of(self, models: Sequence[SpineModel]) -> Stack:
+        """The stack of these models, each in all cases."""
+        count = len(models)
+        if count not in self._known:
+            runs = [(number, case) for number in range(count) for case in self._cases]
+            self._known[count] = Stack.of([self._model] * count, runs)
+        return self._known[count].with_models(models)
 
 
 class Settling:
-    """Poses a time after each load step came on, from rest in the neutral pose."""
+    """Poses a time after each load step came on, from rest in the neutral pose.
+
+    Derivatives are differences over the same steps in time, see `spinepipe.statics.settling`.
+    """
 
     def __init__(
-        self, systems: Sequence[System], free: Sequence[FreeParameter], course: Course
+        self,
+        model: SpineModel,
+        cases: Sequence[LoadCase],
+        free: Sequence[FreeParameter],
+        course: Course,
     ) -> None:
         """``course``: how each step's load comes on and when the pose is read."""
-        self._systems, self._free, self._course = systems, free, course
+        self._model, self._free, self._course = model, free, course
+        alone = [steps_alone(case) for case in cases]
+        known = {key: step for steps in alone for key, step in steps}  # cycles repeat their loads
+        places = {key: number for number, key in enumerate(known)}
+        self._cases = list(known.values())
+        self._lanes = [np.array([places[key] for key, _ in steps]) for steps in alone]
+        self._stacks = _Stacks(model, self._cases)
+        self._sizes: dict[bytes, Mapping[int, tuple[float, ...]]] = {}
 
     def forget(self) -> None:
         """Nothing: each run starts from the neutral pose."""
 
-    def solve(self, x: Array) -> Seen | str:
-        """What is seen with the unknowns at x (m,), or why there is nothing."""
-        known: dict[tuple[object, ...], tuple[Array, Array]] = {}  # cycles repeat their loads
-        poses, seen, by_x = [], [], []
-        for same in self._systems:
-            system = same.with_model(moved(same.model, self._free, x))
-            ends = []
-            for step in system.case.steps:
-                loading = system.slots.loading(step.wrenches)
-                key = (system.case.test, system.slots, loading.key)
-                if key not in known:
-                    found = self._end(system, loading)
-                    if isinstance(found, str):
-                        return found
-                    known[key] = found
-                ends.append(known[key])
-            poses.append(np.stack([q for q, _ in ends]))
-            seen.append(np.stack([observe(system, q) for q, _ in ends]))
-            slopes = [observed_by_parameters(system, q, dq, self._free) for q, dq in ends]
-            by_x.append(np.stack(slopes))
-        return Seen(tuple(poses), tuple(seen), tuple(by_x))
+    def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
+        """What is seen with the unknowns at x (m,), or why there is nothing.
 
-    def _end(self, system: System, loading: Loading) -> tuple[Array, Array] | str:
-        """End pose (n,) and its derivative (n, m), or why there is none."""
-        program = self._course.program(loading)
-        end = move(system, program, self._course.duration_s, coarseness=END_ONLY)
-        if not end.status.usable:
-            return end.message
-        derivative = settled_by_parameters(system, program, end, self._free)
-        if derivative is None:
-            return "the run does not repeat with slightly other stiffness"
-        return end.q, derivative
+        Parameters
+        ----------
+        points : x of each of some searches, with the search's number.
+        """
+        return [self._solved(x) for _, x in points]
+
+    def _solved(self, x: Array) -> Seen | str:
+        base, steps = moved(self._model, self._free, x), STEP * np.eye(len(x))
+        models = [base, *(moved(base, self._free, step) for step in steps)]
+        count = len(self._cases)
+        ends = settle(self._stacks.of(models), self._course, np.tile(np.arange(count), len(models)))
+        self._sizes[x.tobytes()] = ends.sizes
+        if ends.trouble:
+            return ends.trouble[min(ends.trouble)]
+        every = ends.q.reshape(len(models), count, -1, 6)
+        dq = np.moveaxis((every[1:] - every[0]) / STEP, 0, -1)
+        there = self._stacks.of([base])
+        seen, by_x = readings(there, every[0]), readings_by(there, every[0], dq, [self._free])
+        poses = every[0].reshape(count, -1)
+        return Seen(*(tuple(one[at] for at in self._lanes) for one in (poses, seen, by_x)))
+
+    def record(self, x: Array) -> tuple[Array, ...] | str:
+        """The poses (T, n) of every case by the engine of record, over the steps of `solve`."""
+        model, sizes = moved(self._model, self._free, x), self._sizes[x.tobytes()]
+        chain = Chain(model)
+        ends = []
+        for number, case in enumerate(self._cases):
+            system = System(chain, model, case)
+            program = self._course.program(system.slots.loading(case.steps[0].wrenches))
+            end = retrace(system, program, sizes[number])
+            if end is None:
+                return "over the same steps of time the run is lost"
+            ends.append(end)
+        return tuple(np.stack([ends[number] for number in at]) for at in self._lanes)
+
+
+def steps_alone(case: LoadCase) -> list[tuple[bytes, LoadCase]]:
+    """Each load step as a case of its own, and what tells it from others."""
+    found = []
+    for step in case.steps:
+        loads = [[w.body, *w.point, *w.force, *w.moment] for w in step.wrenches]
+        key = case.test.encode() + np.array(loads, dtype=float).tobytes()
+        found.append((key, replace(case, steps=(step,))))
+    return found
 
 
 class Disagreement(RuntimeError):
@@ -143,19 +199,37 @@ LEAST_MOTION = np.array([1e-4] * 3 + [1e-3] * 3)
 """m and rad: smaller motion is held against this."""
 
 
-def by_record(model: SpineModel, cases: Sequence[LoadCase]) -> tuple[Array, ...] | None:
-    """(T, n) poses of every case by the engine of record, from the neutral pose; None of none."""
+def by_record(model: SpineModel, cases: Sequence[LoadCase]) -> tuple[Array, ...] | str:
+    """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
     chain = Chain(model)
-    solved = [follow(System(chain, model, case)) for case in cases]
-    if not all(step.usable for case in solved for step in case):
-        return None
-    return tuple(np.stack([step.equilibrium.q for step in case]) for case in solved)
+    found = []
+    for case in cases:
+        solved = follow(System(chain, model, case))
+        for step in solved:
+            if not step.usable:
+                return step.equilibrium.message
+        found.append(np.stack([step.equilibrium.q for step in solved]))
+    return tuple(found)
 
 
 def on_record(
     model: SpineModel, cases: Sequence[LoadCase], poses: Sequence[Array], same: float
 ) -> tuple[Array, ...] | None:
     """The poses (T, n) of a stack as the engine of record has them, from the neutral pose.
+
+    See `held_against`.
+    """
+    return held_against(by_record(model, cases), model, cases, poses, same)
+
+
+def held_against(
+    record: tuple[Array, ...] | str,
+    model: SpineModel,
+    cases: Sequence[LoadCase],
+    poses: Sequence[Array],
+    same: float,
+) -> tuple[Array, ...] | None:
+    """The record's poses (T, n) of every case, held against those of a stack.
 
     Parameters
     ----------
@@ -166,8 +240,7 @@ def on_record(
     Disagreement
         For a smaller difference that is no rounding error.
     """
-    record = by_record(model, cases)
-    if record is None:
+    if isinstance(record, str):
         return None
     for case, one, other in zip(cases, poses, record, strict=True):
         apart = np.abs(one - other).reshape(len(one), -1, 6)

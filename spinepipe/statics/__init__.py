@@ -13,21 +13,19 @@ from spinepipe.statics.sensitivity import (
     observed_by_parameters,
 )
 from spinepipe.statics.settling import (
-    END_ONLY,
     Course,
     Program,
     Settled,
     move,
     no_settling,
+    retrace,
     settle,
-    settled_by_parameters,
 )
 from spinepipe.statics.system import Balance, Loading, Slots, System
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
 __all__ = [
-    "END_ONLY",
     "Balance",
     "Chain",
     "Course",
@@ -53,6 +51,6 @@ __all__ = [
     "no_settling",
     "observe",
     "observed_by_parameters",
+    "retrace",
     "settle",
-    "settled_by_parameters",
 ]

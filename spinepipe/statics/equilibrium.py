@@ -63,6 +63,9 @@ class Stability:
 
 MOST_ITERATIONS = 12
 
+FIRST_INCREMENT = 0.25
+"""Fraction of a load that is tried when it does not come on at once."""
+
 SMALLEST_FRACTION = 1.0 / 1024.0
 """Continuation gives up when a load increment this small does not contract."""
 
@@ -126,7 +129,7 @@ def solve(
 def _continue(
     system: System, start: Array, loading_from: Loading, loading_to: Loading, states: States
 ) -> Equilibrium:
-    reached, increment, iterations = 0.0, 0.25, 0
+    reached, increment, iterations = 0.0, FIRST_INCREMENT, 0
     last: _Newton | None = None
     verdict: Stability | None = None
     while reached < 1.0:

@@ -16,6 +16,7 @@ smooth: on L1-L4 a difference is within 1e-6 of the derivative.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
@@ -24,7 +25,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics.equilibrium import LARGEST_ROTATION, solve
 from spinepipe.statics.holding import NO_STATES
 from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.sensitivity import FreeParameter, moved
 from spinepipe.statics.system import Loading, System
 from spinepipe.status import Status
 
@@ -79,11 +79,31 @@ class Course:
         """The program that ends in a loading."""
         if self.ramp_s == 0.0:
             return Program.constant(loading)
-        count = max(1, round(self.ramp_s * self.steps_per_s))
         weight = replace(loading, forces=0.0 * loading.forces, moments=0.0 * loading.moments)
-        shares = np.linspace(0.0, 1.0, count + 1)
-        loadings = tuple(weight.towards(loading, share) for share in shares)
-        return Program(tuple((self.ramp_s * shares).tolist()), loadings)
+        shares = self.shares(self.corners)
+        loadings = tuple(weight.towards(loading, share) for share in shares.tolist())
+        return Program(tuple(self.corners.tolist()), loadings)
+
+    @cached_property
+    def corners(self) -> Array:
+        """(T,) s, times at which the load is given, straight in between; the first is 0."""
+        count = max(1, round(self.ramp_s * self.steps_per_s))
+        return self.ramp_s * np.linspace(0.0, 1.0, count + 1) if self.ramp_s else np.zeros(1)
+
+    def shares(self, times: Array) -> Array:
+        """Share of the load that is on at each of the times."""
+        return np.clip(times / self.ramp_s, 0.0, 1.0) if self.ramp_s else np.ones_like(times)
+
+    def corners_after(self, times: Array) -> Array:
+        """The next time at which the load changes its rate, for each of the times; or infinity."""
+        corners = np.append(self.corners, np.inf)
+        following: Array = corners[np.searchsorted(corners, _just_after(times), side="right")]
+        return following
+
+
+def _just_after(time: Array) -> Array:
+    """Times that are a corner but for rounding put behind it."""
+    return time * (1.0 + 1e-12) + 1e-15
 
 
 GAMMA = 4.3586652150845900e-01
@@ -135,6 +155,9 @@ ABSOLUTE_TOLERANCE = np.array([4e-9] * 3 + [4e-7] * 3)
 END_ONLY = 10.0
 """Coarser tolerances where only the end counts: early errors decay. On L1-L4 after 1.5 s and after
 a ramp of 1 s it moves the end by less than 1e-4 of any coordinate."""
+
+STEP = 1e-6
+"""Change of an unknown: well above rounding and well below where the retraced end bends."""
 
 _WEIGHTLESS = np.zeros(3)  # where weight is part of the residual
 
@@ -225,6 +248,12 @@ def no_settling(system: System) -> str | None:
     return None
 
 
+def new_size(size: float, error: float) -> float:
+    """The step to try after one of that size and scaled error."""
+    growth = 0.9 * max(error, 1e-3) ** (-1.0 / 3.0) if np.isfinite(error) else 0.2
+    return size * float(np.clip(growth, 0.2, 6.0))
+
+
 class _Run:
     """Integration state: pose, rate, time and step size."""
 
@@ -261,10 +290,9 @@ class _Run:
             size = min(self.size, limit - self.time)
             q, rate, error = self._try(size)
             accepted = bool(np.isfinite(error)) and error <= 1.0
-            growth = 0.9 * max(error, 1e-3) ** (-1.0 / 3.0) if np.isfinite(error) else 0.2
             if accepted:
                 self._arrive(q, rate, size)
-            self.size = size * float(np.clip(growth, 0.2, 6.0))
+            self.size = new_size(size, error)
             if accepted:
                 return self._within_motion()
 
@@ -358,22 +386,3 @@ def _between(
         + s**2 * (s - 1) * span * v1
     )
     return value
-
-
-STEP = 1e-6
-"""Change of an unknown: well above rounding and well below where the retraced end bends."""
-
-
-def settled_by_parameters(
-    system: System, program: Program, settled: Settled, free: Sequence[FreeParameter]
-) -> Array | None:
-    """(n, m) derivative of the end pose by the unknowns; None where a retraced run is lost."""
-    columns = []
-    for number in range(len(free)):
-        x = np.zeros(len(free))
-        x[number] = STEP
-        there = retrace(system.with_model(moved(system.model, free, x)), program, settled.sizes)
-        if there is None:
-            return None
-        columns.append((there - settled.q) / STEP)
-    return np.column_stack(columns)

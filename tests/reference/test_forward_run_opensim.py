@@ -13,9 +13,7 @@ BENDING = Load(2, moment=np.array([7.5, 0.0, -3.0]))
 
 
 def ours(chain: Chain, duration_s: float, accuracy: float = ACCURACY) -> Array:
-    system = bridge.system(chain)
-    loading = system.slots.loading(system.case.steps[0].wrenches)
-    end = forward_run(system, loading, duration_s, accuracy)
+    end = forward_run(bridge.spine_model(chain), bridge.load_case(chain), duration_s, accuracy)
     assert end is not None
     return end.reshape(-1, 6)
 

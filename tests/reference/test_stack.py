@@ -8,7 +8,8 @@ import pytest
 import random_stacks as draw
 from example_effects import ExtraWeight
 
-from spinepipe.effects import Effect
+from spinepipe.effects import Effect, Kind
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
     FreeParameter,
@@ -30,6 +31,7 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
+from spinepipe.statics.many.survey import Flags
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -125,6 +127,45 @@ def test_random_effects_beside_each_other(n_joints: int) -> None:
     runs, _ = standing(drawn)
     assert len(runs) >= 4
     compare(runs)
+
+
+@pytest.mark.parametrize(("n_joints", "share"), [(1, 20.0), (3, 10.0), (8, 3.0)])
+def test_loads_that_do_not_come_on_at_once(
+    n_joints: int, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loads that some chains carry only in fractions, and others not at all: as the engine says."""
+    rng = np.random.default_rng(40 + n_joints)
+    effects = [effect for effect in VARIANTS if effect.kind is not Kind.PATH]
+    drawn = [
+        draw.model(rng, n_joints, [effects[int(rng.integers(len(effects)))]], share)
+        for _ in range(16)
+    ]
+    stack, continued = stack_of(drawn), []
+    at_once = Stack._continued
+
+    def counted(self: Stack, lanes: Indices, start: Array) -> tuple[Array, Flags]:
+        q, good = at_once(self, lanes, start)
+        continued.extend(good.tolist())
+        return q, good
+
+    monkeypatch.setattr(Stack, "_continued", counted)
+    found = stack.solve(why=False)
+    assert not found.by_engine.any()
+    standing = 0
+    for number, (model, case) in enumerate(drawn):
+        lanes = stack.lanes(np.array([number]))
+        solved = follow(System(Chain(model), model, case))
+        stands = all(step.usable for step in solved)
+        assert (found.status[lanes] == Status.CONVERGED.value).all() == stands
+        if stands:
+            standing += 1
+            expected = np.reshape([step.equilibrium.q for step in solved], found.q[lanes].shape)
+            np.testing.assert_allclose(found.q[lanes], expected, rtol=0, atol=AGREEMENT)
+        else:
+            assert np.isnan(found.q[lanes]).all()
+    assert 4 <= standing < len(drawn)
+    assert any(continued)
+    assert not all(continued)
 
 
 def test_guesses_change_nothing() -> None:

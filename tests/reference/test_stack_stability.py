@@ -9,8 +9,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import System
 from spinepipe.statics.equilibrium import decays
 from spinepipe.statics.many import stability
+from spinepipe.statics.many.dynamics import Factored, Moving
+from spinepipe.statics.many.newton import newton
 from spinepipe.statics.many.stack import Stack
-from spinepipe.statics.many.survey import part
+from spinepipe.statics.many.survey import part, survey
 from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
@@ -60,6 +62,30 @@ def test_tangents_and_mass_matrices_are_pybullet_s(n_joints: int) -> None:
     np.testing.assert_allclose(tangent, expected_tangent, rtol=0, atol=1e-11 * largest)
 
 
+@pytest.mark.parametrize("n_joints", [1, 3, 6, 17])
+def test_inertia_is_pybullet_s(n_joints: int) -> None:
+    """Mass matrices, what inertia asks for at given rates, and the accelerations that answer."""
+    rng = np.random.default_rng(20 + n_joints)
+    made = [loaded(rng, n_joints, 1.0, 1.0) for _ in range(3)]
+    stack = stack_of(made)
+    q = rng.normal(0.0, 0.05, (3, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
+    rates, forces = rng.normal(size=q.shape), rng.normal(size=(3, 6 * n_joints))
+    tangents = stack.bound(np.arange(3), {}).held(q).tangent
+    seen = survey(stack.chains, stack.loads, q, tangents)
+    moving = Moving.of(stack.chains, stack.loads.chain, seen)
+    inertial, accelerations = moving.inertial(rates), moving.accelerations(forces)
+    solved = Factored(moving.mass).solve(forces)
+    for lane, chain in enumerate(made):
+        engine = Chain(bridge.spine_model(chain))
+        mass = engine.mass_matrix(q[lane].ravel())
+        bias = engine.bias(q[lane].ravel(), rates[lane].ravel(), np.zeros(3))
+        for found, expected in ((moving.mass[lane], mass), (inertial[lane].ravel(), bias)):
+            tolerance = 1e-12 * np.abs(expected).max()
+            np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
+        for found in (accelerations[lane], solved[lane]):
+            np.testing.assert_allclose(mass @ found, forces[lane], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("n_joints", "size", "softest", "unstable"),
     [
@@ -77,8 +103,9 @@ def test_what_is_proven_is_what_decays(
     rng = np.random.default_rng(100 + n_joints)
     made = [loaded(rng, n_joints, size, soft) for soft in np.linspace(softest, 1.0, 24)]
     stack = stack_of(made)
-    everything = np.arange(len(made))
-    q, tangents, arrived = stack.newton(everything, np.zeros((len(made), n_joints, 6)), {})
+    q, tangents, arrived = newton(
+        stack.chains, stack.loads, lambda some: stack.bound(some, {}), np.zeros((24, n_joints, 6))
+    )
     there = np.flatnonzero(arrived)
     loads = part(stack.loads, there)
     stands = np.array([decays(*by_pybullet(made[n], q[n])) for n in there.tolist()])

@@ -254,7 +254,7 @@ def test_stiffening_leaves_offsets_where_they_are() -> None:
         lower=np.array([-1.0, -1.0, -1.0, -0.02]),
         upper=np.array([6.0, 6.0, 6.0, 0.02]),
     )
-    start, times = stand_up(Evaluator(soft), np.zeros(4))
+    start, times = stand_up(soft, Evaluator(soft).at, np.zeros(4))
     assert times > 0
     assert start[3] == 0.0
 

@@ -7,7 +7,7 @@ import pytest
 from example_effects import loaded, spine
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
-from spinepipe.calibrate.solvers import Settling
+from spinepipe.calibrate.solvers import Seen, Settling
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics import (
@@ -16,11 +16,12 @@ from spinepipe.statics import (
     Loading,
     System,
     free_parameters,
+    many,
     move,
     moved,
-    settle,
-    settled_by_parameters,
 )
+from spinepipe.statics.many import Stack
+from spinepipe.statics.settling import END_ONLY
 from spinepipe.status import Status
 from spinepipe.world import Chain
 from tests.reference import bridge
@@ -90,10 +91,7 @@ def test_the_derivative_of_the_end_is_that_of_fine_runs(course: Course) -> None:
     for x in step * np.eye(len(free)):
         after, before = (sampled(moved(model, free, s * x), case, course)[0] for s in (1, -1))
         expected.append((after - before) / (2.0 * step))
-    system = System(Chain(model), model, case)
-    program = course.program(system.slots.loading(case.steps[0].wrenches))
-    settled = settle(system, program, course.duration_s)
-    found = settled_by_parameters(system, program, settled, free)
+    found = ends(model, case, free, course).by_x[0]
     for kind in (slice(0, 3), slice(3, 6)):
         wanted, there = (a.reshape(2, 6, -1)[:, kind] for a in (np.array(expected).T, found))
         # the end itself is known to 1e-3
@@ -108,23 +106,51 @@ def tipping() -> tuple[SpineModel, LoadCase]:
     return model, loaded(model, 1)
 
 
-def test_a_run_that_does_not_repeat_has_no_derivative() -> None:
-    model, case = tipping()
-    system = System(Chain(model), model, case)
-    program = QUASI_STATIC.program(system.slots.loading(case.steps[0].wrenches))
-    settled = settle(system, program, 0.002)
-    onwards = replace(settled, sizes=(0.002,) * 1000)
-    free = free_parameters(model, 0, ROTATIONS, "per_specimen")
-    assert settled_by_parameters(system, program, onwards, free) is None
+def test_a_run_that_cannot_take_the_steps_of_another_is_lost() -> None:
+    standing, (tipping_over, case) = spine(1), tipping()
+    stack = Stack.of([standing, tipping_over], [(0, case), (1, case)])
+    found = many.settle(stack, Course(3.0), np.array([0, 0]))
+    assert list(found.trouble) == [1]
+    assert "tips over" in found.trouble[1]
+    assert np.isnan(found.q[1]).all()
+    alone = many.settle(Stack.of([standing], [(0, case)]), Course(3.0), np.array([0]))
+    np.testing.assert_array_equal(found.q[0], alone.q[0])
+    assert found.sizes == alone.sizes
 
 
 def test_a_chain_that_tips_over_has_no_solution() -> None:
     model, case = tipping()
-    system = System(Chain(model), model, case)
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
-    found = Settling([system], free, Course(3.0)).solve(np.zeros(3))
+    found = Settling(model, [case], free, Course(3.0)).solve([(0, np.zeros(3))])[0]
     assert isinstance(found, str)
     assert "tips over" in found
+
+
+@COURSES
+def test_ends_are_those_of_the_engine_of_record(course: Course) -> None:
+    """Chosen steps, poses and readings of several joints; and again over the very same steps."""
+    model = spine(3)
+    case = loaded(model, 2)
+    free = free_parameters(model, 0, ROTATIONS, "per_specimen")
+    solver = Settling(model, [case, twice(case)], free, course)
+    seen = solver.solve([(0, np.zeros(3))])[0]
+    assert isinstance(seen, Seen)
+    expected = sampled(model, case, course, END_ONLY)
+    np.testing.assert_allclose(seen.poses[0], expected, rtol=0, atol=1e-11)
+    np.testing.assert_array_equal(seen.poses[1], np.repeat(seen.poses[0], 2, axis=0))
+    np.testing.assert_array_equal(seen.readings[0], seen.poses[0].reshape(2, -1, 6))
+    record = solver.record(np.zeros(3))
+    assert record is not None
+    np.testing.assert_allclose(record[0], seen.poses[0], rtol=0, atol=1e-13)
+
+
+def ends(
+    model: SpineModel, case: LoadCase, free: tuple[FreeParameter, ...], course: Course
+) -> Seen:
+    """What a fit sees of a case."""
+    found = Settling(model, [case], free, course).solve([(0, np.zeros(len(free)))])[0]
+    assert isinstance(found, Seen)
+    return found
 
 
 def twice(case: LoadCase) -> LoadCase:

@@ -1,14 +1,19 @@
 """Many runs at once: stacks of models and tests, and spines that differ in numbers alone."""
 
 from spinepipe.statics.many.derive import answered, poses_by, readings, readings_by
+from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.given import by_joint_pose, by_load
+from spinepipe.statics.many.settling import Ends, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
 from spinepipe.statics.many.stack import Poses, Stack
+from spinepipe.statics.many.survey import survey
 
 __all__ = [
     "Cases",
+    "Ends",
     "ManySolved",
+    "Moving",
     "Poses",
     "Spines",
     "Stack",
@@ -18,5 +23,7 @@ __all__ = [
     "poses_by",
     "readings",
     "readings_by",
+    "settle",
     "solve_many",
+    "survey",
 ]

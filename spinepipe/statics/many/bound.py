@@ -74,11 +74,20 @@ class Bound:
         neutral: Neutral,
         lanes: tuple[Indices, Indices, Array],
         states: PathStates,
+        share: Array,
     ) -> None:
-        """``neutral`` of M chains; ``lanes`` (N,): chain, run and duration of each lane's step."""
+        """What acts on N lanes.
+
+        Parameters
+        ----------
+        neutral : of M chains.
+        lanes : (N,) each: chain, run and duration of each lane's step.
+        share : (N,) share of loads across joints that is on.
+        """
         chain, runs, seconds = lanes
         self.joints = neutral.origins.shape[1]
         self.count = self.joints * len(runs)
+        self.share = share
         self.places: dict[int, Indices] = {}
         self.geometry_places: dict[int, Indices] = {}
         self.laws: list[Law] = []
@@ -136,8 +145,9 @@ class Bound:
         load, tangent = found.load.reshape(q.shape), found.tangent.reshape(*q.shape, 6)
         for one in self.cables.values():
             own = one.effect.across(q[one.lanes], one.neutral, one.values)
-            load[one.lanes] += own.load * one.there[..., None]
-            tangent[one.lanes] += own.tangent * one.there[..., None, None]
+            on = one.there * self.share[one.lanes, None]
+            load[one.lanes] += own.load * on[..., None]
+            tangent[one.lanes] += own.tangent * on[..., None, None]
         return Holding(load, tangent)
 
     def held_by_laws(self, q: Array) -> Holding:

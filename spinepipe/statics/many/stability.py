@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import decays
+from spinepipe.statics.many.dynamics import inertias_of, tangents_of
 from spinepipe.statics.many.proofs import apart, twists
 from spinepipe.statics.many.survey import Chains, Loads, Survey, survey
 
@@ -50,7 +51,7 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
 def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "Lanes":
     """Lanes at q (N, J, 6) with all that decides their stability."""
     seen, chain = survey(chains, loads, q, tangents), loads.chain
-    return Lanes(seen, _inertia(chains, chain, seen), chains.damping[chain])
+    return Lanes(seen, inertias_of(chains, chain, seen), chains.damping[chain])
 
 
 def proven_by_forms(lanes: "Lanes") -> Flags:
@@ -90,27 +91,6 @@ class Lanes:
         return result
 
 
-def _inertia(chains: Chains, chain: Indices, seen: Survey) -> Array:
-    """(N, J, 6, 6) inertia of each vertebra by its twist, about the origin of ground."""
-    centres = (seen.turned @ chains.coms[chain][..., None])[..., 0] + seen.shifted
-    mass, arms = chains.masses[chain][..., None, None], _crosses(centres)
-    found = np.zeros((*centres.shape[:2], 6, 6))
-    own = seen.turned @ chains.inertias[chain] @ seen.turned.swapaxes(2, 3)
-    found[..., :3, :3] = own - mass * arms @ arms
-    found[..., :3, 3:] = mass * arms
-    found[..., 3:, :3] = -mass * arms
-    found[..., 3:, 3:] = mass * np.eye(3)
-    return found
-
-
-def _crosses(vectors: Array) -> Array:
-    """(..., 3, 3) matrices W with W u = vector x u."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    nothing = np.zeros_like(x)
-    rows = [[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
 def _by_intervals(lanes: Lanes, top: Array) -> Flags:
     """(N,) interval by interval up to top (N,)."""
     reached, nothing = np.zeros(len(top)), np.zeros(len(top))
@@ -140,20 +120,4 @@ def matrices(lane: Lanes) -> tuple[Array, Array]:
     scale = 1.0 / np.sqrt(lane.damping.ravel())
     both, n = scale[:, None] * scale, len(scale)
     lower = np.tril(lane.momenta.reshape(n, 6) @ lane.seen.axes.reshape(n, 6).T)
-    return (lower + np.tril(lower, -1).T) * both, _tangent(lane.seen) * both
-
-
-def _tangent(seen: Survey) -> Array:
-    """(n, n) of one lane."""
-    joints = seen.axes.shape[1]
-    every = seen.axes[0].reshape(-1, 6).T
-    turned = seen.axes[0][..., :3] @ seen.slopes[0]
-    down = (turned + seen.rows[0]).reshape(-1, 6) @ every
-    moments = (seen.slopes[0] @ seen.axes[0].swapaxes(1, 2)).swapaxes(1, 2)  # L s of each axis s
-    up = (moments.reshape(-1, 3) @ every[:3]).T
-    joint = np.repeat(np.arange(joints), 6)
-    found = -np.where(joint[:, None] > joint, down, up)
-    within = seen.blocks[0] - turned @ seen.axes[0].swapaxes(1, 2)
-    for j in range(joints):
-        found[6 * j : 6 * j + 6, 6 * j : 6 * j + 6] = within[j]
-    return found
+    return (lower + np.tril(lower, -1).T) * both, tangents_of(lane.seen)[0] * both

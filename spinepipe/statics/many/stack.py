@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array, Indices, Neutral
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.statics.equilibrium import LARGEST_ROTATION, MOST_ITERATIONS, STEP_TOLERANCE
 from spinepipe.statics.many.bound import Bound, PathStates
+from spinepipe.statics.many.continuation import Increment, continued
 from spinepipe.statics.many.dead import with_dead_loads
-from spinepipe.statics.many.elimination import Changes, answers
 from spinepipe.statics.many.lanes import Acting, Effects
-from spinepipe.statics.many.stability import surely_stable
-from spinepipe.statics.many.survey import Chains, Loads, part, survey
+from spinepipe.statics.many.newton import settled
+from spinepipe.statics.many.survey import Chains, Loads, part
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
 from spinepipe.status import Status
@@ -29,6 +28,8 @@ from spinepipe.world import Chain
 Flags = NDArray[np.bool_]
 Run = tuple[int, LoadCase]
 """A model's number, and a test of it."""
+
+NO_WAY = "no stable equilibrium on the way from the neutral pose"
 
 CHUNK = 40_000
 """Numbers in the tangents that are worked on together: they should stay in a core's cache."""
@@ -135,27 +136,33 @@ class Stack:
         loads = with_dead_loads(effects.dead, self.chains, self.listed, self.run)
         return replace(self, model=tuple(models).__getitem__, effects=effects, loads=loads)
 
-    def solve(self, guess: Array | None = None) -> Poses:
+    def solve(self, guess: Array | None = None, why: bool = True) -> Poses:
         """Equilibria of all lanes.
 
         Parameters
         ----------
-        guess : (L, J, 6) poses near by; without them each run starts from the neutral pose.
+        guess : (L, J, 6) poses near by; runs without them, or NaN, start from the neutral pose.
+        why : whether the engine of record is asked about runs without memory that have none here.
         """
         q = np.full((len(self.run), self.joints, 6), np.nan)
         open_ones = ~self.alone
         if guess is not None:
-            for runs in self.chunks(np.flatnonzero(open_ones & ~self.remembers)):
+            near = open_ones & ~np.isnan(guess[self.first[:-1], 0, 0])
+            for runs in self.chunks(np.flatnonzero(near & ~self.remembers)):
                 open_ones[runs] = ~self._at_once(runs, guess, q)
-            for runs in self.chunks(np.flatnonzero(open_ones & self.remembers)):
+            for runs in self.chunks(np.flatnonzero(near & self.remembers)):
                 open_ones[runs] = ~self._step_by_step(runs, guess, q)
         for runs in self.chunks(np.flatnonzero(open_ones)):
             open_ones[runs] = ~self._step_by_step(runs, None, q)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
         messages: dict[int, str] = {}
-        by_engine = open_ones | self.alone
+        by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
             self._by_engine(number, q, status, messages)
+        for number in np.flatnonzero(open_ones & ~by_engine).tolist():
+            lanes = range(self.first[number], self.first[number + 1])
+            status[lanes] = Status.UNSTABLE.value
+            messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
 
     def chunks(self, runs: Indices) -> Iterator[Indices]:
@@ -190,6 +197,10 @@ class Stack:
             live, lanes = live[going], lanes[going]
             start = last[runs[live]] if guess is None else guess[lanes]
             found, arrived = self._settled(lanes, start, states)
+            if guess is None:
+                lost = np.flatnonzero(~arrived & ~self.remembers[runs[live]])
+                if len(lost):
+                    found[lost], arrived[lost] = self._continued(lanes[lost], start[lost])
             good[live] = arrived
             q[lanes], last[runs[live]] = found, found
             if self.remembers[runs].any():
@@ -218,14 +229,15 @@ class Stack:
         for number, state in after.items():
             states[number][bound.places[number]] = state
 
-    def bound(self, lanes: Indices, states: PathStates) -> Bound:
-        """Laws and geometry at work on some lanes."""
+    def bound(self, lanes: Indices, states: PathStates, share: Array | None = None) -> Bound:
+        """Laws and geometry at work on some lanes; ``share`` (N,) of loads across joints."""
         chain = self.loads.chain[lanes]
         return Bound(
             self.effects,
             self.neutral,
             (chain, self.run[lanes], self.seconds[lanes]),
             states,
+            np.ones(len(lanes)) if share is None else share,
         )
 
     @property
@@ -235,44 +247,24 @@ class Stack:
 
     def _settled(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """Poses (N, J, 6) of lanes from poses near by, and which are stable equilibria for sure."""
-        q, tangents, arrived = self.newton(lanes, start, states)
-        there = np.flatnonzero(arrived)
-        loads = part(self.loads, lanes[there])
-        arrived[there] = surely_stable(self.chains, loads, q[there], tangents[there])
-        return q, arrived
 
-    def newton(
-        self, lanes: Indices, start: Array, states: PathStates
-    ) -> tuple[Array, Array, Flags]:
-        """Poses (N, J, 6), tangents there (N, J, 6, 6), and which lanes have arrived (N,).
+        def laws(some: Indices) -> Bound:
+            return self.bound(lanes[some], states)
 
-        A lane whose steps do not contract, or that leaves joint motion, is given up.
-        """
-        q = start.copy()
-        tangents = np.zeros((*q.shape, 6))
-        arrived = np.zeros(len(lanes), dtype=bool)
-        left: Indices = np.arange(len(lanes))
-        last = np.full(len(lanes), np.inf)
-        bound, loads = self.bound(lanes, states), part(self.loads, lanes)
-        for _ in range(MOST_ITERATIONS):
-            held = bound.held(q[left])
-            step, solved = newton_step(self.chains, loads, q[left], held.load, held.tangent)
-            q[left] += step
-            size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
-            inside = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
-            going = solved & inside & (size < 4.0 * last)
-            there = going & (size < 1.0)
-            arrived[left[there]] = True
-            tangents[left[there]] = held.tangent[there]
-            going &= ~there
-            if not going.any():
-                break
-            last = size[going]
-            if not going.all():
-                left = left[going]
-                bound = self.bound(lanes[left], states)
-                loads = part(self.loads, lanes[left])
-        return q, tangents, arrived
+        return settled(self.chains, part(self.loads, lanes), laws, start)
+
+    def _continued(self, lanes: Indices, start: Array) -> tuple[Array, Flags]:
+        """The same for lanes without memory, from the steps before, the load in fractions."""
+        first = self.first[self.run[lanes]] == lanes
+        before = part(self.loads, np.where(first, lanes, lanes - 1))
+        for numbers in (before.forces, before.moments):
+            numbers[first] = 0.0
+        increment = Increment(before, part(self.loads, lanes), first)
+
+        def laws(some: Indices, share: Array) -> Bound:
+            return self.bound(lanes[some], self.initial_states(), share)
+
+        return continued(self.chains, increment, laws, start)
 
     def _by_engine(
         self, number: int, q: Array, status: NDArray[np.str_], messages: dict[int, str]
@@ -292,15 +284,6 @@ class Stack:
                 messages[lane] = step.equilibrium.message
             if step.usable:
                 q[lane] = step.equilibrium.q.reshape(-1, 6)
-
-
-def newton_step(
-    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array
-) -> tuple[Array, Flags]:
-    """Newton steps (N, J, 6) from q, and on which lanes there is one."""
-    seen = survey(chains, loads, q, tangents)
-    rates, good = answers(seen, Changes((seen.applied - held)[..., None]))
-    return rates[..., 0], good
 
 
 def _chains(models: Sequence[SpineModel]) -> Chains:

@@ -1,11 +1,10 @@
 """Job: errors of one specimen with landmarks of one precision, pose by pose."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
+from spinepipe.calibrate import Fit, MeasuredCase, Problem, by_record, fit, needed
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.designs import sample_landmarks
@@ -121,13 +120,11 @@ def _with(
         message = f"the cohort's own pose was not calibrated: {stiffness}"
         return _row((), (), Status.REFUSED, message)
     problem: Problem = calibration_problem(root, settings, specimen, frames, stiffness)
-    evaluator = Evaluator(replace(problem, free=(), lower=_NONE, upper=_NONE))
-    there = evaluator.at(_NONE)
-    status = Status.CONVERGED if there.poses and there.residual is not None else Status.UNSTABLE
-    return _row(evaluator.problem.cases, there.poses, status, there.message)
-
-
-_NONE = np.empty(0)
+    cases = needed(problem)
+    found = by_record(problem.model, [one.case for one in cases])
+    if isinstance(found, str):
+        return _row(cases, (), Status.UNSTABLE, found)
+    return _row(cases, found, Status.CONVERGED, "")
 
 
 def _row(

@@ -1,0 +1,298 @@
+"""Moving chains, many at once, in compiled loops: mass matrices, tangents, what inertia asks for.
+
+Twists are written as in `survey`, momenta as (moment about the origin of ground, momentum). With V
+the twist of what carries an axis S, the axis changes at the rate V x S; a vertebra with inertia I
+and twist V asks for the wrench I A + V x* I V at the acceleration A that is left when no rate
+changes (Featherstone 2008, doi 10.1007/978-1-4899-7560-7, recursive Newton-Euler).
+
+Nothing here calls another compiled file: what is kept of a compilation hangs on its own file alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.statics.many.survey import Chains, Plain, Survey, compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """N lanes at one pose each; n = 6 J.
+
+    Attributes
+    ----------
+    mass : (N, n, n) mass matrix. inertias : (N, J, 6, 6) of each vertebra by its twist.
+    """
+
+    seen: Survey
+    inertias: Array
+    mass: Array
+
+    @classmethod
+    def of(cls, chains: Chains, chain: Indices, seen: Survey) -> "Moving":
+        """Lanes (N,) of which each is a pose of a chain."""
+        inertias = inertias_of(chains, chain, seen)
+        count, n = len(inertias), 6 * inertias.shape[1]
+        mass = np.empty((count, n, n))
+        _weigh(seen.axes, inertias, mass)
+        return cls(seen, inertias, mass)
+
+    def inertial(self, rates: Array) -> Array:
+        """(N, J, 6) what inertia asks of each axis at rates (N, J, 6) that do not change."""
+        found = np.empty(rates.shape)
+        _whirl(self.seen.axes, self.inertias, rates, found)
+        return found
+
+    def accelerations(self, forces: Array) -> Array:
+        """(N, n) the mass matrix's answer to forces (N, n); NaN where it is not positive."""
+        found = forces.copy()
+        _answer(self.mass, found)
+        return found
+
+
+def inertias_of(chains: Chains, chain: Indices, seen: Survey) -> Array:
+    """(N, J, 6, 6) inertia of each vertebra by its twist, about the origin of ground."""
+    found = np.empty((*seen.shifted.shape[:2], 6, 6))
+    bodies = (chain, chains.masses, chains.coms, chains.inertias)
+    _place_inertias(bodies, seen.turned, seen.shifted, found)
+    return found
+
+
+def tangents_of(seen: Survey) -> Array:
+    """(N, n, n) tangents of what the joints hold less what is applied."""
+    count, n = len(seen.axes), 6 * seen.axes.shape[1]
+    found = np.empty((count, n, n))
+    _unfold(tuple(seen), found)
+    return found
+
+
+@compiled
+def _inertia(
+    turned: Array, shifted: Array, mass: float, com: Array, own: Array, found: Array
+) -> None:
+    """Fill the inertia (6, 6) of a displaced vertebra about the origin of ground."""
+    c, half = np.empty(3), np.empty((3, 3))
+    for r in range(3):
+        c[r] = shifted[r]
+        for k in range(3):
+            c[r] += turned[r, k] * com[k]
+            half[r, k] = 0.0
+            for i in range(3):
+                half[r, k] += turned[r, i] * own[i, k]
+    square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    found[:] = 0.0
+    for r in range(3):
+        for k in range(3):
+            value = -mass * c[r] * c[k]
+            for i in range(3):
+                value += half[r, i] * turned[k, i]
+            found[r, k] = value
+        found[r, r] += mass * square
+        found[3 + r, 3 + r] = mass
+    found[0, 4], found[0, 5] = -mass * c[2], mass * c[1]
+    found[1, 3], found[1, 5] = mass * c[2], -mass * c[0]
+    found[2, 3], found[2, 4] = -mass * c[1], mass * c[0]
+    for r in range(3):
+        for k in range(3):
+            found[3 + k, r] = found[r, 3 + k]
+
+
+@compiled
+def _place_inertias(bodies: Plain, turned: Array, shifted: Array, found: Array) -> None:
+    """Fill the inertias (N, J, 6, 6)."""
+    chain_of, masses, coms, own = bodies
+    for n in range(len(turned)):
+        chain = chain_of[n]
+        for j in range(turned.shape[1]):
+            _inertia(
+                turned[n, j],
+                shifted[n, j],
+                masses[chain, j],
+                coms[chain, j],
+                own[chain, j],
+                found[n, j],
+            )
+
+
+@compiled
+def _weigh(every_axes: Array, inertias: Array, mass: Array) -> None:
+    """Fill the mass matrices (N, n, n)."""
+    carried, momentum = np.empty((6, 6)), np.empty(6)
+    for n in range(len(inertias)):
+        axes = every_axes[n]
+        carried[:] = 0.0
+        for j in range(len(axes) - 1, -1, -1):
+            carried += inertias[n, j]
+            for k in range(6):
+                for r in range(6):
+                    momentum[r] = 0.0
+                    for c in range(6):
+                        momentum[r] += carried[r, c] * axes[j, k, c]
+                for i in range(j + 1):
+                    for c in range(6):
+                        value = 0.0
+                        for r in range(6):
+                            value += axes[i, c, r] * momentum[r]
+                        mass[n, 6 * j + k, 6 * i + c] = value
+                        mass[n, 6 * i + c, 6 * j + k] = value
+
+
+@compiled
+def _unfold(seen: Plain, found: Array) -> None:
+    """Fill the tangents (N, n, n) from what the survey keeps of them joint by joint."""
+    every_axes, _, every_rows, every_blocks, every_slopes, _, _ = seen
+    joints = every_axes.shape[1]
+    down, moments = np.empty((6, 6)), np.empty((6, 3))
+    for n in range(len(every_axes)):
+        for j in range(joints):
+            axes, slopes = every_axes[n, j], every_slopes[n, j]
+            for k in range(6):
+                for c in range(6):
+                    down[k, c] = 0.0
+                    for r in range(3):
+                        down[k, c] += axes[k, r] * slopes[r, c]
+                for r in range(3):
+                    moments[k, r] = 0.0
+                    for c in range(6):
+                        moments[k, r] += slopes[r, c] * axes[k, c]
+            for k in range(6):
+                for c in range(6):
+                    value = every_blocks[n, j, k, c]
+                    for r in range(6):
+                        value -= down[k, r] * axes[c, r]
+                    found[n, 6 * j + k, 6 * j + c] = value
+            for k in range(6):
+                for c in range(6):
+                    down[k, c] += every_rows[n, j, k, c]
+            for i in range(j):
+                other = every_axes[n, i]
+                for k in range(6):
+                    for c in range(6):
+                        lower, upper = 0.0, 0.0
+                        for r in range(6):
+                            lower += down[k, r] * other[c, r]
+                        for r in range(3):
+                            upper += moments[k, r] * other[c, r]
+                        found[n, 6 * j + k, 6 * i + c] = -lower
+                        found[n, 6 * i + c, 6 * j + k] = -upper
+
+
+@compiled
+def _add_cross(a: Array, b: Array, factor: float, out: Array) -> None:
+    """Add a x b times a factor to out, (3,) each."""
+    out[0] += factor * (a[1] * b[2] - a[2] * b[1])
+    out[1] += factor * (a[2] * b[0] - a[0] * b[2])
+    out[2] += factor * (a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
+def _whirl(axes: Array, inertias: Array, rates: Array, found: Array) -> None:
+    """Fill what inertia asks of the axes (N, J, 6) at rates (N, J, 6)."""
+    joints = axes.shape[1]
+    twist, change, momentum, beyond = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    wrenches = np.empty((joints, 6))
+    for n in range(len(axes)):
+        twist[:] = 0.0
+        change[:] = 0.0
+        for j in range(joints):
+            for k in range(6):
+                s, rate = axes[n, j, k], rates[n, j, k]
+                _add_cross(twist[:3], s[:3], rate, change[:3])
+                _add_cross(twist[:3], s[3:], rate, change[3:])
+                _add_cross(twist[3:], s[:3], rate, change[3:])
+                for r in range(6):
+                    twist[r] += rate * s[r]
+            for r in range(6):
+                momentum[r] = 0.0
+                wrenches[j, r] = 0.0
+                for c in range(6):
+                    momentum[r] += inertias[n, j, r, c] * twist[c]
+                    wrenches[j, r] += inertias[n, j, r, c] * change[c]
+            _add_cross(twist[:3], momentum[:3], 1.0, wrenches[j, :3])
+            _add_cross(twist[3:], momentum[3:], 1.0, wrenches[j, :3])
+            _add_cross(twist[:3], momentum[3:], 1.0, wrenches[j, 3:])
+        beyond[:] = 0.0
+        for j in range(joints - 1, -1, -1):
+            beyond += wrenches[j]
+            for k in range(6):
+                found[n, j, k] = 0.0
+                for r in range(6):
+                    found[n, j, k] += axes[n, j, k, r] * beyond[r]
+
+
+@compiled
+def _answer(matrices: Array, right: Array) -> None:
+    """Solve symmetric positive matrices (N, n, n) for right-hand sides (N, n) in place."""
+    n = right.shape[1]
+    lower = np.empty((n, n))
+    for lane in range(len(right)):
+        x = right[lane]
+        for r in range(n):
+            for c in range(r + 1):
+                value = matrices[lane, r, c]
+                for i in range(c):
+                    value -= lower[r, i] * lower[c, i]
+                lower[r, c] = np.sqrt(value) if r == c else value / lower[c, c]
+            for c in range(r):
+                x[r] -= lower[r, c] * x[c]
+            x[r] /= lower[r, r]
+        for r in range(n - 1, -1, -1):
+            x[r] /= lower[r, r]
+            for c in range(r):
+                x[c] -= lower[r, c] * x[r]
+
+
+class Factored:
+    """LU factors of N matrices (n, n), each with its row exchanges."""
+
+    def __init__(self, matrices: Array) -> None:
+        self._lu = matrices.copy()
+        self._rows = np.empty(matrices.shape[:2], dtype=np.int64)
+        _factor(self._lu, self._rows)
+
+    def solve(self, right: Array) -> Array:
+        """(N, n) for right-hand sides (N, n); not finite where a matrix is singular."""
+        found = np.empty(right.shape)
+        _substitute(self._lu, self._rows, right, found)
+        return found
+
+
+@compiled
+def _factor(matrices: Array, rows: Indices) -> None:
+    """LU with partial pivoting in place; rows (N, n) are filled with the order of the rows."""
+    n = matrices.shape[1]
+    for lane in range(len(matrices)):
+        a, order = matrices[lane], rows[lane]
+        for k in range(n):
+            order[k] = k
+        for k in range(n):
+            p = k
+            for r in range(k + 1, n):
+                if abs(a[r, k]) > abs(a[p, k]):
+                    p = r
+            if p != k:
+                order[k], order[p] = order[p], order[k]
+                for c in range(n):
+                    a[k, c], a[p, c] = a[p, c], a[k, c]
+            for r in range(k + 1, n):
+                f = a[r, k] / a[k, k]
+                a[r, k] = f
+                for c in range(k + 1, n):
+                    a[r, c] -= f * a[k, c]
+
+
+@compiled
+def _substitute(lu: Array, rows: Indices, right: Array, found: Array) -> None:
+    """Forward and backward substitution of (N, n)."""
+    n = right.shape[1]
+    for lane in range(len(right)):
+        a, x = lu[lane], found[lane]
+        for r in range(n):
+            x[r] = right[lane, rows[lane, r]]
+            for c in range(r):
+                x[r] -= a[r, c] * x[c]
+        for r in range(n - 1, -1, -1):
+            for c in range(r + 1, n):
+                x[r] -= a[r, c] * x[c]
+            x[r] /= a[r, r]
