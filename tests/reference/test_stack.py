@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import random_stacks as draw
 from example_effects import ExtraWeight
 
 from spinepipe.effects import Effect, Kind
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
     FreeParameter,
@@ -143,8 +144,8 @@ def test_loads_that_do_not_come_on_at_once(
     stack, continued = stack_of(drawn), []
     at_once = Stack._continued
 
-    def counted(self: Stack, lanes: Indices, start: Array) -> tuple[Array, Flags]:
-        q, good = at_once(self, lanes, start)
+    def counted(self: Stack, *rest: Any) -> tuple[Array, Flags]:
+        q, good = at_once(self, *rest)
         continued.extend(good.tolist())
         return q, good
 

@@ -198,9 +198,9 @@ class Stack:
             start = last[runs[live]] if guess is None else guess[lanes]
             found, arrived = self._settled(lanes, start, states)
             if guess is None:
-                lost = np.flatnonzero(~arrived & ~self.remembers[runs[live]])
+                lost = np.flatnonzero(~arrived)
                 if len(lost):
-                    found[lost], arrived[lost] = self._continued(lanes[lost], start[lost])
+                    found[lost], arrived[lost] = self._continued(lanes[lost], start[lost], states)
             good[live] = arrived
             q[lanes], last[runs[live]] = found, found
             if self.remembers[runs].any():
@@ -253,8 +253,8 @@ class Stack:
 
         return settled(self.chains, part(self.loads, lanes), laws, start)
 
-    def _continued(self, lanes: Indices, start: Array) -> tuple[Array, Flags]:
-        """The same for lanes without memory, from the steps before, the load in fractions."""
+    def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
+        """The same from the steps before, the load in fractions."""
         first = self.first[self.run[lanes]] == lanes
         before = part(self.loads, np.where(first, lanes, lanes - 1))
         for numbers in (before.forces, before.moments):
@@ -262,7 +262,7 @@ class Stack:
         increment = Increment(before, part(self.loads, lanes), first)
 
         def laws(some: Indices, share: Array) -> Bound:
-            return self.bound(lanes[some], self.initial_states(), share)
+            return self.bound(lanes[some], states, share)
 
         return continued(self.chains, increment, laws, start)
 
