@@ -1,9 +1,8 @@
 """From a cohort's tables to what the engine takes: frames, bodies, models, load cases. SI."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -176,26 +175,23 @@ def _steps(
     cohort: Cohort, rows: pd.DataFrame, coms: Mapping[str, Array], shift: Array
 ) -> tuple[LoadStep, ...]:
     moving = {name: index for index, name in enumerate(cohort.vertebrae[1:])}
+    points = rows[["px_mm", "py_mm", "pz_mm"]].to_numpy(dtype=float) / MM_PER_M
+    forces = rows[["fx_n", "fy_n", "fz_n"]].to_numpy(dtype=float)
+    moments = rows[["mx_nm", "my_nm", "mz_nm"]].to_numpy(dtype=float)
+    vertebrae, numbers = rows["vertebra"].tolist(), rows["step"].to_numpy()
+    times = rows["time_s"].to_numpy(dtype=float)
+    for place in np.flatnonzero(np.isnan(points).any(axis=1)):
+        points[place] = coms[vertebrae[place]]
     steps = []
-    for step in sorted(set(rows["step"])):
-        of_step = rows[rows["step"] == step]
+    for step in np.unique(numbers):
+        places = np.flatnonzero(numbers == step)
         wrenches = tuple(
-            _wrench(moving[row["vertebra"]], row, coms, shift) for row in of_step.to_dict("records")
+            Wrench(moving[vertebrae[at]], points[at] + shift, forces[at], moments[at])
+            for at in places.tolist()
         )
-        times = of_step["time_s"].dropna()
-        steps.append(LoadStep(int(step), wrenches, float(times.iloc[0]) if len(times) else None))
+        told = times[places][~np.isnan(times[places])]
+        steps.append(LoadStep(int(step), wrenches, float(told[0]) if len(told) else None))
     return tuple(steps)
-
-
-def _wrench(
-    body: int, row: Mapping[Hashable, Any], coms: Mapping[str, Array], shift: Array
-) -> Wrench:
-    point = np.array([row["px_mm"], row["py_mm"], row["pz_mm"]], dtype=float) / MM_PER_M
-    if np.isnan(point).any():
-        point = coms[row["vertebra"]]
-    force = np.array([row["fx_n"], row["fy_n"], row["fz_n"]], dtype=float)
-    moment = np.array([row["mx_nm"], row["my_nm"], row["mz_nm"]], dtype=float)
-    return Wrench(body, point + shift, force, moment)
 
 
 def on_bushings(

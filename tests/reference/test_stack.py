@@ -25,6 +25,8 @@ from spinepipe.statics import (
 )
 from spinepipe.statics.equilibrium import factor
 from spinepipe.statics.many import (
+    Acting,
+    Answering,
     Stack,
     by_joint_pose,
     by_load,
@@ -198,6 +200,45 @@ def test_an_effect_that_takes_no_stack_is_solved_by_the_engine() -> None:
     assert poses.by_engine.tolist() == [True, False]
     expected = by_engine(heavy, case, ())[0]
     np.testing.assert_array_equal(poses.q[: len(expected)], expected)
+
+
+IDLE = [effect for effect in VARIANTS if isinstance(effect, Acting)]
+
+
+@pytest.mark.parametrize("effect", IDLE, ids=str)
+def test_what_idle_effects_would_do(effect: Effect) -> None:
+    """Without solving anew: as the derivatives of a model that has them, switched off."""
+    rng = np.random.default_rng(8)
+    stiffening = next(one for one in VARIANTS if one.name == "nonlinear_stiffening")
+    (model, case), _ = draw.model(rng, 3, [stiffening], 0.5), None
+    plain = stack_of([(model, case)])
+    q = plain.solve().q
+    answering = Answering.of(plain, q)
+    assert answering is not None
+    parameters = effect.parameters
+    off = np.array([p.default if p.off is None else p.off for p in parameters])
+    idle = ScopedEffect(effect, (0, 1, 2), np.tile(off, (3, 1)))
+    full = model.with_effects((*model.effects, idle))
+    strengths = [number for number, p in enumerate(parameters) if p.off is not None]
+    free = [
+        FreeParameter("", len(model.effects), column, (joint,), False)
+        for column in strengths
+        for joint in range(3)
+    ]
+    expected = poses_by(stack_of([(full, case)]), q, [free])
+    found = answering.by_strengths(effect, off)[..., strengths]
+    found = np.moveaxis(found, (2, 3), (1, 2)).reshape(expected.shape)
+    largest = np.maximum(np.abs(expected).max(axis=(0, 1, 2)), 1e-9)
+    np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-11)
+    assert np.abs(expected).max() > 0.0 or effect.name == "facet_contact"  # a gap not closed here
+
+
+def test_effects_in_between_need_a_model_of_their_own() -> None:
+    rng = np.random.default_rng(9)
+    for name in ("axes_tilt", "hysteresis", "marker_bias"):
+        effect = next(one for one in VARIANTS if one.name == name)
+        stack = stack_of([draw.model(rng, 2, [effect])])
+        assert Answering.of(stack, np.zeros((len(stack.run), 2, 6))) is None
 
 
 def test_derivatives_by_loads_and_joint_poses() -> None:

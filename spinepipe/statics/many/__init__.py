@@ -3,6 +3,7 @@
 from spinepipe.statics.many.derive import answered, poses_by, readings, readings_by
 from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.given import by_joint_pose, by_load
+from spinepipe.statics.many.idle import Acting, Answering
 from spinepipe.statics.many.settling import Ends, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
@@ -10,6 +11,8 @@ from spinepipe.statics.many.stack import Poses, Stack
 from spinepipe.statics.many.survey import survey
 
 __all__ = [
+    "Acting",
+    "Answering",
     "Cases",
     "Ends",
     "ManySolved",

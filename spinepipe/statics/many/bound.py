@@ -177,8 +177,10 @@ class Bound:
             j, here, carried = law.joints, seen.q[law.joints], load[law.joints]
             response = law.respond(here, carried, self.states)
             if response.by_carried is not None:
-                by_x[j] += response.by_carried @ by_x[j]
-                tangent[j] += response.by_carried @ tangent[j]
+                rows = np.flatnonzero(response.by_carried.any(axis=(0, 2)))
+                by_carried, at = response.by_carried[:, rows], j[:, None]
+                by_x[at, rows] += by_carried @ by_x[j]
+                tangent[at, rows] += by_carried @ tangent[j]
             self._add_own(
                 by_x, law, here, carried, slopes.laws[law.index], states_by_x.get(law.index)
             )
@@ -235,7 +237,8 @@ class Bound:
             response = law.respond(here, carried, self.states)
             load_by_x[j] += response.tangent @ moved[j]
             if response.by_carried is not None:
-                load_by_x[j] += response.by_carried @ carried_by_x
+                rows = np.flatnonzero(response.by_carried.any(axis=(0, 2)))
+                load_by_x[j[:, None], rows] += response.by_carried[:, rows] @ carried_by_x
             own, state = slopes.laws[law.index], states_by_x.get(law.index)
             self._add_own(load_by_x, law, here, carried, own, state)
             load[j] += response.load

@@ -20,7 +20,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     UNSEEN,
     Column,
     columns_of,
-    signatures,
+    signatures_of_each,
 )
 from spinepipe.studies.discrepancy.search.screen import Index
 from spinepipe.studies.discrepancy.search.whitening import Whitening
@@ -90,8 +90,9 @@ def seen(
     base = plain.noise_only(solved.by(solved.model, free))
     bases = orthonormal(base), orthonormal(white.shortened(base))
     raw, refitted, left = [], [], []
-    for index in those.indices:
-        moved = plain.noise_only(signatures(solved, index.columns))
+    groups = [index.columns for index in those.indices]
+    for signature in signatures_of_each(solved, groups):
+        moved = plain.noise_only(signature)
         raw.append(moved.T @ moved)
         rest = _without(bases[0], moved)
         refitted.append(rest.T @ rest)

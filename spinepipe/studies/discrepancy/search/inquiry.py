@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     drawn,
     linearised,
     products,
-    signatures,
+    signatures_of_each,
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.refit import Refit, refit, refits
@@ -143,8 +143,8 @@ def linearised_for(
     for number, (name, one) in enumerate(grounds.readings.items()):
         solved = Solved(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
-        for place, of_effect in zip(parts, columns, strict=True):
-            plain = grounds.plain[name].noise_only(signatures(solved, of_effect))
+        for place, moved in zip(parts, signatures_of_each(solved, columns), strict=True):
+            plain = grounds.plain[name].noise_only(moved)
             white = grounds.setting.whitenings[name].shortened(plain)
             place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
     return [

@@ -13,7 +13,11 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.hypothesis import Variant, bushing_stiffness
 from spinepipe.studies.discrepancy.search.prediction import Solved
-from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Column, signatures
+from spinepipe.studies.discrepancy.search.projected import (
+    EVERY_TEST,
+    Column,
+    signatures_of_each,
+)
 from spinepipe.units import COORDINATES, ROTATIONS
 
 
@@ -104,16 +108,14 @@ def nuisance_signatures(
     """
     stiffness = bushing_stiffness(solved.model)
     columns = nuisance_columns(priors, stiffness, tests)
-    single = signatures(solved, columns)
+    posture = np.full(len(stiffness), priors.posture)
+    tilts = [_columns(variant, posture, (EVERY_TEST,)) for variant in POSTURE]
+    single, *together = signatures_of_each(solved, [columns, *tilts])
     single = tuple(
         np.concatenate(pair, axis=-1) for pair in zip(single, _alike(columns, single), strict=True)
     )
     if not priors.posture:
         return single
-    posture = np.full(len(stiffness), priors.posture)
-    together = [
-        signatures(solved, _columns(variant, posture, (EVERY_TEST,))) for variant in POSTURE
-    ]
     return tuple(
         np.concatenate([one, np.sum(tilts, axis=0)], axis=-1)
         for one, *tilts in zip(single, *together, strict=True)

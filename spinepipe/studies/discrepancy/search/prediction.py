@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +10,16 @@ from spinepipe.calibrate.solvers import on_record
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import FreeParameter, moved
-from spinepipe.statics.many import Poses, Stack, answered, poses_by, readings, readings_by
+from spinepipe.statics.many import (
+    Acting,
+    Answering,
+    Poses,
+    Stack,
+    answered,
+    poses_by,
+    readings,
+    readings_by,
+)
 from spinepipe.units import less_step_0
 
 SAME = 1e-7
@@ -194,6 +204,22 @@ class Solved:
         dq = poses_by(stack, self._q, [free])
         found = self._by_test(readings_by(stack, self._q, dq, [free]))
         return tuple(less_step_0(one, self.zeroed) for one in found)
+
+    @cached_property
+    def answering(self) -> Answering | None:
+        """How the tests answer what is off; None where effects of the model are in between."""
+        return Answering.of(self._stack, self._q)
+
+    def by_strengths(self, effect: Acting, off: Array) -> tuple[Array, ...]:
+        """(T, J, 6, J, P) derivatives of each test by each parameter (P,) of an effect that is off.
+
+        The second J: the joint whose parameter it is.
+        """
+        assert self.answering is not None
+        lanes, joints, _ = self._q.shape
+        found = np.moveaxis(self.answering.by_strengths(effect, off), 1, 2)
+        every = found.reshape(lanes, joints, 6, joints, len(off))
+        return tuple(less_step_0(one, self.zeroed) for one in self._by_test(every))
 
     def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:
         """(T, J, 6, m) motion by loads (T, J, 6, m) that hold the joints besides their laws."""

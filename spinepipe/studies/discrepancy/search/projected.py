@@ -7,9 +7,10 @@ projected out of each specimen; what they share (strengths and shapes of named e
 and is taken out of the sums.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import FreeParameter
+from spinepipe.statics.many import Acting
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.prediction import Solved
@@ -193,24 +195,72 @@ def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column
 
 def signatures(solved: Solved, columns: Sequence[Column]) -> tuple[Array, ...]:
     """(T, J, 6, m) derivative of each test's readings by each column's strength, in prior SDs."""
+    return next(signatures_of_each(solved, [columns]))
+
+
+def signatures_of_each(
+    solved: Solved, groups: Sequence[Sequence[Column]]
+) -> Iterator[tuple[Array, ...]]:
+    """The same for several effects; what differs by the test alone is derived once."""
+    every = dict.fromkeys(_Moved.of(column) for columns in groups for column in columns)
+    parts: dict[Variant, list[_Moved]] = {}
+    for one in every:
+        parts.setdefault(one.variant, []).append(one)
+    found = [_derived(solved, some) for some in parts.values()] or [_by_model(solved, [])]
+    whole = [np.concatenate(of_test, axis=-1) for of_test in zip(*found, strict=True)]
+    places = {one: place for place, one in enumerate(m for some in parts.values() for m in some)}
+    for columns in groups:
+        at = [places[_Moved.of(column)] for column in columns]
+        scales = np.array([column.scale for column in columns])
+        yield tuple(
+            by_x[..., at]
+            * np.where([one.test in (EVERY_TEST, case.test) for one in columns], scales, 0.0)
+            for by_x, case in zip(whole, solved.cases, strict=True)
+        )
+
+
+class _Moved(NamedTuple):
+    """A strength of an idle effect at one joint, or at all."""
+
+    variant: Variant
+    sds: tuple[float, ...]
+    strength: int
+    joint: int | None
+
+    @classmethod
+    def of(cls, column: Column) -> "_Moved":
+        """What moves for a column."""
+        return cls(column.variant, column.sds, column.strength, column.joint)
+
+
+def _derived(solved: Solved, moved: Sequence[_Moved]) -> tuple[Array, ...]:
+    """(T, J, 6, m) derivative of each test's readings by strengths of an idle variant."""
+    effect = moved[0].variant.create()
+    if solved.answering is None or not isinstance(effect, Acting):
+        return _by_model(solved, moved)
+    shapes = dict.fromkeys(one.sds for one in moved)
+    made = {sds: solved.by_strengths(effect, moved[0].variant.off(sds)) for sds in shapes}
+    columns = []
+    for variant, sds, strength, joint in moved:
+        slope = variant.off(sds)[strength] if effect.parameters[strength].logarithmic else 1.0
+        columns.append([slope * of_test[..., joint, strength] for of_test in made[sds]])
+    return tuple(np.stack(of_test, axis=-1) for of_test in zip(*columns, strict=True))
+
+
+def _by_model(solved: Solved, moved: Sequence[_Moved]) -> tuple[Array, ...]:
+    """The same of any effect, from a model that has it."""
     model = solved.model
+    effects, free = list(model.effects), []
     scoped: dict[tuple[Variant, tuple[float, ...]], int] = {}
-    effects: list[ScopedEffect] = list(model.effects)
-    free = []
-    for column in columns:
-        key = (column.variant, column.sds)
-        if key not in scoped:
-            scoped[key] = len(effects)
-            effects.append(idle(column.variant, column.sds, model.n_joints))
-        parameter = effects[scoped[key]].effect.parameters[column.strength]
-        row = 0 if column.joint is None else column.joint
-        free.append(FreeParameter("", scoped[key], column.strength, (row,), parameter.logarithmic))
-    found = solved.by(model.with_effects(tuple(effects)), free)
-    scales = np.array([column.scale for column in columns])
-    return tuple(
-        by_x * np.where([column.test in (EVERY_TEST, case.test) for column in columns], scales, 0.0)
-        for by_x, case in zip(found, solved.cases, strict=True)
-    )
+    for variant, sds, strength, joint in moved:
+        if (variant, sds) not in scoped:
+            scoped[variant, sds] = len(effects)
+            effects.append(idle(variant, sds, model.n_joints))
+        place = scoped[variant, sds]
+        parameter = effects[place].effect.parameters[strength]
+        rows = (0 if joint is None else joint,)
+        free.append(FreeParameter("", place, strength, rows, parameter.logarithmic))
+    return solved.by(model.with_effects(tuple(effects)), free)
 
 
 def idle(variant: Variant, sds: Sequence[float], joints: int) -> ScopedEffect:
