@@ -135,7 +135,7 @@ def made_up_fit(jacobians: dict[str, Array], members: dict[str, tuple[int, ...]]
     residuals = {name: rng.normal(size=len(j)) for name, j in jacobians.items()}
     x = np.zeros(count)
     bound = np.zeros(count, dtype=bool)
-    return JointFit(hypothesis, x, {}, 1.0, residuals, jacobians, {}, bound, "")
+    return JointFit(hypothesis, x, {}, 1.0, residuals, jacobians, {}, {}, bound, "")
 
 
 def problem_of(fit: JointFit, signatures: dict[str, Array], draws: int) -> Linearised:
@@ -227,7 +227,7 @@ def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Arra
     supposed = (Supposed(form, np.zeros(1)),)
     hypothesis = Hypothesis({"a": member}, unknowns, supposed)
     bound = np.zeros(3, dtype=bool)
-    fit = JointFit(hypothesis, x, {}, float(on @ on), {"a": -on}, {"a": -whole}, {}, bound, "")
+    fit = JointFit(hypothesis, x, {}, float(on @ on), {"a": -on}, {"a": -whole}, {}, {}, bound, "")
     return fit, float(off @ off - on @ on), base, f, y
 
 

@@ -44,7 +44,7 @@ def fitted(*supposed: Supposed) -> JointFit:
         for name, member in started.members.items()
     }
     bound = np.zeros(len(x), dtype=bool)
-    return JointFit(started, x, ended, 1.0, {}, {}, {}, bound, "")
+    return JointFit(started, x, ended, 1.0, {}, {}, {}, {}, bound, "")
 
 
 def motion(model: object) -> Array:
@@ -132,7 +132,7 @@ def value_of(
     of_a = {"a": np.array([[0.6], [0.8]]) / prior}
     started = Hypothesis({"a": member}, (u,), supposed)
     bound = np.array([at_bound])
-    fit = JointFit(started, np.array([move]), {}, 1.0, {}, of_a, {}, bound, "")
+    fit = JointFit(started, np.array([move]), {}, 1.0, {}, of_a, {}, {}, bound, "")
     (found,) = fitted_values(fit, 0)
     return found
 

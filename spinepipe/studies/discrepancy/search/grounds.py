@@ -127,5 +127,5 @@ def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
         members = {
             name: replace(member, model=fit.models[name]) for name, member in models.members.items()
         }
-        fit = run(joint_fit, replace(models, members=members), setting)
+        fit = run(joint_fit, replace(models, members=members), setting, fit.poses)
     raise NoBase(fit.status)

@@ -215,5 +215,6 @@ class Inquiry:
         """Grounds with these of the current effects alone; the base where they have no fit."""
         if not others:
             return self.base
-        fit: JointFit = self.run(joint_fit, current.suppose(others), self.base.setting)
+        start, near = current.suppose(others), current.fit.poses
+        fit: JointFit = self.run(joint_fit, start, self.base.setting, near)
         return self.base.at(fit) if fit.usable else self.base

@@ -46,7 +46,7 @@ class JointFit:
     ----------
     x : (m,) unknowns, moves from the hypothesis' start. models : by specimen, with fitted values.
     chi2 : sum of squared whitened residuals. residuals, jacobians : by specimen, whitened (N,) and
-        (N, own unknowns). predicted : by specimen, per test (T, J, 6).
+        (N, own unknowns). predicted, poses : by specimen, per test (T, J, 6) and (T, n).
     at_bound : (m,) bool. status : empty where all went well, else why not.
     """
 
@@ -57,6 +57,7 @@ class JointFit:
     residuals: Mapping[str, Array]
     jacobians: Mapping[str, Array]
     predicted: Mapping[str, tuple[Array, ...]]
+    poses: Mapping[str, tuple[Array, ...]]
     at_bound: NDArray[np.bool_]
     status: str
 
@@ -76,16 +77,19 @@ class JointFit:
         return np.concatenate(blocks)
 
 
+Near = Mapping[str, tuple[Array, ...]] | None
+
+
 class _Points:
     """Evaluates a hypothesis; the last point is kept."""
 
-    def __init__(self, hypothesis: Hypothesis, setting: Setting) -> None:
+    def __init__(self, hypothesis: Hypothesis, setting: Setting, near: Near) -> None:
         self.hypothesis, self.setting = hypothesis, setting
         subjects = {
             name: Subject(member.model, setting.readings[name].cases, member.free)
             for name, member in hypothesis.members.items()
         }
-        self.together = Together(subjects, setting.zeroed)
+        self.together = Together(subjects, setting.zeroed, near)
         self.sd = np.array([u.sd for u in hypothesis.unknowns])
         self.mean = np.array([u.mean for u in hypothesis.unknowns])
         self.known: dict[
@@ -143,9 +147,14 @@ class _Points:
         return np.concatenate(targets), np.concatenate(rows)
 
 
-def joint_fit(hypothesis: Hypothesis, setting: Setting) -> JointFit:
-    """The hypothesis at its most likely point; weak priors on what no reading tells."""
-    points = _Points(hypothesis, setting)
+def joint_fit(hypothesis: Hypothesis, setting: Setting, near: Near = None) -> JointFit:
+    """The hypothesis at its most likely point; weak priors on what no reading tells.
+
+    Parameters
+    ----------
+    near : poses of a fit that the first ones are looked for near by.
+    """
+    points = _Points(hypothesis, setting, near)
     low = np.array([u.low for u in hypothesis.unknowns])
     high = np.array([u.high for u in hypothesis.unknowns])
     start = np.clip(np.zeros(len(low)), low, high)
@@ -174,12 +183,13 @@ def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) 
     }
     chi2 = float(sum(r @ r for r in residuals.values()))
     readings = {name: one.readings for name, one in predicted.items()}
+    poses = {name: one.poses for name, one in predicted.items()}
     return JointFit(
-        points.hypothesis, x, models, chi2, residuals, jacobians, readings, at_bound, status
+        points.hypothesis, x, models, chi2, residuals, jacobians, readings, poses, at_bound, status
     )
 
 
 def _nowhere(hypothesis: Hypothesis, x: Array, why: str) -> JointFit:
     models = {name: member.model for name, member in hypothesis.members.items()}
     nothing = np.zeros(len(x), dtype=bool)
-    return JointFit(hypothesis, x, models, np.inf, {}, {}, {}, nothing, why)
+    return JointFit(hypothesis, x, models, np.inf, {}, {}, {}, {}, nothing, why)

@@ -54,7 +54,13 @@ class Subject:
 class Together:
     """Specimens under a model each, solved again and again from near poses."""
 
-    def __init__(self, subjects: Mapping[str, Subject], zeroed: bool) -> None:
+    def __init__(
+        self,
+        subjects: Mapping[str, Subject],
+        zeroed: bool,
+        near: Mapping[str, Sequence[Array]] | None = None,
+    ) -> None:
+        """``near``: poses (T, n) of each test, by specimen, near which the first are looked for."""
         self.subjects, self.zeroed = dict(subjects), zeroed
         members = list(self.subjects.values())
         runs = [(number, case) for number, one in enumerate(members) for case in one.cases]
@@ -62,6 +68,10 @@ class Together:
         self._free = [one.free for one in members]
         self._stack = Stack.of([one.model for one in members], runs)
         self._last: tuple[Array, Array, Array] | None = None
+        self._near: Array | None = None
+        if near:
+            every = np.concatenate([q for name in self.subjects for q in near[name]])
+            self._near = every.reshape(len(every), -1, 6)
 
     def at(self, x: Mapping[str, Array]) -> dict[str, Predicted]:
         """Prediction of each with its unknowns moved by x (m,) from its model's values.
@@ -75,7 +85,7 @@ class Together:
         models = [self.model(name, x[name]) for name in names]
         stack = self._stack.with_models(models)
         every = self._padded([x[name] for name in names])
-        found = stack.solve(self._guess(every))
+        found = stack.solve(self._guess(every), why=False)
         _must_stand(found, stack, models)
         q = found.q
         dq = poses_by(stack, q, self._free)
@@ -114,7 +124,7 @@ class Together:
     def _guess(self, x: Array) -> Array | None:
         """(L, J, 6) poses to start from, to first order from the last ones."""
         if self._last is None:
-            return None
+            return self._near
         there, q, dq = self._last
         change = (x - there)[self._stack.loads.chain]
         guess: Array = q + (dq @ change[:, None, :, None])[..., 0]
@@ -123,7 +133,8 @@ class Together:
     def leads_to(self, x: Mapping[str, Array], predicted: Mapping[str, Predicted]) -> bool:
         """Whether the loads lead to the same poses from the neutral one."""
         names = list(self.subjects)
-        found = self._stack.with_models([self.model(name, x[name]) for name in names]).solve()
+        stack = self._stack.with_models([self.model(name, x[name]) for name in names])
+        found = stack.solve(why=False)
         if found.trouble:
             return False
         there = np.concatenate([q for name in names for q in predicted[name].poses])

@@ -202,7 +202,7 @@ def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
     before = grounds.fit
     for share in STARTS:
         supposed = (*standing(before), weaker(one, share))
-        fit = run(joint_fit, grounds.suppose(supposed), grounds.setting)
+        fit = run(joint_fit, grounds.suppose(supposed), grounds.setting, before.poses)
         if fit.usable:
             break
     if not fit.usable or _degenerate(fit, len(supposed) - 1):
