@@ -10,7 +10,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Supposed
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
 from spinepipe.studies.discrepancy.store import Run
@@ -117,11 +117,21 @@ def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, 
     return {name: whitening(one.tests, noise) for name, one in readings.items()}
 
 
+def _why_not(models: Hypothesis, setting: Setting) -> str:
+    """Why the models do not stand where their fit starts, by the engine of record; or nothing."""
+    for name, member in models.members.items():
+        try:
+            Solved(member.model, setting.readings[name].cases, setting.zeroed)
+        except NoEquilibrium as trouble:
+            return str(trouble)
+    return ""
+
+
 def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
     fit = run(joint_fit, models, setting)
     for _ in range(MOST_BASE_FITS):
         if not fit.usable:
-            raise NoBase(fit.status)
+            raise NoBase(_why_not(models, setting) or fit.status)
         if not fit.status:
             return fit
         members = {
