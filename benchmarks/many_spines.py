@@ -7,15 +7,17 @@ import numpy as np
 
 from benchmarks.engine import by_cpodes, by_default_integrator, with_moments
 from benchmarks.timing import cpu_seconds
+from spinepipe.effects import Parameter, create
+from spinepipe.model import ScopedEffect
 from spinepipe.statics import System, follow
-from spinepipe.statics.many import Cases, Spines, solve_many
+from spinepipe.statics.many import Cases, Spines, Stack, solve_many
 from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import Chain as PeerChain
 from tests.reference.peers.chain import t12_s1_chain
 
-JOINTS = (3, 6, 10, 15, 20)
+JOINTS = (3, 6, 10, 17)
 BENT_JOINTS = 6
 """Up to this many joints bear the whole moment; longer spines less, to bend by as much."""
 COUNT = 1000
@@ -48,6 +50,67 @@ def growth() -> Iterator[Growth]:
     """One row for each number of joints."""
     for joints in JOINTS:
         yield _row(joints)
+
+
+@dataclass(frozen=True)
+class Remembering:
+    """CPU seconds of one equilibrium of 6 joints that stiffen and remember, steps one by one.
+
+    Attributes
+    ----------
+    steps : of a test that goes up and back.
+    together_s, engine_s : among many at once, and by the engine of record.
+    difference : largest between the two, m or rad. by_engine : share that was handed on.
+    """
+
+    steps: int
+    together_s: float
+    engine_s: float
+    difference: float
+    by_engine: float
+
+
+MEMORY = ("hysteresis", "nonlinear_stiffening")
+UP_AND_BACK = np.concatenate([np.linspace(0.0, 1.0, 11), np.linspace(0.9, -1.0, 10)])
+
+
+def remembering() -> Remembering:
+    """T12-S1 in flexion, hysteresis and stiffening laws at every joint, each spine of its own."""
+    chain = chain_of(6)
+    plain, case = spine_model(chain), load_case(chain, *UP_AND_BACK)
+    rng = np.random.default_rng(1)
+    models = [plain.with_effects((*plain.effects, *_laws(rng))) for _ in range(COUNT // 5)]
+    stack = Stack.of(models, [(number, case) for number in range(len(models))])
+    found = stack.solve()
+    few = models[:CHECKED]
+    poses = [[one.equilibrium.q for one in follow(System(Chain(m), m, case))] for m in few]
+    first = found.q[: stack.first[len(few)]].reshape(len(few), len(UP_AND_BACK), -1)
+    both = len(models) * len(UP_AND_BACK)
+    engine = cpu_seconds(lambda: [follow(System(Chain(m), m, case)) for m in few], 3).median
+    return Remembering(
+        len(UP_AND_BACK),
+        cpu_seconds(stack.solve, 5).median / both,
+        engine / (len(few) * len(UP_AND_BACK)),
+        float(np.abs(first - np.array(poses)).max()),
+        float(found.by_engine.mean()),
+    )
+
+
+def _laws(rng: np.random.Generator) -> list[ScopedEffect]:
+    """Both laws at all joints, as strong as is usual."""
+    found = []
+    for name in MEMORY:
+        effect = create(name, {})
+        typical = np.array([_typical(p) for p in effect.parameters])
+        spread = np.exp(rng.normal(0.0, 0.1, (BENT_JOINTS, len(typical))))
+        found.append(ScopedEffect(effect, tuple(range(BENT_JOINTS)), typical * spread, ("*",)))
+    return found
+
+
+def _typical(parameter: Parameter) -> float:
+    """The usual value; of what is usually off, half a prior SD."""
+    value = parameter.default if parameter.off is None else parameter.off
+    return value if value else 0.5 * (parameter.side or 1.0) * parameter.prior_scale
 
 
 def chain_of(joints: int) -> PeerChain:

@@ -88,8 +88,7 @@ def main(options: list[str]) -> int:
             "pytest",
             "-m",
             "numeric",
-            "tests/unit",
-            "tests/studies",
+            "tests",
             *options,
         ]
         if subprocess.run(tests, env=environment(kernel), check=False).returncode != 0:

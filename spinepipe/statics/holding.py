@@ -6,6 +6,7 @@ derivatives of earlier laws pass through later ones.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,6 +47,11 @@ class ActiveLaw:
     values: Array
     per_joint: bool
 
+    @cached_property
+    def rows(self) -> Indices | slice:
+        """Its joints as what reads and writes their rows fastest."""
+        return _rows(self.joints)
+
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
         return self.effect.respond(q, self.values, carried)
@@ -64,6 +70,11 @@ class ActivePath:
     joints: Indices
     values: Array
     per_joint: bool
+
+    @cached_property
+    def rows(self) -> Indices | slice:
+        """Its joints as what reads and writes their rows fastest."""
+        return _rows(self.joints)
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
@@ -93,6 +104,13 @@ class ActivePath:
 Law = ActiveLaw | ActivePath
 
 
+def _rows(joints: Indices) -> Indices | slice:
+    """Joints that follow each other as a slice: no copy is made of their rows."""
+    if len(joints) and (np.diff(joints) == 1).all():
+        return slice(int(joints[0]), int(joints[-1]) + 1)
+    return joints
+
+
 @dataclass(frozen=True)
 class Holding:
     """Generalised load (J, 6) that holds the joints and its tangent blocks (J, 6, 6)."""
@@ -105,7 +123,7 @@ def hold(placed: Placed, laws: Sequence[Law], states: States, moved: bool) -> Ho
     """Sum of the laws, pulled back to the joints' own coordinates where geometry moved them."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     for law in laws:
-        j = law.joints
+        j = law.rows
         response = law.respond(placed.q[j], load[j], states)
         if response.by_carried is not None:
             tangent[j] += response.by_carried @ tangent[j]

@@ -50,9 +50,8 @@ def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
         bound = stack.bound(lanes, states)
         before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
         found[lanes] = moved.poses(lanes, bound, q[lanes], moved.on(bound), before)
-    remembering = np.flatnonzero(stack.remembers & ~stack.alone)
-    if len(remembering):
-        _step_by_step(stack, remembering, q, moved, found)
+    for runs in stack.chunks(np.flatnonzero(stack.remembers & ~stack.alone), stepwise=True):
+        _step_by_step(stack, runs, q, moved, found)
     for run in np.flatnonzero(stack.alone).tolist():
         _by_engine(stack, run, unknowns, found)
     return found

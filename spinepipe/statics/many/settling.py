@@ -85,6 +85,8 @@ class _Acting:
 
     def at(self, share: Array) -> Loads:
         """The loads with a share (N,) of the listed ones."""
+        if (share == 1.0).all():
+            return self.full
         part = share[:, None, None]
         return self.full._replace(
             forces=self.bare.forces + part * (self.full.forces - self.bare.forces),
@@ -248,9 +250,11 @@ class _Step:
     def _ramp(self, moving: Moving) -> Array:
         """(N, n) rate of change of the applied load at the start; the load is linear in time."""
         course = self.runs.course
+        ramp = np.zeros_like(self.q0)
+        if (course.shares(self.time) == 1.0).all():
+            return ramp
         corner = course.corners_after(self.time)
         on = np.isfinite(corner)
-        ramp = np.zeros_like(self.q0)
         if not on.any():
             return ramp
         loads = self.acting.at(course.shares(np.where(on, corner, self.time)))

@@ -49,7 +49,7 @@ def carried(stack: Stack, q: Array) -> Array:
     load = np.full(q.shape, np.nan)
     states = stack.initial_states()
     good = ~np.isnan(q[:, 0, 0])
-    for runs in stack.chunks(np.arange(len(stack.remembers))):
+    for runs in stack.chunks(np.arange(len(stack.remembers)), stepwise=True):
         for _, lanes in stack.steps(runs):
             there = lanes[good[lanes]]
             bound = stack.bound(there, states)

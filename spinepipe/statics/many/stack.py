@@ -150,9 +150,9 @@ class Stack:
             near = open_ones & ~np.isnan(guess[self.first[:-1], 0, 0])
             for runs in self.chunks(np.flatnonzero(near & ~self.remembers)):
                 open_ones[runs] = ~self._at_once(runs, guess, q)
-            for runs in self.chunks(np.flatnonzero(near & self.remembers)):
+            for runs in self.chunks(np.flatnonzero(near & self.remembers), stepwise=True):
                 open_ones[runs] = ~self._step_by_step(runs, guess, q)
-        for runs in self.chunks(np.flatnonzero(open_ones)):
+        for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
             open_ones[runs] = ~self._step_by_step(runs, None, q)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
         messages: dict[int, str] = {}
@@ -165,13 +165,13 @@ class Stack:
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
 
-    def chunks(self, runs: Indices) -> Iterator[Indices]:
-        """Runs in portions that are worked on together."""
+    def chunks(self, runs: Indices, stepwise: bool = False) -> Iterator[Indices]:
+        """Runs in portions that are worked on together: all their steps, or a step at a time."""
         if not len(runs):
             return
-        lanes = np.cumsum(self.first[runs + 1] - self.first[runs])
+        widths = np.ones(len(runs)) if stepwise else self.first[runs + 1] - self.first[runs]
         size = max(1, CHUNK // (36 * self.joints))
-        yield from np.split(runs, np.flatnonzero(np.diff(lanes // size)) + 1)
+        yield from np.split(runs, np.flatnonzero(np.diff(np.cumsum(widths) // size)) + 1)
 
     def lanes(self, runs: Indices) -> Indices:
         """All lanes of some runs, run by run."""

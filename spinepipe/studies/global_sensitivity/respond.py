@@ -1,5 +1,6 @@
 """Job: motion and joint loads of one specimen in one batch of samples, in all tests."""
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,6 +37,11 @@ def run(root: str, study: str, design: str, specimen: str, batch: str, output: s
     made_by = provenance("respond", settings, cohort, [specimen], size)
     by_engine = np.concatenate([many.by_engine for many in found])
     handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
+    print(
+        f"{study}: {specimen}, batch {batch}: {by_engine.sum()} of {len(by_engine)} runs left to "
+        "the engine of record",
+        file=sys.stderr,
+    )
     write(to_arrow(TABLE, columns), output, made_by | handed)
 
 
