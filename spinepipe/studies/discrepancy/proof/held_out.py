@@ -25,9 +25,10 @@ from spinepipe.studies.discrepancy.proof.folds import (
     step_fold,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.inquiry import Found
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import Run, at_once
 
 SAME = 1e-6
 """Share of chi2 by which predictions that hang on nothing that was scored may differ."""
@@ -149,12 +150,23 @@ class Asked:
 
 def held_out(found: Found, asked: Asked, run: Run) -> HeldOut:
     """Each fold's readings as predicted by fits without them."""
-    readings, tests = found.base.readings, found.base.tests
-    models = FoldModels(found.base, found.final, asked.refit, run)
+    if asked.refit:  # each fit is kept
+        return _proof(found.base, found.final, asked, run)
+    return run(to_first_order, found.base, found.final, asked)
+
+
+def to_first_order(base: Grounds, final: Grounds, asked: Asked) -> HeldOut:
+    """The same by models that are straight about the fit to all readings."""
+    return _proof(base, final, asked, at_once)
+
+
+def _proof(base: Grounds, final: Grounds, asked: Asked, run: Run) -> HeldOut:
+    readings = base.readings
+    models = FoldModels(base, final, asked.refit, run)
     motion = nothing_held_out(readings)
     folds: list[Fold] = []
     if asked.tests:
-        folds += folds_by_test(readings, tests)
+        folds += folds_by_test(readings, base.tests)
     if asked.specimens:
         folds += folds_by_specimen(readings)
     rows = [_row(models, fold, number, motion) for number, fold in enumerate(folds)]
