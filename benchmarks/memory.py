@@ -47,8 +47,8 @@ def processes() -> Iterator[Memory]:
 
 
 def per_row(job: str, call: str, rows: int) -> float:
-    """Bytes per row that a job of `spinepipe.jobs` holds at most, beyond those of its modules."""
-    imported = f"import spinepipe.jobs.{job} as job\n"
+    """Bytes per row that a job of `spinepipe` holds at most, beyond those of its modules."""
+    imported = f"import spinepipe.{job} as job\n"
     return (_peak_mib(imported + call) - _peak_mib(imported)) * 2**20 / rows
 
 

@@ -9,6 +9,7 @@ from pyarrow import parquet
 
 from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
+from spinepipe.marks import read_mark
 from spinepipe.sensitivity.global_indices.spread import values_of
 from spinepipe.statics.many import solve_many
 from spinepipe.studies.global_sensitivity.batch import start_of_specimen
@@ -157,14 +158,15 @@ def _handed_on(folder: str, specimen: str) -> dict[str, float]:
 def _design_bytes(folder: str) -> float:
     rows = parquet.read_metadata(f"{folder}/results/{STUDY}/design.parquet").num_rows
     call = f"job.run({folder!r}, {STUDY!r}, {f'{folder}/drawn.parquet'!r})"
-    return per_row("global_sensitivity.design", call, rows)
+    return per_row("studies.global_sensitivity.design", call, rows)
 
 
 def _join_bytes(folder: str, rows: int) -> float:
     blocks = Path(folder, f"results/{STUDY}/blocks/responses").rglob("*.parquet")
     paths = [str(path) for path in sorted(blocks)]
-    call = f"job.run('responses', {paths!r}, {f'{folder}/joined.parquet'!r})"
-    return per_row("collect", call, rows)
+    marks, output = [read_mark(path) for path in paths], f"{folder}/joined.parquet"
+    call = f"job.run('global_sensitivity', 'responses', {paths!r}, {marks!r}, {output!r})"
+    return per_row("jobs.collect", call, rows)
 
 
 def target_runs() -> Iterator[Targets]:

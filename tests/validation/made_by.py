@@ -13,7 +13,7 @@ def made_by(*jobs: str) -> str:
     """Digest of these jobs of kind cohort_stiffness, of the generator and of the validation."""
     found = hashlib.sha256()
     for job in jobs:
-        found.update(code_digest(f"spinepipe.jobs.cohort_stiffness.{job}").encode())
+        found.update(code_digest(f"spinepipe.studies.cohort_stiffness.{job}").encode())
     for folder in SOURCES:
         for path in sorted((TESTS / folder).glob("*.py")):
             found.update(path.read_bytes())
