@@ -37,8 +37,8 @@ Flags = NDArray[np.bool_]
 MOST_ITERATIONS = 40
 """Newton's, halved steps among them."""
 
-PUSH_TOLERANCE = 1e-9
-"""Of the largest push: Newton has arrived when it changes by less."""
+PUSH_TOLERANCE, SMALL_PUSH = 1e-9, 1.0
+"""Newton has arrived when pushes change by less than this share of the largest; N and N m."""
 
 SOFTEST, HARDEST = 1e4, 1e-4
 """Compliances of a holder: units squared that it gives way per N m of work."""
@@ -275,7 +275,7 @@ class _Problem:
 
     def _arrived(self, step: Array, pushes: Array) -> bool:
         moved, pushed = step[: self.count], step[self.count :]
-        largest = max(float(np.abs(pushes).max(initial=0.0)), 1e-6)
+        largest = max(float(np.abs(pushes).max(initial=0.0)), SMALL_PUSH)
         near = float(np.abs(pushed).max(initial=0.0)) < PUSH_TOLERANCE * largest
         return near and bool((np.abs(moved) < self.tolerance).all())
 

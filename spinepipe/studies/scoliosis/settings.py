@@ -14,7 +14,6 @@ MODELS: tuple[ModelName, ...] = (
     "linear_regions",
     "linear_per_segment",
     "uniform",
-    "tangent_fitted",
 )
 
 

@@ -80,6 +80,23 @@ class Ends:
         return found
 
 
+@dataclass(frozen=True)
+class Straight:
+    """The shape of linear laws: as many times the rotation as its stiffness says."""
+
+    def load(self, r: Array) -> Array:
+        """(S,) tau over stiffness, rad."""
+        return r
+
+    def rotation(self, load: Array) -> Array:
+        """(S,) r at which it is so."""
+        return load
+
+
+Shape = Ends | Straight
+"""How the moments of segments grow with their rotation, but for a factor of each."""
+
+
 def ends_of(pairs: Pairs, enlargement: float) -> Ends:
     """The ends at so many times the rotations of the films.
 
@@ -100,14 +117,15 @@ class Laws:
 
     Attributes
     ----------
-    ratio : force of the left bend over that of the right one.
-    stretch : (S,) A, N m, for forces of which the larger has an apical moment as asked.
+    shape : of the laws. ratio : force of the left bend over that of the right one.
+    stretch : (S,) A, N m (of linear laws the stiffness, N m/rad), for forces of which the larger
+        has an apical moment as asked.
     constrained : (S,) whether A would have been less than it may be.
     errors : (S, 2) rad, r of the law less r of the film, right and left bend.
     force_right_n, force_left_n : size of the two forces.
     """
 
-    ends: Ends
+    shape: Shape
     ratio: float
     stretch: Array
     constrained: Flags
@@ -121,35 +139,33 @@ class Laws:
         return float(np.sqrt((self.errors**2).mean(axis=1)).sum())
 
 
-def characterise(pairs: Pairs, enlargement: float, apex: int, apical_nm: float) -> Laws:
+def characterise(pairs: Pairs, shape: Shape, apex: int, apical_nm: float) -> Laws:
     """The laws whose rotations under two forces are nearest those of the films.
 
     Parameters
     ----------
-    enlargement : ends over the films' rotations, above 1.
     apex : segment below the apical vertebra of the thoracolumbar or lumbar curve.
     apical_nm : the larger of the two moments about it.
     """
-    ends = ends_of(pairs, enlargement)
 
     def rmse(log_ratio: float) -> float:
-        return _laws(pairs, ends, float(np.exp(log_ratio)), apex, apical_nm).rmse
+        return _laws(pairs, shape, float(np.exp(log_ratio)), apex, apical_nm).rmse
 
     tried = np.linspace(-FARTHEST_RATIO, FARTHEST_RATIO, RATIOS_TRIED)
     best = int(np.argmin([rmse(one) for one in tried]))
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
     found = minimize_scalar(rmse, bounds=(low, high), method="bounded", options={"xatol": 1e-10})
-    return _laws(pairs, ends, float(np.exp(found.x)), apex, apical_nm)
+    return _laws(pairs, shape, float(np.exp(found.x)), apex, apical_nm)
 
 
-def _laws(pairs: Pairs, ends: Ends, ratio: float, apex: int, apical_nm: float) -> Laws:
+def _laws(pairs: Pairs, shape: Shape, ratio: float, apex: int, apical_nm: float) -> Laws:
     """The laws with forces of one ratio, regression through the origin (Eq 4)."""
     force = apical_nm / max(pairs.arm_right[apex], ratio * pairs.arm_left[apex])
     moments = np.stack([force * pairs.arm_right, -ratio * force * pairs.arm_left], axis=1)
     rotations = np.stack([pairs.right, pairs.left], axis=1)
-    g = np.stack([ends.load(one) for one in rotations.T], axis=1)
+    g = np.stack([shape.load(one) for one in rotations.T], axis=1)
     asked = (moments * g).sum(axis=1) / (g**2).sum(axis=1)
     least = LEAST_SHARE * float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
     stretch = np.maximum(asked, least)
-    reached = np.stack([ends.rotation(one / stretch) for one in moments.T], axis=1)
-    return Laws(ends, ratio, stretch, asked < least, reached - rotations, force, ratio * force)
+    reached = np.stack([shape.rotation(one / stretch) for one in moments.T], axis=1)
+    return Laws(shape, ratio, stretch, asked < least, reached - rotations, force, ratio * force)

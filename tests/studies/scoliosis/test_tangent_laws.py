@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.scoliosis.tangent_laws import Pairs, characterise, ends_of
+from spinepipe.studies.scoliosis.tangent_laws import Pairs, Straight, characterise, ends_of
 
 SEGMENTS = 14
 
@@ -70,7 +70,7 @@ def test_a_segment_that_turns_against_the_bend_has_its_larger_rotation_on_both_s
 @pytest.mark.parametrize("ratio", [0.6, 1.0, 1.7])
 def test_films_of_tangent_laws_give_the_laws_back(ratio: float) -> None:
     films, stretch = made_by_laws(ratio)
-    found = characterise(films, 1.2, apex=2, apical_nm=63.0)
+    found = characterise(films, ends_of(films, 1.2), apex=2, apical_nm=63.0)
     assert found.ratio == pytest.approx(ratio, rel=1e-5)
     np.testing.assert_allclose(found.stretch / found.stretch[0], stretch / stretch[0], rtol=1e-5)
     assert np.abs(found.errors).max() < 1e-7
@@ -80,7 +80,7 @@ def test_films_of_tangent_laws_give_the_laws_back(ratio: float) -> None:
 def test_stated_moment_scales_all_laws_and_changes_no_rotation() -> None:
     """Consistency check J7: the films hold the ratio of the forces alone."""
     films = pairs(np.random.default_rng(3))
-    one, other = (characterise(films, 1.2, 2, moment) for moment in (63.0, 6.3))
+    one, other = (characterise(films, ends_of(films, 1.2), 2, moment) for moment in (63.0, 6.3))
     np.testing.assert_allclose(one.stretch, 10.0 * other.stretch, rtol=1e-9)
     np.testing.assert_allclose(one.errors, other.errors, rtol=0, atol=1e-12)
     assert one.ratio == pytest.approx(other.ratio, rel=1e-12)
@@ -91,10 +91,11 @@ def test_stated_moment_scales_all_laws_and_changes_no_rotation() -> None:
 def test_mirrored_films_give_mirrored_laws() -> None:
     films = pairs(np.random.default_rng(4))
     mirrored = Pairs(-films.left, -films.right, films.arm_left, films.arm_right)
-    one, other = characterise(films, 1.2, 2, 63.0), characterise(mirrored, 1.2, 2, 63.0)
+    one, other = (characterise(x, ends_of(x, 1.2), 2, 63.0) for x in (films, mirrored))
     assert other.ratio == pytest.approx(1.0 / one.ratio, rel=1e-6)
     np.testing.assert_allclose(other.stretch, one.stretch, rtol=1e-6)
-    np.testing.assert_allclose(other.ends.upper, -one.ends.lower, rtol=1e-12)
+    upper, lower = ends_of(mirrored, 1.2).upper, ends_of(films, 1.2).lower
+    np.testing.assert_allclose(upper, -lower, rtol=1e-12)
 
 
 def test_a_negative_stretch_is_held_at_the_least_and_told() -> None:
@@ -102,7 +103,8 @@ def test_a_negative_stretch_is_held_at_the_least_and_told() -> None:
     films = pairs(np.random.default_rng(5))
     right, left = films.right.copy(), films.left.copy()
     right[4], left[4] = np.deg2rad(-5.0), np.deg2rad(-0.5)
-    found = characterise(Pairs(right, left, films.arm_right, films.arm_left), 1.2, 2, 63.0)
+    turned = Pairs(right, left, films.arm_right, films.arm_left)
+    found = characterise(turned, ends_of(turned, 1.2), 2, 63.0)
     assert found.constrained.tolist() == [number == 4 for number in range(SEGMENTS)]
     assert found.stretch.min() > 0.0
 
@@ -110,6 +112,21 @@ def test_a_negative_stretch_is_held_at_the_least_and_told() -> None:
 def test_without_enlargement_moments_have_no_meaning_and_rotations_do() -> None:
     """Consistency check J8: at 0 % the films are at the ends; just above, r is still told."""
     films = pairs(np.random.default_rng(6))
-    near = characterise(films, 1.0 + 1e-6, 2, 63.0)
+    near = characterise(films, ends_of(films, 1.0 + 1e-6), 2, 63.0)
     assert np.isfinite(near.rmse)
     assert np.abs(near.errors).max() < np.deg2rad(0.01)
+
+
+def test_films_of_springs_give_the_springs_back() -> None:
+    """Linear laws from the same pairs: Eq 4 with r in the place of tan(B r + C) + D."""
+    stiffness, arm = np.linspace(50.0, 120.0, SEGMENTS), np.linspace(0.4, 0.02, SEGMENTS)
+    right, left = 90.0 * arm / stiffness, -1.4 * 90.0 * 0.9 * arm / stiffness
+    found = characterise(Pairs(right, left, arm, 0.9 * arm), Straight(), 2, 63.0)
+    assert found.ratio == pytest.approx(1.4, rel=1e-6)
+    np.testing.assert_allclose(found.stretch / found.stretch[0], stretch_of(stiffness), rtol=1e-6)
+    assert np.abs(found.errors).max() < 1e-9
+
+
+def stretch_of(stiffness: Array) -> Array:
+    found: Array = stiffness / stiffness[0]
+    return found
