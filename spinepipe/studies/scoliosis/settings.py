@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 from spinepipe.studies.parts import FORM, EachOnce, PublishedStiffness
 from spinepipe.studies.study import Study
 
-ModelName = Literal["tangent", "linear_regions", "linear_per_segment", "uniform", "tangent_fitted"]
+ModelName = Literal["tangent", "linear_regions", "linear_per_segment", "uniform"]
 
 MODELS: tuple[ModelName, ...] = (
     "tangent",
