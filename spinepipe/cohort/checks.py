@@ -12,7 +12,6 @@ from itertools import pairwise
 from math import isnan
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import AppliedLoad, Draft
 from spinepipe.cohort.text import Document
 from spinepipe.model import MOST_JOINTS
@@ -69,7 +68,7 @@ def _height(name: str) -> tuple[int, int] | None:
 
 def check_keys(draft: Draft) -> Iterator[Problem]:
     """Repeated keys in every table but ``loads.csv``, whose wildcards ask for more care."""
-    for stem, form in TABLES.items():
+    for stem, form in draft.forms.items():
         if stem != "loads":
             yield from _repeated_keys(draft, stem, form.keys)
 
@@ -251,7 +250,7 @@ def check_names(draft: Draft) -> Iterator[Problem]:
         "vertebra": draft.vertebrae,
         "joint": draft.joint_names,
     }
-    for stem, form in TABLES.items():
+    for stem, form in draft.forms.items():
         for column, names in known.items():
             if names and column in form.names and stem != "specimens":
                 wildcard = ("*",) if (stem, column) == ("loads", "specimen") else ()

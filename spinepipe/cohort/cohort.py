@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -73,6 +73,8 @@ class Cohort:
     landmarks, joints, bodies : geometry and masses in ground, neutral pose.
     loads : ``specimen`` may be ``*`` (all); ``cycle`` is float64, NaN stands for every cycle.
     motion : ``cycle`` is int64, 1 where the file says nothing.
+    further : tables that a kind of study reads besides, by the stem of their file; rows keep the
+        number of their line in it.
     digest : sha256 over the names and bytes of the files that were read.
     """
 
@@ -91,6 +93,7 @@ class Cohort:
     loads: pd.DataFrame | None
     motion: pd.DataFrame | None
     digest: str
+    further: Mapping[str, pd.DataFrame] = field(default_factory=dict)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -127,7 +130,8 @@ class Cohort:
             "tests": self.tests,
         }
         names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion")
-        return _PartDigests(shared, {name: getattr(self, name) for name in names})
+        tables = {name: getattr(self, name) for name in names}
+        return _PartDigests(shared, {**tables, **self.further})
 
 
 EVERYONE = "*"

@@ -63,6 +63,7 @@ class TableForm:
     columns : declared columns in output order.
     keys : columns that together may occur only once.
     carries : whether undeclared columns are allowed and carried through as text.
+    places : whether it tells where vertebrae are, so that neither landmarks nor joints are needed.
     """
 
     stem: str
@@ -70,6 +71,7 @@ class TableForm:
     columns: tuple[Column, ...]
     keys: tuple[str, ...]
     carries: bool = False
+    places: bool = False
 
     @property
     def file(self) -> str:

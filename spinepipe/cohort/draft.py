@@ -1,15 +1,15 @@
 """A cohort while it is being checked: what could be read of it, wildcards of loads written out."""
 
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from math import isnan
 from typing import Any
 
 import pandas as pd
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import TABLES
+from spinepipe.cohort.columns import TABLES, TableForm
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Draft:
     tables : tables by stem, indexed by line number; cells that are bad are NaN.
     absent : stems of the files that do not exist. A stem neither here nor in ``tables`` belongs to
         a file that could not be read, about which nothing more is said.
+    forms : of all files that are read, by stem.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Draft:
     gravity: bool | None
     tables: dict[str, pd.DataFrame]
     absent: frozenset[str]
+    forms: Mapping[str, TableForm] = field(default_factory=lambda: TABLES)
 
     @property
     def specimens(self) -> tuple[str, ...]:
@@ -45,7 +47,7 @@ class Draft:
 
     def file(self, stem: str) -> str:
         """Name of a table's file in messages."""
-        return f"{self.name}/{TABLES[stem].file}"
+        return f"{self.name}/{self.forms[stem].file}"
 
     def rows(self, stem: str, *columns: str) -> Iterator[tuple[int, tuple[Any, ...]]]:
         """Line number and cells of the named columns, row by row; nothing for an absent table."""

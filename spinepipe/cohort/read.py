@@ -1,6 +1,6 @@
 """Read a cohort folder, or say everything that is wrong with it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from spinepipe.cohort.checks import (
     usable_vertebrae,
 )
 from spinepipe.cohort.cohort import Cohort, CohortHeader
-from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
 from spinepipe.cohort.draft import Draft, applied_loads
 from spinepipe.cohort.text import Document, read_yaml, validate
@@ -26,12 +26,13 @@ from spinepipe.problems import InputError, Problem
 __all__ = ["read"]
 
 
-def read(folder: Path) -> Cohort:
+def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
     """Read and validate one cohort folder.
 
     Parameters
     ----------
     folder : ``config/cohorts/<cohort>``, or any other folder of the same form.
+    further : files that are read besides those of every cohort, where they are there.
 
     Raises
     ------
@@ -44,18 +45,20 @@ def read(folder: Path) -> Cohort:
         raise InputError([Problem(str(folder), None, None, found, allowed, "check the name")])
     name = folder.resolve().name
     document, header, problems = _read_header(folder, name)
-    tables, absent = _read_tables(folder, name, problems)
+    forms = TABLES | {form.stem: form for form in further}
+    tables, absent = _read_tables(folder, name, forms, problems)
     draft = Draft(
         name=name,
         vertebrae=usable_vertebrae(document) if document else (),
         gravity=document.data.get("gravity") is True if document else None,
         tables=tables,
         absent=absent,
+        forms=forms,
     )
     problems += _checks(draft)
     if problems or header is None:
         raise InputError(problems)
-    return _cohort(folder, header, tables)
+    return _cohort(folder, header, tables, forms)
 
 
 def _read_header(
@@ -72,14 +75,14 @@ def _read_header(
 
 
 def _read_tables(
-    folder: Path, name: str, problems: list[Problem]
+    folder: Path, name: str, forms: Mapping[str, TableForm], problems: list[Problem]
 ) -> tuple[dict[str, pd.DataFrame], frozenset[str]]:
     """Tables by stem and the stems without a file; what is wrong is added to ``problems``."""
     tables: dict[str, pd.DataFrame] = {}
-    absent = {stem for stem, form in TABLES.items() if not (folder / form.file).is_file()}
+    absent = {stem for stem, form in forms.items() if not (folder / form.file).is_file()}
     if "specimens" in absent:
         problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
-    for stem, form in TABLES.items():
+    for stem, form in forms.items():
         if stem not in absent:
             table, faults = read_table(folder / form.file, form, f"{name}/{form.file}")
             problems += faults
@@ -103,8 +106,13 @@ def _missing(file: str) -> Problem:
     return Problem(file, None, None, "no such file", "a file of this name", "add it")
 
 
-def _cohort(folder: Path, header: CohortHeader, tables: dict[str, pd.DataFrame]) -> Cohort:
-    final = {stem: _final(table) for stem, table in tables.items()}
+def _cohort(
+    folder: Path,
+    header: CohortHeader,
+    tables: dict[str, pd.DataFrame],
+    forms: Mapping[str, TableForm],
+) -> Cohort:
+    final = {stem: _final(table) for stem, table in tables.items() if stem in TABLES}
     return Cohort(
         name=header.cohort,
         title=header.title,
@@ -120,7 +128,8 @@ def _cohort(folder: Path, header: CohortHeader, tables: dict[str, pd.DataFrame])
         bodies=final.get("bodies"),
         loads=final.get("loads"),
         motion=_numbered(final.get("motion")),
-        digest=_digest(folder),
+        digest=_digest(folder, forms),
+        further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )
 
 
@@ -137,9 +146,9 @@ def _numbered(motion: pd.DataFrame | None) -> pd.DataFrame | None:
     return motion.assign(cycle=motion["cycle"].fillna(1.0).astype("int64"))
 
 
-def _digest(folder: Path) -> str:
+def _digest(folder: Path, forms: Mapping[str, TableForm]) -> str:
     digest = sha256()
-    for file in sorted([COHORT_YAML, *(form.file for form in TABLES.values())]):
+    for file in sorted([COHORT_YAML, *(form.file for form in forms.values())]):
         if (folder / file).is_file():
             digest.update(file.encode() + b"\0" + sha256((folder / file).read_bytes()).digest())
     return digest.hexdigest()

@@ -166,10 +166,18 @@ def _stopped(q: Array, found: _Newton | None, reached: float, iterations: int) -
 
 
 def _newton(system: System, start: Array, loading: Loading, states: States) -> _Newton | None:
-    """Newton from ``start``; None unless the steps contract onto a pose within joint motion."""
+    """Newton from ``start``; None unless the steps contract onto a pose within joint motion.
+
+    A step beyond the ends of a law, where it carries without limit, is halved.
+    """
     q, last = start, np.inf
+    step: Array | None = None
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
+        if step is not None and not np.isfinite(balance.residual).all():
+            step = 0.5 * step
+            q = q - step
+            continue
         try:
             factored = factor(balance.tangent)
         except SingularTangent:

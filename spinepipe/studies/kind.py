@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import TableForm
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.study import Study
@@ -84,6 +85,7 @@ class Kind:
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
     exports : ``file:function`` of what makes a model of a specimen for other programs.
+    forms : files of a cohort's folder that it reads besides those of every cohort.
     """
 
     settings: type[Study]
@@ -96,6 +98,7 @@ class Kind:
     ignored_by_figures: tuple[str, ...] = ()
     makes_models: str | None = None
     exports: str | None = None
+    forms: tuple[TableForm, ...] = ()
 
     def job(self, name: str) -> Job:
         """The job of that name."""

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import TableForm
 from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.parts import FORM
@@ -129,9 +130,15 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         place = (document.file, document.line_of("cohort"), "cohort")
         return None, [Problem(*place, f"unknown cohort '{name}'", allowed, remedy)]
     try:
-        return cohorts.read(folder), []
+        return cohorts.read(folder, _further(document)), []
     except InputError as error:
         return None, list(error.problems)
+
+
+def _further(document: Document) -> tuple[TableForm, ...]:
+    """The files that the kind of a study reads besides."""
+    kind = document.data.get("kind")
+    return kind_of(kind).forms if isinstance(kind, str) and kind in kind_names() else ()
 
 
 CONFIG = Path("config") / "config.yaml"

@@ -29,32 +29,46 @@ def settled(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arr
 def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Array, Array, Flags]:
     """Poses (N, J, 6), tangents there (N, J, 6, 6), and which lanes have arrived (N,).
 
-    A lane whose steps do not contract, or that leaves joint motion, is given up.
+    A lane whose steps do not contract, or that leaves joint motion, is given up. A step beyond the
+    ends of a law, where it carries without limit, is halved.
     """
     q = start.copy()
     tangents = np.zeros((*q.shape, 6))
     arrived = np.zeros(len(q), dtype=bool)
     left: Indices = np.arange(len(q))
-    last = np.full(len(q), np.inf)
+    last, taken = np.full(len(q), np.inf), np.zeros_like(q)
     bound, acting = laws(left), loads
     for _ in range(MOST_ITERATIONS):
         held = bound.held(q[left])
         step, solved = newton_step(chains, acting, q[left], held.load, held.tangent)
+        beyond = _without_limit(held.load)
+        step[beyond] = -0.5 * taken[beyond]
         q[left] += step
+        taken = np.where(beyond[:, None, None], -step, step)
         size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
-        inside = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
-        going = solved & inside & (size < 4.0 * last)
-        there = going & (size < 1.0)
+        inside: Flags = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
+        nearer = np.where(beyond, size > 0.0, solved & (size < 4.0 * last))
+        going: Flags = inside & nearer
+        there = going & (size < 1.0) & ~beyond
         arrived[left[there]] = True
         tangents[left[there]] = held.tangent[there]
         going &= ~there
         if not going.any():
             break
-        last = size[going]
+        last, taken = np.where(beyond, last, size)[going], taken[going]
         if not going.all():
             left = left[going]
             bound, acting = laws(left), part(loads, left)
     return q, tangents, arrived
+
+
+def _without_limit(load: Array) -> Flags:
+    """(N,) lanes with a joint that holds without limit, of loads (N, J, 6)."""
+    finite = np.isfinite(load)
+    if finite.all():
+        return np.zeros(len(load), dtype=bool)
+    found: Flags = np.logical_not(finite.all(axis=(1, 2)))
+    return found
 
 
 def newton_step(

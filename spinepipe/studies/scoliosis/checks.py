@@ -1,0 +1,219 @@
+"""What a study of scoliotic spines demands of its films: each fault with its place and remedy."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document
+from spinepipe.effects.contract import Array
+from spinepipe.problems import Problem
+from spinepipe.studies.places import at
+from spinepipe.studies.scoliosis.films import (
+    CENTRE,
+    CORNERS,
+    ERECT,
+    HELD_OUT,
+    LEFT,
+    NEEDED,
+    RIGHT,
+    Film,
+    placed,
+)
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+FARTHEST_APART_DEG = 25.0
+"""Tilt of a vertebra and of the line through its neighbours' centres differ by less."""
+
+LEAST_BEND_DEG = 2.0
+"""A bending film tilts the top of the spine by more than this."""
+
+RADIANS = 0.1
+"""Tilts that are so small a share of what the centres say are no degrees."""
+
+SAME_MM = 0.05
+"""Films whose centres all agree to this are one film."""
+
+SHORTER = 0.97
+"""Traction may not leave less than this share of the erect length."""
+
+
+def check_scoliosis(document: Document, study: Scoliosis, cohort: Cohort) -> Iterator[Problem]:
+    """Everything that is wrong with the films of a cohort."""
+    films = cohort.further.get("films")
+    if films is None:
+        place = at(document, "cohort")
+        found, allowed = "a cohort without films.csv", "a cohort with films of its patients"
+        yield Problem(*place, found, allowed, "add films.csv, or name another cohort")
+        return
+    for patient in cohort.specimen_names:
+        yield from _patient(cohort, patient, films[films["specimen"] == patient])
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a fault of a film is told."""
+
+    file: str
+    patient: str
+    position: str
+
+    def problem(
+        self, row: int | None, what: str | None, found: str, allowed: str, remedy: str
+    ) -> Problem:
+        named = f"{self.patient}, film {self.position}: {found}"
+        return Problem(self.file, row, what, named, allowed, remedy)
+
+
+def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Problem]:
+    file = f"{cohort.name}/films.csv"
+    known = list(dict.fromkeys(rows["position"]))
+    for needed in NEEDED:
+        if needed not in known:
+            found = f"no film of {patient} in position {needed}"
+            allowed = f"films {', '.join(NEEDED)} of every patient"
+            yield Problem(file, None, "position", found, allowed, "add its rows")
+    shapes: dict[str, Film] = {}
+    for position in known:
+        film, place = rows[rows["position"] == position], _Place(file, patient, position)
+        faults = list(_film(cohort, place, film))
+        yield from faults
+        if not faults:
+            readings = film.groupby(["observer", "repeat"], sort=False, dropna=False)
+            each = [placed(one, cohort.vertebrae).seen_from_below() for _, one in readings]
+            numbers = np.mean([[one.right, one.up, one.tilt] for one in each], axis=0)
+            shapes[position] = Film(*numbers)
+            yield from _tilts(place, film, cohort.vertebrae, shapes[position])
+    yield from _bends(file, patient, shapes)
+
+
+def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem]:
+    """Each reading of a film: every vertebra once, all of its numbers, the lowest at nought."""
+    for (observer, repeat), reading in rows.groupby(
+        ["observer", "repeat"], sort=False, dropna=False
+    ):
+        who = ", ".join(
+            f"{n} {v}" for n, v in (("observer", observer), ("repeat", repeat)) if v == v
+        )
+        by = f" ({who})" if who else ""
+        line = int(reading.index[0])
+        there = list(reading["vertebra"])
+        missing = [name for name in cohort.vertebrae if name not in there]
+        if missing:
+            found = f"no {', '.join(missing)}{by}"
+            yield place.problem(
+                line, "vertebra", found, "every vertebra of cohort.yaml", "add the rows"
+            )
+        twice = [name for name in dict.fromkeys(there) if there.count(name) > 1]
+        if twice:
+            found = f"{', '.join(twice)} twice{by}"
+            remedy = "delete one film, or number them as repeats"
+            yield place.problem(line, "vertebra", found, "a position once", remedy)
+        if missing or twice:
+            continue
+        whole = reading[list(CORNERS)].notna().all(axis=1)
+        centre = reading[list(CENTRE)].notna().all(axis=1)
+        for row in reading.index[~(whole | centre)].tolist():
+            vertebra = str(reading.loc[row, "vertebra"])
+            found = f"{vertebra} has neither its centre and tilt nor four corners"
+            allowed = "y_mm, z_mm and orientation_deg, or the eight numbers of the corners"
+            yield place.problem(int(row), None, found, allowed, "fill the cells")
+        if centre.all() and not whole.all():
+            yield from _lowest(cohort, place, reading)
+
+
+def _lowest(cohort: Cohort, place: _Place, reading: pd.DataFrame) -> Iterator[Problem]:
+    lowest = reading[reading["vertebra"] == cohort.vertebrae[0]]
+    numbers = lowest[list(CENTRE)].to_numpy(float)[0]
+    if np.abs(numbers).max() > 1e-6:
+        shown = ", ".join(f"{n} {v:g}" for n, v in zip(CENTRE, numbers, strict=True))
+        yield place.problem(
+            int(lowest.index[0]),
+            None,
+            f"{cohort.vertebrae[0]} at {shown}",
+            f"0, 0 and 0 at {cohort.vertebrae[0]}, whose frame the film is measured in",
+            "subtract its place and turn the film, or give corners",
+        )
+
+
+def _tilts(
+    place: _Place, rows: pd.DataFrame, vertebrae: tuple[str, ...], film: Film
+) -> Iterator[Problem]:
+    """Does what is said of tilt go with the line of the centres?"""
+    line = _line_of_centres(film)
+    given = float(np.abs(film.tilt).max())
+    if np.abs(line).max() > np.deg2rad(5.0) and given < RADIANS * np.abs(line).max():
+        found = f"no vertebra tilted by more than {DEG_PER_RAD * given:.2g}, while the line of "
+        found += f"centres leans by {DEG_PER_RAD * float(np.abs(line).max()):.0f} deg"
+        remedy = "radians? multiply by 57.3"
+        yield place.problem(None, "orientation_deg", found, "degrees", remedy)
+        return
+    off = np.abs(film.tilt - line)
+    worst = int(np.argmax(off))
+    if off[worst] > np.deg2rad(FARTHEST_APART_DEG):
+        row = int(rows.index[(rows["vertebra"] == vertebrae[worst]).to_numpy()][0])
+        found = f"{vertebrae[worst]} tilted {DEG_PER_RAD * float(off[worst]):.0f} deg from the line"
+        allowed = f"within {FARTHEST_APART_DEG:g} deg of the line through its neighbours' centres"
+        remedy = "check sign and vertebra; is the film mirrored (AP for PA)?"
+        yield place.problem(row, "orientation_deg", f"{found} of centres", allowed, remedy)
+
+
+def _line_of_centres(film: Film) -> Array:
+    """(V,) rad, tilt of the line from the neighbour below to the neighbour above."""
+    right, up = film.right, film.up
+    below = np.maximum(np.arange(len(up)) - 1, 0)
+    above = np.minimum(np.arange(len(up)) + 1, len(up) - 1)
+    found: Array = np.arctan2(right[above] - right[below], up[above] - up[below])
+    return found
+
+
+def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]:
+    """Do the films show what their positions say?"""
+    if ERECT not in films:
+        return
+    erect = films[ERECT]
+    yield from _same(file, patient, films)
+    leans = {}
+    for position, side in ((RIGHT, 1.0), (LEFT, -1.0)):
+        if position in films and not _alike(films[position], erect):
+            leans[position] = side * float(films[position].tilt[-1] - erect.tilt[-1])
+    wrong = [name for name, lean in leans.items() if lean < -np.deg2rad(LEAST_BEND_DEG)]
+    if len(wrong) == 2:
+        found = f"{patient}: both bending films lean to the other side"
+        remedy = "exchange the two positions, or mirror the films (AP for PA)"
+        allowed = "right_bending to the right: y and orientation fall"
+        yield Problem(file, None, "position", found, allowed, remedy)
+    for position, lean in leans.items():
+        place = _Place(file, patient, position)
+        if wrong == [position]:
+            found = "the spine leans to the other side than on the erect film"
+            remedy = "is the film mirrored (AP for PA), or the other bend?"
+            yield place.problem(None, "position", found, f"a film of {position}", remedy)
+        elif abs(lean) <= np.deg2rad(LEAST_BEND_DEG):
+            found = f"the top tilts by {DEG_PER_RAD * lean:.1f} deg only"
+            allowed = f"more than {LEAST_BEND_DEG:g} deg from the erect film"
+            yield place.problem(None, "position", found, allowed, "is this the bending film?")
+    traction = films.get("traction")
+    if traction is not None and traction.up[-1] < SHORTER * erect.up[-1]:
+        place, lengths = _Place(file, patient, "traction"), (traction.up[-1], erect.up[-1])
+        found = "{:.0f} mm tall, {:.0f} mm erect".format(*(MM_PER_M * one for one in lengths))
+        remedy = "is the film scaled, or of another position?"
+        yield place.problem(None, "z_mm", found, "traction lengthens a spine", remedy)
+
+
+def _same(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]:
+    names = [name for name in (*NEEDED, *HELD_OUT) if name in films]
+    for number, one in enumerate(names):
+        for other in names[number + 1 :]:
+            if _alike(films[one], films[other]):
+                place, found = _Place(file, patient, other), f"the same as film {one}"
+                remedy = "replace the one that was entered twice"
+                yield place.problem(None, "position", found, "a film of its own", remedy)
+
+
+def _alike(one: Film, other: Film) -> bool:
+    apart = np.hypot(one.right - other.right, one.up - other.up)
+    return bool(MM_PER_M * apart.max() < SAME_MM)

@@ -1,0 +1,100 @@
+"""Cobb and Ferguson angles of a spine's curves, chosen on the erect film and kept for all films.
+
+A curve lies between two end vertebrae, the ones tilted farthest to either side; its apex is the
+vertebra farthest from the line between their centres. Cobb's angle is between the tilts of the end
+vertebrae, Ferguson's between the lines from their centres to the apex's.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.studies.scoliosis.films import Film
+
+LEAST_CURVE = float(np.deg2rad(5.0))
+"""Smaller changes of tilt are waves of the line, no curves."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Numbers of the lower and upper end vertebra and of the apex, counted from below.
+
+    Attributes
+    ----------
+    side : 1 for a bulge to the right, -1 to the left.
+    """
+
+    lower: int
+    upper: int
+    apex: int
+    side: int
+
+    def cobb(self, film: Film) -> float:
+        """Tilt of the lower less that of the upper end vertebra, rad; to its side positive."""
+        return float(self.side * (film.tilt[self.lower] - film.tilt[self.upper]))
+
+    def ferguson(self, film: Film) -> float:
+        """Angle between the lines below and above the apex, rad; to its side positive."""
+        points = np.stack([film.right, film.up], axis=1)
+        below = points[self.apex] - points[self.lower]
+        above = points[self.upper] - points[self.apex]
+        tilt_below, tilt_above = (np.arctan2(*line) for line in (below, above))
+        return float(self.side * (tilt_below - tilt_above))
+
+
+def curves(erect: Film) -> tuple[Curve, ...]:
+    """The curves of a spine, caudal to cranial; adjacent ones share an end vertebra."""
+    ends = _turning_points(erect.tilt)
+    found = []
+    for lower, upper in pairwise(ends):
+        if upper - lower < 2:
+            continue
+        side = 1 if erect.tilt[lower] > erect.tilt[upper] else -1
+        found.append(Curve(lower, upper, _apex(erect, lower, upper), side))
+    return tuple(found)
+
+
+def main_curve(erect: Film) -> Curve:
+    """The curve of the largest Cobb angle."""
+    return max(curves(erect), key=lambda curve: curve.cobb(erect))
+
+
+def lumbar_apex(erect: Film, vertebrae: tuple[str, ...]) -> int:
+    """Apex of the lowest curve whose apex is lumbar or at T12 or T11; else of the lowest curve."""
+    every = curves(erect)
+    names = (vertebrae[one.apex] for one in every)
+    low = [one for one, name in zip(every, names, strict=True) if name[0] == "L" or name in _LAST]
+    chosen = low or list(every[:1])
+    return chosen[0].apex if chosen else len(vertebrae) // 3
+
+
+_LAST = ("T12", "T11")
+
+
+def _turning_points(tilt: Array) -> list[int]:
+    """Vertebrae at which the tilt turns back, ends among them; small waves are none."""
+    points, way = [0], 0
+    extreme = 0
+    for at in range(1, len(tilt)):
+        gone = tilt[at] - tilt[extreme]
+        if way == 0:
+            if abs(gone) > LEAST_CURVE:
+                way, extreme = int(np.sign(gone)), at
+        elif way * gone >= 0.0:
+            extreme = at
+        elif abs(gone) > LEAST_CURVE:
+            points.append(extreme)
+            way, extreme = -way, at
+    points.append(extreme if way else len(tilt) - 1)
+    return points
+
+
+def _apex(erect: Film, lower: int, upper: int) -> int:
+    """The vertebra between two others that is farthest from the line through these."""
+    points = np.stack([erect.right, erect.up], axis=1)
+    line = points[upper] - points[lower]
+    off = points[lower + 1 : upper] - points[lower]
+    away = np.abs(line[0] * off[:, 1] - line[1] * off[:, 0])
+    return lower + 1 + int(np.argmax(away))

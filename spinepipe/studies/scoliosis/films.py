@@ -1,0 +1,228 @@
+"""Films of a patient: where every vertebra lies and how it is tilted, at every position.
+
+In files the axes are those of Jalalian 2017: y to the left, z along the lowest vertebra, rotation
+to the right negative. Here: to the right, up, tilt to the right; m and rad. Each film is seen from
+its own lowest vertebra, which then lies at nought and stands upright.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.effects.contract import Array
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+ERECT, RIGHT, LEFT = "erect", "right_bending", "left_bending"
+NEEDED = (ERECT, RIGHT, LEFT)
+HELD_OUT = ("neutral", "traction")
+
+CENTRE = ("y_mm", "z_mm", "orientation_deg")
+CORNERS = tuple(
+    f"{end}_{side}_{axis}_mm"
+    for end in ("upper", "lower")
+    for side in ("left", "right")
+    for axis in "yz"
+)
+
+
+_SPECIMEN = Column("specimen", "patient", "text", required=True)
+_FARTHEST_MM = 2000.0
+
+FILMS = TableForm(
+    "films",
+    "patient x position x vertebra x observer x repeat",
+    (
+        _SPECIMEN,
+        Column("position", "erect, right_bending, left_bending or another one", "text", True),
+        Column("vertebra", "vertebra, as listed in cohort.yaml", "text", required=True),
+        Column("observer", "who read the film", "text"),
+        Column("repeat", "which of the observer's readings", "integer", low=1, high=1000),
+        Column("y_mm", "centre of the body, to the left", low=-_FARTHEST_MM, high=_FARTHEST_MM),
+        Column(
+            "z_mm", "centre of the body, along the lowest", low=-_FARTHEST_MM, high=_FARTHEST_MM
+        ),
+        Column("orientation_deg", "tilt of the body, to the left", low=-90.0, high=90.0),
+        *(
+            Column(
+                name,
+                f"{' '.join(name.split('_')[:2])} corner, {'left' if 'y_mm' in name else 'up'}",
+                low=-_FARTHEST_MM,
+                high=_FARTHEST_MM,
+            )
+            for name in CORNERS
+        ),
+    ),
+    keys=("specimen", "position", "vertebra", "observer", "repeat"),
+    places=True,
+)
+
+PATIENTS = TableForm(
+    "patients",
+    "patient",
+    (
+        _SPECIMEN,
+        Column("sex", "sex", "text"),
+        Column("age_years", "age", low=0, high=130),
+        Column("lenke_class", "Lenke class, as in 1A", "text"),
+        Column("cobb_deg", "Cobb angle of the main curve on the erect film", low=0, high=180),
+    ),
+    keys=("specimen",),
+)
+
+
+@dataclass(frozen=True)
+class Film:
+    """One position of V vertebrae, caudal to cranial.
+
+    Attributes
+    ----------
+    right, up, tilt : (V,) m, m and rad; nought at the lowest vertebra.
+    """
+
+    right: Array
+    up: Array
+    tilt: Array
+
+    @cached_property
+    def turned(self) -> Array:
+        """(V - 1,) rad, tilt of each vertebra less that of the one below."""
+        found: Array = np.diff(self.tilt)
+        return found
+
+    @property
+    def top(self) -> Array:
+        """(3,) place and tilt of the uppermost vertebra."""
+        return np.array([self.right[-1], self.up[-1], self.tilt[-1]])
+
+    def seen_from_below(self) -> "Film":
+        """The same from its lowest vertebra."""
+        cos, sin = np.cos(self.tilt[0]), np.sin(self.tilt[0])
+        right, up = self.right - self.right[0], self.up - self.up[0]
+        return Film(cos * right - sin * up, sin * right + cos * up, self.tilt - self.tilt[0])
+
+    def scaled(self, factor: float) -> "Film":
+        """The same film, so many times as large."""
+        return Film(factor * self.right, factor * self.up, self.tilt)
+
+    def mirrored(self) -> "Film":
+        """Left and right exchanged."""
+        return Film(-self.right, self.up, -self.tilt)
+
+
+@dataclass(frozen=True)
+class Read:
+    """What was read of one patient.
+
+    Attributes
+    ----------
+    films : by position. sizes : by position, mean height of the vertebrae, m; none without corners.
+    scales : by position, the factor that makes the film as large as the erect one.
+    sd : (3,) m, m and rad, SD of what is taken for right, up and tilt; NaN where none tells.
+    readings : by position, how many were averaged.
+    """
+
+    films: Mapping[str, Film]
+    sizes: Mapping[str, float]
+    scales: Mapping[str, float]
+    sd: Array
+    readings: Mapping[str, int]
+
+    def turned(self, position: str) -> Array:
+        """(V - 1,) rad: r, how far segments have turned since the erect film, right positive."""
+        found: Array = self.films[position].turned - self.films[ERECT].turned
+        return found
+
+    def chord(self, position: str) -> float:
+        """Distance from the lowest to the uppermost vertebra, over that on the erect film."""
+        lengths = [np.hypot(*self.films[one].top[:2]) for one in (position, ERECT)]
+        return float(lengths[0] / lengths[1])
+
+
+def read_films(cohort: Cohort, patient: str) -> Read:
+    """The films of a patient; `checks` has seen to it that they are whole."""
+    rows = cohort.further["films"]
+    rows = rows[rows["specimen"] == patient]
+    films, sizes, readings, scatter = {}, {}, {}, []
+    for position, film in rows.groupby("position", sort=False):
+        each = [
+            placed(one, cohort.vertebrae).seen_from_below()
+            for _, one in film.groupby(["observer", "repeat"], sort=False, dropna=False)
+        ]
+        stack = np.array([[one.right, one.up, one.tilt] for one in each])
+        films[str(position)], readings[str(position)] = Film(*stack.mean(axis=0)), len(each)
+        if len(each) > 1:
+            scatter.append((stack[:, :, 1:].var(axis=0, ddof=1).mean(axis=1), len(each)))
+        size = height(film)
+        if size is not None:
+            sizes[str(position)] = size
+    scales = _scales(films, sizes)
+    films = {name: film.scaled(scales[name]) for name, film in films.items()}
+    return Read(films, sizes, scales, _sd(scatter), readings)
+
+
+def placed(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
+    """One reading of a film, in the film's own frame."""
+    rows = rows.set_index("vertebra").loc[list(vertebrae)]
+    if rows[list(CORNERS)].notna().all(axis=None):
+        return _of_corners(rows)
+    y, z, turn = (rows[name].to_numpy(float) for name in CENTRE)
+    return Film(-y / MM_PER_M, z / MM_PER_M, -turn / DEG_PER_RAD)
+
+
+def _of_corners(rows: pd.DataFrame) -> Film:
+    """Centre where the diagonals cross, tilt of the line through the centres of the endplates."""
+    corner = corners(rows)
+    start, across = corner["upper_left"], corner["lower_right"] - corner["upper_left"]
+    other, back = corner["upper_right"], corner["lower_left"] - corner["upper_right"]
+    share = _cross(other - start, back) / _cross(across, back)
+    centre = start + share[:, None] * across
+    axis = (corner["upper_left"] + corner["upper_right"]) - (
+        corner["lower_left"] + corner["lower_right"]
+    )
+    tilt = np.arctan2(-axis[:, 0], axis[:, 1])
+    return Film(-centre[:, 0] / MM_PER_M, centre[:, 1] / MM_PER_M, tilt)
+
+
+def corners(rows: pd.DataFrame) -> dict[str, Array]:
+    """(V, 2) y and z, mm, of the four corners."""
+    return {
+        f"{end}_{side}": rows[[f"{end}_{side}_{axis}_mm" for axis in "yz"]].to_numpy(float)
+        for end in ("upper", "lower")
+        for side in ("left", "right")
+    }
+
+
+def _cross(one: Array, other: Array) -> Array:
+    found: Array = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    return found
+
+
+def height(rows: pd.DataFrame) -> float | None:
+    """Mean height of the vertebrae on a film, m; None without their corners."""
+    if not rows[list(CORNERS)].notna().all(axis=None):
+        return None
+    corner = corners(rows)
+    axis = 0.5 * (
+        corner["upper_left"] + corner["upper_right"] - corner["lower_left"] - corner["lower_right"]
+    )
+    return float(np.hypot(*axis.T).mean()) / MM_PER_M
+
+
+def _scales(films: Mapping[str, Film], sizes: Mapping[str, float]) -> dict[str, float]:
+    known = ERECT in sizes
+    return {name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in films}
+
+
+def _sd(scatter: list[tuple[Array, int]]) -> Array:
+    """(3,) SD of a mean of readings, pooled over films."""
+    if not scatter:
+        return np.full(3, np.nan)
+    freedom = np.array([count - 1 for _, count in scatter], dtype=float)
+    variance = np.array([one / count for one, count in scatter])
+    found: Array = np.sqrt((freedom[:, None] * variance).sum(axis=0) / freedom.sum())
+    return found

@@ -1,0 +1,175 @@
+"""Everything that may be wrong with films is told, with film, vertebra and remedy."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort.text import Document
+from spinepipe.problems import InputError
+from spinepipe.studies.scoliosis.checks import check_scoliosis
+from spinepipe.studies.scoliosis.films import CENTRE, FILMS, PATIENTS
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from tests.generators import ais_films
+
+STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+LEVELS = ais_films.LEVELS
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cohort of one patient without a fault."""
+    folder = tmp_path_factory.mktemp("films") / "ais"
+    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    return folder
+
+
+def told(folder: Path, sound: Path, change: Callable[[pd.DataFrame], pd.DataFrame]) -> list[str]:
+    """What is said of the sound cohort with its films changed."""
+    folder = folder / "ais"
+    folder.mkdir()
+    for file in ("cohort.yaml", "specimens.csv", "patients.csv"):
+        (folder / file).write_bytes((sound / file).read_bytes())
+    change(pd.read_csv(sound / "films.csv")).to_csv(folder / "films.csv", index=False)
+    cohort = cohorts.read(folder, (FILMS, PATIENTS))
+    document = Document("s.yaml", {"cohort": "ais"}, {})
+    return [str(problem) for problem in check_scoliosis(document, STUDY, cohort)]
+
+
+def on(table: pd.DataFrame, *positions: str) -> "pd.Series[bool]":
+    return table["position"].isin(positions)
+
+
+def test_sound_films_are_not_blamed(tmp_path: Path, sound: Path) -> None:
+    assert told(tmp_path, sound, lambda table: table) == []
+
+
+def radians(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(orientation_deg=table["orientation_deg"] / 57.2958)
+
+
+def mirrored(*positions: str) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        rows = on(table, *positions)
+        table.loc[rows, ["y_mm", "orientation_deg"]] *= -1.0
+        return table
+
+    return change
+
+
+def exchanged(one: str, other: str) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    names = {one: other, other: one}
+    return lambda table: table.assign(position=table["position"].replace(names))
+
+
+def copied(source: str, target: str) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        numbers = table.loc[on(table, source), list(CENTRE)].to_numpy()
+        table.loc[on(table, target), list(CENTRE)] = numbers
+        return table
+
+    return change
+
+
+def twice(table: pd.DataFrame) -> pd.DataFrame:
+    again = table[on(table, "erect") & (table["vertebra"] == "T8")].assign(observer=None)
+    both = table.assign(observer=None)
+    return pd.concat([both, again])
+
+
+def shifted(table: pd.DataFrame) -> pd.DataFrame:
+    rows = on(table, "erect")
+    table.loc[rows, "z_mm"] += 12.0
+    return table
+
+
+def without(position: str, vertebra: str | None = None) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        gone = on(table, position)
+        if vertebra is not None:
+            gone &= table["vertebra"] == vertebra
+        return table[~gone]
+
+    return change
+
+
+def emptied(table: pd.DataFrame) -> pd.DataFrame:
+    row = on(table, "right_bending") & (table["vertebra"] == "T5")
+    table.loc[row, "orientation_deg"] = None
+    return table
+
+
+def askew(table: pd.DataFrame) -> pd.DataFrame:
+    row = on(table, "erect") & (table["vertebra"] == "T9")
+    table.loc[row, "orientation_deg"] += 40.0
+    return table
+
+
+def short(table: pd.DataFrame) -> pd.DataFrame:
+    rows = on(table, "traction")
+    table.loc[rows, ["y_mm", "z_mm"]] *= 0.9
+    return table
+
+
+def unbent(table: pd.DataFrame) -> pd.DataFrame:
+    """The right bending film with the tilts of the erect one."""
+    tilts = table.loc[on(table, "erect"), "orientation_deg"].to_numpy()
+    table.loc[on(table, "right_bending"), "orientation_deg"] = tilts
+    return table
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (radians, ["film erect", "radians? multiply by 57.3"]),
+        (mirrored("right_bending"), ["film right_bending", "mirrored"]),
+        (mirrored("right_bending", "left_bending"), ["both bending films", "exchange"]),
+        (exchanged("right_bending", "left_bending"), ["both bending films", "exchange"]),
+        (copied("erect", "right_bending"), ["right_bending", "the same as film erect"]),
+        (copied("neutral", "traction"), ["film traction", "the same as film neutral"]),
+        (unbent, ["film right_bending", "is this the bending film?"]),
+        (shifted, ["film erect", "L4 at", "subtract its place"]),
+        (without("erect"), ["no film of p01 in position erect", "add its rows"]),
+        (without("left_bending"), ["no film of p01 in position left_bending"]),
+        (without("erect", "T8"), ["film erect", "no T8", "add the rows"]),
+        (emptied, ["film right_bending", "T5 has neither", "fill the cells"]),
+        (twice, ["film erect", "T8 twice", "a position once"]),
+        (askew, ["film erect", "T9 tilted", "mirrored"]),
+        (short, ["film traction", "lengthens"]),
+    ],
+)
+def test_a_fault_is_told_with_its_film_and_remedy(
+    tmp_path: Path,
+    sound: Path,
+    change: Callable[[pd.DataFrame], pd.DataFrame],
+    words: list[str],
+) -> None:
+    found = told(tmp_path, sound, change)
+    assert found
+    assert any(all(word in line for word in words) for line in found), "\n".join(found)
+
+
+def test_a_vertebra_that_does_not_exist_is_told_by_the_reader(tmp_path: Path, sound: Path) -> None:
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        row = on(table, "erect") & (table["vertebra"] == "T12")
+        table.loc[row, "vertebra"] = "T13"
+        return table
+
+    with pytest.raises(InputError) as error:
+        told(tmp_path, sound, change)
+    assert "unknown vertebra 'T13'" in str(error.value)
+
+
+def test_neutral_and_traction_may_be_missing(tmp_path: Path, sound: Path) -> None:
+    kept = ["erect", "right_bending", "left_bending"]
+    assert told(tmp_path, sound, lambda table: table[on(table, *kept)]) == []
+
+
+def test_a_cohort_without_films_is_refused(sound: Path) -> None:
+    cohort = cohorts.read(sound, (FILMS, PATIENTS))
+    bare = type(cohort)(**{**vars(cohort), "further": {}})
+    document = Document("s.yaml", {"cohort": "ais"}, {"cohort": 3})
+    (problem,) = check_scoliosis(document, STUDY, bare)
+    assert "films.csv" in problem.found

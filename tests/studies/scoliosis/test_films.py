@@ -1,0 +1,171 @@
+"""Films as they are read: axes, signs, corners, scales, scatter; and the angles of curves."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.studies.scoliosis.curve_angles import curves, lumbar_apex, main_curve
+from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, PATIENTS, Film, read_films
+
+VERTEBRAE = ("L4", "L3", "L2", "L1")
+HEADER = """\
+cohort: filmed
+title: One patient
+source: made for a test
+vertebrae: [L4, L3, L2, L1]
+gravity: false
+"""
+POSITIONS = ("erect", "right_bending", "left_bending")
+
+
+def centres(lean_deg: float) -> list[dict[str, object]]:
+    """A straight spine that leans to the right, in the paper's axes: left positive."""
+    lean = np.deg2rad(lean_deg)
+    return [
+        {
+            "vertebra": name,
+            "y_mm": -30.0 * at * np.sin(lean),
+            "z_mm": 30.0 * at * np.cos(lean),
+            "orientation_deg": -lean_deg if at else 0.0,
+        }
+        for at, name in enumerate(VERTEBRAE)
+    ]
+
+
+def cornered(lean_deg: float, size: float = 1.0, turn_deg: float = 0.0) -> list[dict[str, object]]:
+    """The same as corners of bodies 40 mm wide and 24 mm high, the film turned and enlarged."""
+    rows = []
+    for at, name in enumerate(VERTEBRAE):
+        tilt = np.deg2rad(lean_deg * (at > 0))
+        lean = np.deg2rad(lean_deg)
+        centre = 30.0 * at * np.array([np.sin(lean), np.cos(lean)])
+        row: dict[str, object] = {"vertebra": name}
+        for end, up in (("upper", 12.0), ("lower", -12.0)):
+            for side, right in (("left", -20.0), ("right", 20.0)):
+                c, s = np.cos(tilt), np.sin(tilt)
+                point = centre + np.array([c * right + s * up, c * up - s * right])
+                c, s = np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))
+                x, y = size * np.array([c * point[0] + s * point[1], c * point[1] - s * point[0]])
+                row[f"{end}_{side}_y_mm"], row[f"{end}_{side}_z_mm"] = 100.0 - x, 50.0 + y
+        rows.append(row)
+    return rows
+
+
+def written(folder: Path, films: dict[str, list[dict[str, object]]]) -> cohorts.Cohort:
+    """A cohort of one patient with these films."""
+    folder = folder / "filmed"
+    folder.mkdir()
+    (folder / "cohort.yaml").write_text(HEADER, encoding="utf-8")
+    (folder / "specimens.csv").write_text("specimen\np01\n", encoding="utf-8")
+    rows = [
+        {"specimen": "p01", "position": position, **row}
+        for position, film in films.items()
+        for row in film
+    ]
+    pd.DataFrame(rows).to_csv(folder / "films.csv", index=False)
+    return cohorts.read(folder, (FILMS, PATIENTS))
+
+
+def test_a_lean_to_the_right_is_positive(tmp_path: Path) -> None:
+    films = dict(zip(POSITIONS, map(centres, (0.0, 10.0, -8.0)), strict=True))
+    read = read_films(written(tmp_path, films), "p01")
+    bent = read.films["right_bending"]
+    np.testing.assert_allclose(bent.tilt, np.deg2rad([0.0, 10.0, 10.0, 10.0]), atol=1e-12)
+    assert bent.right[-1] == pytest.approx(0.09 * np.sin(np.deg2rad(10.0)))
+    np.testing.assert_allclose(np.rad2deg(read.turned("right_bending")), [10.0, 0.0, 0.0])
+    np.testing.assert_allclose(np.rad2deg(read.turned("left_bending")), [-8.0, 0.0, 0.0])
+    assert np.isnan(read.sd).all()
+
+
+def test_corners_on_a_turned_and_enlarged_film_give_the_same(tmp_path: Path) -> None:
+    films = {
+        "erect": cornered(0.0),
+        "right_bending": cornered(10.0, size=1.25, turn_deg=17.0),
+        "left_bending": cornered(-8.0, size=0.8, turn_deg=-5.0),
+    }
+    read = read_films(written(tmp_path, films), "p01")
+    assert read.scales["right_bending"] == pytest.approx(0.8)
+    bent = read.films["right_bending"]
+    np.testing.assert_allclose(bent.tilt, np.deg2rad([0.0, 10.0, 10.0, 10.0]), atol=1e-9)
+    np.testing.assert_allclose(bent.up[-1], 0.09 * np.cos(np.deg2rad(10.0)), rtol=1e-9)
+    np.testing.assert_allclose(bent.right[-1], 0.09 * np.sin(np.deg2rad(10.0)), rtol=1e-9)
+
+
+def test_readings_are_averaged_and_their_scatter_is_the_noise(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    films: dict[str, list[dict[str, object]]] = {}
+    for position, lean in zip(POSITIONS, (0.0, 10.0, -8.0), strict=True):
+        films[position] = []
+        for observer in "ab":
+            for repeat in range(1, 41):
+                for at, row in enumerate(centres(lean)):
+                    error = rng.normal(0.0, [0.4, 0.4, 0.9]) * (at > 0)
+                    read = {
+                        name: float(row[name]) + error[k]  # type: ignore[arg-type]
+                        for k, name in enumerate(CENTRE)
+                    }
+                    films[position].append({**row, **read, "observer": observer, "repeat": repeat})
+    read = read_films(written(tmp_path, films), "p01")
+    assert read.readings["erect"] == 80
+    expected = np.array([4e-4, 4e-4, np.deg2rad(0.9)]) / np.sqrt(80)
+    np.testing.assert_allclose(read.sd, expected, rtol=0.1)
+    assert np.rad2deg(read.films["right_bending"].tilt[-1]) == pytest.approx(10.0, abs=0.5)
+
+
+def test_without_corners_the_chord_tells_of_scale(tmp_path: Path) -> None:
+    films = dict(zip(POSITIONS, map(centres, (0.0, 10.0, -8.0)), strict=True))
+    for row in films["right_bending"]:
+        row["y_mm"], row["z_mm"] = 1.1 * float(row["y_mm"]), 1.1 * float(row["z_mm"])  # type: ignore[arg-type]
+    read = read_films(written(tmp_path, films), "p01")
+    assert read.scales["right_bending"] == 1.0
+    assert read.chord("right_bending") == pytest.approx(1.1)
+
+
+def test_corner_names_say_end_side_and_axis() -> None:
+    assert len(CORNERS) == len(set(CORNERS)) == 8
+    assert "lower_right_z_mm" in CORNERS
+
+
+def s_shaped() -> Film:
+    """A lumbar curve to the left of 40 deg and a thoracic one to the right of 50 deg."""
+    levels = np.arange(15.0)
+    lumbar = np.clip(levels / 5.0, 0.0, 1.0)
+    thoracic = np.clip((levels - 5.0) / 9.0, 0.0, 1.0)
+    tilt = np.deg2rad(40.0 * lumbar - 50.0 * thoracic)
+    between = 0.5 * (tilt[1:] + tilt[:-1])
+    right = np.concatenate([[0.0], np.cumsum(0.03 * np.sin(between))])
+    up = np.concatenate([[0.0], np.cumsum(0.03 * np.cos(between))])
+    return Film(right, up, tilt)
+
+
+LEVELS = ("L4", "L3", "L2", "L1", *(f"T{number}" for number in range(12, 1, -1)))
+
+
+def test_curves_lie_between_the_vertebrae_tilted_farthest() -> None:
+    film = s_shaped()
+    lumbar, thoracic = curves(film)
+    assert (lumbar.lower, lumbar.upper, lumbar.side) == (0, 5, -1)
+    assert (thoracic.lower, thoracic.upper, thoracic.side) == (5, 14, 1)
+    assert np.rad2deg(lumbar.cobb(film)) == pytest.approx(40.0)
+    assert np.rad2deg(thoracic.cobb(film)) == pytest.approx(50.0)
+    assert main_curve(film) == thoracic
+    assert lumbar_apex(film, LEVELS) == lumbar.apex
+    assert 1 <= lumbar.apex <= 4
+
+
+def test_ferguson_s_angle_is_smaller_than_cobb_s_by_the_known_ratio() -> None:
+    """Stokes 1993: Cobb over Ferguson 1.35; a circular arc has 2."""
+    film = s_shaped()
+    for curve in curves(film):
+        assert 1.2 < curve.cobb(film) / curve.ferguson(film) < 2.1
+
+
+def test_a_mirrored_film_has_the_same_angles_to_the_other_side() -> None:
+    film = s_shaped()
+    for one, other in zip(curves(film), curves(film.mirrored()), strict=True):
+        assert (one.lower, one.upper, one.apex) == (other.lower, other.upper, other.apex)
+        assert one.side == -other.side
+        assert one.ferguson(film) == pytest.approx(other.ferguson(film.mirrored()))

@@ -1,0 +1,117 @@
+"""Patients as models: mirrors, what films do not tell, poses held where the films have the top."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort import Cohort
+from spinepipe.studies.scoliosis.films import ERECT, FILMS, LEFT, PATIENTS, RIGHT, Read
+from spinepipe.studies.scoliosis.held_spine import HeldSpine, geometry, with_laws
+from spinepipe.studies.scoliosis.personal import WAYS, Patient, patient_of, tangent
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tangent_laws import Pairs
+from tests.generators import ais_films
+
+STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+
+
+@pytest.fixture(scope="module")
+def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
+    folder = tmp_path_factory.mktemp("films") / "ais"
+    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    return cohorts.read(folder, (FILMS, PATIENTS))
+
+
+@pytest.fixture(scope="module")
+def patient(cohort: Cohort) -> Patient:
+    return patient_of(STUDY, cohort, "p01")
+
+
+def mirrored(patient: Patient) -> Patient:
+    """The same patient on films that are turned over."""
+    exchanged = {RIGHT: LEFT, LEFT: RIGHT}
+    films = {exchanged.get(n, n): film.mirrored() for n, film in patient.read.films.items()}
+    read: Read = replace(patient.read, films=films)
+    pairs = patient.pairs
+    return Patient(
+        patient.name,
+        read,
+        geometry(patient.name, patient.chain.joints, films[ERECT], STUDY.profile),
+        patient.springs,
+        Pairs(-pairs.left, -pairs.right, pairs.arm_left, pairs.arm_right),
+        patient.apex,
+    )
+
+
+@pytest.mark.parametrize("model", list(WAYS))
+def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> None:
+    other = mirrored(patient)
+    for position, opposite in ((RIGHT, LEFT), ("neutral", "neutral")):
+        one, two = (
+            HeldSpine(WAYS[model](who, STUDY).model, who.erect).at(who.read.films[film].top)
+            for who, film in ((patient, position), (other, opposite))
+        )
+        assert one.held.status == two.held.status == "converged"
+        # the two forces of a tangent law are searched for, to a hundred-millionth
+        np.testing.assert_allclose(two.r, -one.r, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(two.film.up, one.film.up, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("model", list(WAYS))
+def test_the_uppermost_vertebra_is_where_the_film_has_it(patient: Patient, model: str) -> None:
+    spine = HeldSpine(WAYS[model](patient, STUDY).model, patient.erect)
+    for film in patient.read.films.values():
+        posed = spine.at(film.top)
+        assert posed.held.status == "converged"
+        np.testing.assert_allclose(posed.film.top, film.top, rtol=0, atol=1e-12)
+        assert not posed.held.q.reshape(-1, 6)[:, :3].any()
+        assert posed.r.sum() == pytest.approx(film.turned.sum() - patient.erect.turned.sum())
+
+
+def test_the_erect_film_takes_no_push(patient: Patient) -> None:
+    spine = HeldSpine(tangent(patient, STUDY).model, patient.erect)
+    posed = spine.at(patient.erect.top)
+    assert np.abs(posed.held.pushes).max() < 1e-9
+    assert np.abs(posed.r).max() < 1e-12
+
+
+def test_films_do_not_tell_how_stiff_a_spine_is_in_all(patient: Patient) -> None:
+    """All lateral laws ten times as stiff, the other rotations too: no vertebra moves."""
+    personal = tangent(patient, STUDY)
+    laws, springs = personal.model.effects[1].values.copy(), personal.model.effects[0].values.copy()
+    laws[:, 0] *= 10.0
+    stiffer = with_laws(patient.chain, 10.0 * springs, laws)
+    for position in (RIGHT, "traction"):
+        top = patient.read.films[position].top
+        one, two = (HeldSpine(m, patient.erect).at(top) for m in (personal.model, stiffer))
+        np.testing.assert_allclose(two.r, one.r, rtol=0, atol=1e-6)
+
+
+def test_a_stated_mean_stiffness_is_the_mean(cohort: Cohort) -> None:
+    scale = {"of": "mean_stiffness", "mean_stiffness_nm_per_rad": 80.0}
+    study = Scoliosis.model_validate({**STUDY.model_dump(), "scale": scale})
+    patient = patient_of(study, cohort, "p01")
+    for way in WAYS.values():
+        if way is not WAYS["linear_regions"]:
+            assert way(patient, study).at_rest.mean() == pytest.approx(80.0)
+
+
+def test_models_say_how_much_they_take_from_the_films(patient: Patient) -> None:
+    free = {name: way(patient, STUDY).free for name, way in WAYS.items()}
+    count = patient.chain.n_joints
+    assert free == {
+        "tangent": 3 * count + 1,
+        "linear_per_segment": count + 1,
+        "linear_regions": len(patient.curves) - 1,
+        "uniform": 0,
+    }
+
+
+def test_segments_that_the_films_turn_backwards_are_named(cohort: Cohort, tmp_path: Path) -> None:
+    patient = patient_of(STUDY, cohort, "p01")
+    assert patient.pairs.opposite.any()
+    personal = tangent(patient, STUDY)
+    assert set(np.flatnonzero(personal.constrained)) <= set(np.flatnonzero(patient.pairs.opposite))
