@@ -28,9 +28,8 @@ UPPER_FACE, LOWER_FACE = "inferior_endplate_centre", "superior_endplate_centre"
 
 def check_geometry(draft: Draft) -> Iterator[Problem]:
     """Joints without a pose, landmarks that define no frame, and points that lie nowhere sane."""
-    told = any(form.places for stem, form in draft.forms.items() if stem not in draft.absent)
     if {"landmarks", "joints"} <= draft.absent:
-        if not told:
+        if not any(form.places for stem, form in draft.forms.items() if stem not in draft.absent):
             found = "neither landmarks.csv nor joints.csv"
             allowed = "landmarks.csv, joints.csv or both"
             yield Problem(draft.name, None, None, found, allowed, "add one")

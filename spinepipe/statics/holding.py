@@ -37,8 +37,22 @@ class States:
 NO_STATES = States({})
 
 
+class _OnJoints:
+    """What acts on some joints."""
+
+    joints: Indices
+
+    @cached_property
+    def rows(self) -> Indices | slice:
+        """Its joints; as a slice where they follow each other, so that no row is copied."""
+        joints = self.joints
+        if len(joints) and (np.diff(joints) == 1).all():
+            return slice(int(joints[0]), int(joints[-1]) + 1)
+        return joints
+
+
 @dataclass(frozen=True)
-class ActiveLaw:
+class ActiveLaw(_OnJoints):
     """A joint law at work: its place in the model's effects, its joints and values."""
 
     effect: JointLaw
@@ -46,11 +60,6 @@ class ActiveLaw:
     joints: Indices
     values: Array
     per_joint: bool
-
-    @cached_property
-    def rows(self) -> Indices | slice:
-        """Its joints as what reads and writes their rows fastest."""
-        return _rows(self.joints)
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
@@ -62,7 +71,7 @@ class ActiveLaw:
 
 
 @dataclass(frozen=True)
-class ActivePath:
+class ActivePath(_OnJoints):
     """A path law at work; it responds with the state that the last load step left."""
 
     effect: PathLaw
@@ -70,11 +79,6 @@ class ActivePath:
     joints: Indices
     values: Array
     per_joint: bool
-
-    @cached_property
-    def rows(self) -> Indices | slice:
-        """Its joints as what reads and writes their rows fastest."""
-        return _rows(self.joints)
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
@@ -102,13 +106,6 @@ class ActivePath:
 
 
 Law = ActiveLaw | ActivePath
-
-
-def _rows(joints: Indices) -> Indices | slice:
-    """Joints that follow each other as a slice: no copy is made of their rows."""
-    if len(joints) and (np.diff(joints) == 1).all():
-        return slice(int(joints[0]), int(joints[-1]) + 1)
-    return joints
 
 
 @dataclass(frozen=True)

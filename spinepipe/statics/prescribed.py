@@ -97,8 +97,7 @@ class Place:
     unit = 1e-3
 
     def value(self, motion: ChainMotion) -> float:
-        moved = motion.displacement(self.body)
-        return float(self.direction @ (moved.rotation @ self.point + moved.origin))
+        return float(self.direction @ motion.displacement(self.body).apply(self.point))
 
     def slope(self, motion: ChainMotion) -> Array:
         found: Array = motion.velocities(self.body, self.point) @ self.direction
@@ -225,7 +224,7 @@ def hold_at(
     """
     problem = _Problem(system, tuple(prescriptions), free)
     rest = Held(np.zeros(len(free)), np.zeros(len(wanted)), wanted, Ended.CONVERGED, "", 0)
-    for near in (start, rest) if start is not None else (rest,):
+    for near in filter(None, (start, rest)):
         found = problem.newton(near, wanted, 0.0)
         if found is not None and found.status is Ended.CONVERGED:
             return found
@@ -246,7 +245,9 @@ class _Problem:
 
     def values(self, q: Array) -> Array:
         """(k,) of the prescriptions at q."""
-        motion = ChainMotion(self.system.chain, q)
+        return self._values(ChainMotion(self.system.chain, q))
+
+    def _values(self, motion: ChainMotion) -> Array:
         return np.array([one.value(motion) for one in self.prescriptions])
 
     def newton(self, start: Held, wanted: Array, compliance: float) -> Held | None:
@@ -288,7 +289,7 @@ class _Problem:
             return None
         motion, free = ChainMotion(self.system.chain, q), self.free
         slopes = np.array([one.slope(motion) for one in self.prescriptions])[:, free]
-        values = np.array([one.value(motion) for one in self.prescriptions])
+        values = self._values(motion)
         tangent = balance.tangent.copy()
         for push, one in zip(pushes, self.prescriptions, strict=True):
             tangent -= push * one.bend(motion)

@@ -13,6 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
 from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import COHORTS, Study, cohort_folder
@@ -59,9 +60,9 @@ def displayed(path: Path, root: Path) -> str:
 
 
 def _validated(document: Document) -> tuple[Study | None, list[Problem]]:
-    kind = document.data.get("kind")
-    if isinstance(kind, str) and kind in kind_names():
-        return validate(kind_of(kind).settings, document)
+    declared, kind = _kind(document), document.data.get("kind")
+    if declared is not None:
+        return validate(declared.settings, document)
     place = (document.file, document.line_of("kind"), "kind")
     found = "nothing: the key is missing" if kind is None else repr(kind)
     otherwise = "the kind decides which other keys are allowed"
@@ -137,8 +138,14 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
 
 def _further(document: Document) -> tuple[TableForm, ...]:
     """The files that the kind of a study reads besides."""
-    kind = document.data.get("kind")
-    return kind_of(kind).forms if isinstance(kind, str) and kind in kind_names() else ()
+    kind = _kind(document)
+    return () if kind is None else kind.forms
+
+
+def _kind(document: Document) -> Kind | None:
+    """The kind that a study file names, or None."""
+    name = document.data.get("kind")
+    return kind_of(name) if isinstance(name, str) and name in kind_names() else None
 
 
 CONFIG = Path("config") / "config.yaml"

@@ -111,32 +111,26 @@ class Patient:
 
     def moved(self, turns: Array) -> tuple[Array, Array]:
         """Places (15, 2) and tilts (15,) when every segment has turned so far to the right."""
-        places, pivots = [self.places[0]], []
-        turned = 0.0
+        places, _ = self._chain(turns)
+        return places, self.tilts + np.concatenate([[0.0], np.cumsum(turns)])
+
+    def _chain(self, turns: Array) -> tuple[Array, list[Array]]:
+        """Places (15, 2), and where the pivots are."""
+        places, pivots, turned = [self.places[0]], [], 0.0
         for below, pivot, above, turn in zip(
             self.places[:-1], self.pivots, self.places[1:], turns, strict=True
         ):
             pivots.append(places[-1] + _turned(turned, pivot - below))
             turned += turn
             places.append(pivots[-1] + _turned(turned, above - pivot))
-        return np.array(places), self.tilts + np.concatenate([[0.0], np.cumsum(turns)])
+        return np.array(places), pivots
 
     def settled(self, forces: Array, moment: float) -> Array:
         """(14,) rad: where the energy is least under forces (15, 2) N and a moment on the top."""
 
         def work(turns: Array) -> tuple[float, Array]:
             stored, moments = self.energy(turns)
-            places, _ = self.moved(turns)
-            pivots = [
-                place + _turned(angle, pivot - below)
-                for place, angle, pivot, below in zip(
-                    places[:-1],
-                    np.concatenate([[0.0], np.cumsum(turns)[:-1]]),
-                    self.pivots,
-                    self.places[:-1],
-                    strict=True,
-                )
-            ]
+            places, pivots = self._chain(turns)
             slope = moments - moment
             for segment, pivot in enumerate(pivots):
                 arms = places[segment + 1 :] - pivot

@@ -42,20 +42,19 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arra
         held = bound.held(q[left])
         step, solved = newton_step(chains, acting, q[left], held.load, held.tangent)
         beyond = _without_limit(held.load)
-        step[beyond] = -0.5 * taken[beyond]
+        step[beyond], solved[beyond] = -0.5 * taken[beyond], taken[beyond].any(axis=(1, 2))
         q[left] += step
-        taken = np.where(beyond[:, None, None], -step, step)
         size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
-        inside: Flags = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
-        nearer = np.where(beyond, size > 0.0, solved & (size < 4.0 * last))
-        going: Flags = inside & nearer
+        inside = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
+        going = solved & inside & (size < 4.0 * last)
         there = going & (size < 1.0) & ~beyond
         arrived[left[there]] = True
         tangents[left[there]] = held.tangent[there]
         going &= ~there
         if not going.any():
             break
-        last, taken = np.where(beyond, last, size)[going], taken[going]
+        step[beyond] *= -1.0  # as much of the step before is left
+        last, taken = np.where(beyond, last, size)[going], step[going]
         if not going.all():
             left = left[going]
             bound, acting = laws(left), part(loads, left)
@@ -64,10 +63,7 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arra
 
 def _without_limit(load: Array) -> Flags:
     """(N,) lanes with a joint that holds without limit, of loads (N, J, 6)."""
-    finite = np.isfinite(load)
-    if finite.all():
-        return np.zeros(len(load), dtype=bool)
-    found: Flags = np.logical_not(finite.all(axis=(1, 2)))
+    found: Flags = np.logical_not(np.isfinite(load).all(axis=(1, 2)))
     return found
 
 

@@ -20,7 +20,8 @@ from spinepipe.studies.scoliosis.films import (
     NEEDED,
     RIGHT,
     Film,
-    placed,
+    as_read,
+    by_reading,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -82,22 +83,16 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Probl
         faults = list(_film(cohort, place, film))
         yield from faults
         if not faults:
-            readings = film.groupby(["observer", "repeat"], sort=False, dropna=False)
-            each = [placed(one, cohort.vertebrae).seen_from_below() for _, one in readings]
-            numbers = np.mean([[one.right, one.up, one.tilt] for one in each], axis=0)
-            shapes[position] = Film(*numbers)
+            shapes[position] = Film(*as_read(film, cohort.vertebrae).mean(axis=0))
             yield from _tilts(place, film, cohort.vertebrae, shapes[position])
     yield from _bends(file, patient, shapes)
 
 
 def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem]:
     """Each reading of a film: every vertebra once, all of its numbers, the lowest at nought."""
-    for (observer, repeat), reading in rows.groupby(
-        ["observer", "repeat"], sort=False, dropna=False
-    ):
-        who = ", ".join(
-            f"{n} {v}" for n, v in (("observer", observer), ("repeat", repeat)) if v == v
-        )
+    for reading in by_reading(rows):
+        told = reading[["observer", "repeat"]].iloc[0].dropna()
+        who = ", ".join(f"{name} {value}" for name, value in told.items())
         by = f" ({who})" if who else ""
         line = int(reading.index[0])
         there = list(reading["vertebra"])

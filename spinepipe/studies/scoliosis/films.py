@@ -5,7 +5,7 @@ to the right negative. Here: to the right, up, tilt to the right; m and rad. Eac
 its own lowest vertebra, which then lies at nought and stands upright.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -99,6 +99,12 @@ class Film:
         """(3,) place and tilt of the uppermost vertebra."""
         return np.array([self.right[-1], self.up[-1], self.tilt[-1]])
 
+    def joints(self, share: float) -> Array:
+        """(V - 1, 2) m, right and up: so far on the way from each centre to the one above."""
+        points = np.stack([self.right, self.up], axis=1)
+        found: Array = points[:-1] + share * np.diff(points, axis=0)
+        return found
+
     def seen_from_below(self) -> "Film":
         """The same from its lowest vertebra."""
         cos, sin = np.cos(self.tilt[0]), np.sin(self.tilt[0])
@@ -149,20 +155,28 @@ def read_films(cohort: Cohort, patient: str) -> Read:
     rows = rows[rows["specimen"] == patient]
     films, sizes, readings, scatter = {}, {}, {}, []
     for position, film in rows.groupby("position", sort=False):
-        each = [
-            placed(one, cohort.vertebrae).seen_from_below()
-            for _, one in film.groupby(["observer", "repeat"], sort=False, dropna=False)
-        ]
-        stack = np.array([[one.right, one.up, one.tilt] for one in each])
-        films[str(position)], readings[str(position)] = Film(*stack.mean(axis=0)), len(each)
+        each = as_read(film, cohort.vertebrae)
+        films[str(position)], readings[str(position)] = Film(*each.mean(axis=0)), len(each)
         if len(each) > 1:
-            scatter.append((stack[:, :, 1:].var(axis=0, ddof=1).mean(axis=1), len(each)))
+            scatter.append((each[:, :, 1:].var(axis=0, ddof=1).mean(axis=1), len(each)))
         size = height(film)
         if size is not None:
             sizes[str(position)] = size
     scales = _scales(films, sizes)
     films = {name: film.scaled(scales[name]) for name, film in films.items()}
     return Read(films, sizes, scales, _sd(scatter), readings)
+
+
+def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """The rows of each reading of a film."""
+    for _, one in rows.groupby(["observer", "repeat"], sort=False, dropna=False):
+        yield one
+
+
+def as_read(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Array:
+    """(K, 3, V) right, up and tilt of each reading of a film, seen from its lowest vertebra."""
+    each = (placed(one, vertebrae).seen_from_below() for one in by_reading(rows))
+    return np.array([[one.right, one.up, one.tilt] for one in each])
 
 
 def placed(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:

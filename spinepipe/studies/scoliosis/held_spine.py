@@ -6,13 +6,14 @@ erect film is the neutral pose. Ground axes: anterior, up, right; the lowest ver
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose
+from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System
 from spinepipe.statics.motion import ChainMotion
@@ -41,8 +42,9 @@ def geometry(patient: str, joints: Sequence[str], erect: Film, profile: Profile)
     """
     count = len(joints)
     points = np.column_stack([np.zeros(count + 1), erect.up, erect.right])
-    places = points[:-1] + profile.endplate_share * np.diff(points, axis=0)
-    places[:, 0] -= 0.5 * profile.endplate_depth_mm / MM_PER_M
+    right, up = erect.joints(profile.endplate_share).T
+    back = np.full(count, -0.5 * profile.endplate_depth_mm / MM_PER_M)
+    places = np.column_stack([back, up, right])
     tilts = 0.5 * (erect.tilt[1:] + erect.tilt[:-1])
     inertia = np.eye(3) * 0.4 * MASS_KG * RADIUS_M**2
     bodies = (
@@ -51,17 +53,14 @@ def geometry(patient: str, joints: Sequence[str], erect: Film, profile: Profile)
     return SpineModel(
         specimen=patient,
         joints=tuple(joints),
-        frames=tuple(Pose(_about_x(t), at) for t, at in zip(tilts, places, strict=True)),
+        frames=tuple(
+            Pose(rotation_zxy(0.0, t, 0.0), at) for t, at in zip(tilts, places, strict=True)
+        ),
         bodies=tuple(bodies),
         gravity=np.zeros(3),
         damping=np.ones((count, 6)),
         effects=(),
     )
-
-
-def _about_x(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def with_springs(model: SpineModel, springs: Array) -> SpineModel:
@@ -110,9 +109,8 @@ class HeldSpine:
 
     def with_model(self, model: SpineModel) -> "HeldSpine":
         """The same spine on other stiffness."""
-        other = object.__new__(HeldSpine)
-        other.system, other.erect = self.system.with_model(model), self.erect
-        other.free, other.grips = self.free, self.grips
+        other = copy(self)
+        other.system = self.system.with_model(model)
         return other
 
     def at(self, top: Array, start: Held | None = None) -> Posed:

@@ -125,10 +125,9 @@ def arms(share: float, film: Film, across_chord: bool) -> Array:
     across_chord : the pull is across the line from the lowest to the uppermost vertebra, else
         along the ground of the lowest.
     """
-    points = np.stack([film.right, film.up], axis=1)
-    joints = points[:-1] + share * np.diff(points, axis=0)
-    along = points[-1] - points[0] if across_chord else np.array([0.0, 1.0])
-    found: Array = (points[-1] - joints) @ (along / np.linalg.norm(along))
+    top = film.top[:2]
+    along = top if across_chord else np.array([0.0, 1.0])
+    found: Array = (top - film.joints(share)) @ (along / np.linalg.norm(along))
     return found
 
 
@@ -160,8 +159,8 @@ def _personal(
 
 def uniform(patient: Patient, study: Scoliosis) -> Personal:
     """The same spring everywhere: nothing is taken from the films."""
-    at_rest = patient.springs[:, BENDING].copy()
-    at_rest *= _factor(study.scale, at_rest) if study.scale.of == "mean_stiffness" else 1.0
+    stated = patient.springs[:, BENDING]
+    at_rest = _factor(study.scale, stated) * stated
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
     return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), 0)
 

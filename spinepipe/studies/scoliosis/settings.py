@@ -1,20 +1,16 @@
 """What a study of scoliotic spines asks."""
 
-from typing import Annotated, Literal
+from typing import Literal, get_args
 
 from pydantic import BaseModel, Field
 
 from spinepipe.studies.parts import FORM, EachOnce, PublishedStiffness
 from spinepipe.studies.study import Study
+from spinepipe.units import COORDINATES
 
 ModelName = Literal["tangent", "linear_regions", "linear_per_segment", "uniform"]
 
-MODELS: tuple[ModelName, ...] = (
-    "tangent",
-    "linear_regions",
-    "linear_per_segment",
-    "uniform",
-)
+MODELS: tuple[ModelName, ...] = get_args(ModelName)
 
 
 class Scale(BaseModel):
@@ -32,7 +28,7 @@ class Scale(BaseModel):
         description="larger of the two moments about the apical disc, N m (Jalalian 2017 Eq 5)",
     )
     mean_stiffness_nm_per_rad: float = Field(
-        default=64.0,
+        default=PublishedStiffness().in_order()[COORDINATES.index("right_bending")],
         gt=0,
         le=1e5,
         description="mean lateral stiffness at rest, N m/rad (Gould 2024b Table 2)",
@@ -66,9 +62,6 @@ class Scoliosis(Study):
         le=3.0,
         description="ends of the tangent over the rotations of the bending films",
     )
-    enlargements: EachOnce[Annotated[float, Field(ge=1.0, le=3.0)]] = Field(
-        default=(1.0, 1.1, 1.2, 1.3, 1.4), description="enlargements that are compared"
-    )
     arm: Literal["erect", "film"] = Field(
         default="film", description="film on which the arms of the bending force are measured"
     )
@@ -89,4 +82,3 @@ class Scoliosis(Study):
     place_sd_mm: float | None = Field(
         default=None, gt=0, le=50, description="SD of a vertebra's place, where no repeats tell it"
     )
-    seed: int = Field(default=1, ge=0, description="seed of what is drawn")
