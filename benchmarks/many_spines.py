@@ -7,11 +7,12 @@ import numpy as np
 
 from benchmarks.engine import by_cpodes, by_default_integrator, with_moments
 from benchmarks.timing import cpu_seconds
-from spinepipe.effects import Parameter, create
+from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import System, follow
 from spinepipe.statics.many import Cases, Spines, Stack, solve_many
 from spinepipe.world import Chain
+from tests.cases.random_stacks import values
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import Chain as PeerChain
@@ -97,20 +98,9 @@ def remembering() -> Remembering:
 
 
 def _laws(rng: np.random.Generator) -> list[ScopedEffect]:
-    """Both laws at all joints, as strong as is usual."""
-    found = []
-    for name in MEMORY:
-        effect = create(name, {})
-        typical = np.array([_typical(p) for p in effect.parameters])
-        spread = np.exp(rng.normal(0.0, 0.1, (BENT_JOINTS, len(typical))))
-        found.append(ScopedEffect(effect, tuple(range(BENT_JOINTS)), typical * spread, ("*",)))
-    return found
-
-
-def _typical(parameter: Parameter) -> float:
-    """The usual value; of what is usually off, half a prior SD."""
-    value = parameter.default if parameter.off is None else parameter.off
-    return value if value else 0.5 * (parameter.side or 1.0) * parameter.prior_scale
+    """Both laws at all joints."""
+    effects, joints = (create(name, {}) for name in MEMORY), tuple(range(BENT_JOINTS))
+    return [ScopedEffect(one, joints, values(one, BENT_JOINTS, rng), ("*",)) for one in effects]
 
 
 def chain_of(joints: int) -> PeerChain:
