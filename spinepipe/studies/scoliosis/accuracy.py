@@ -1,0 +1,126 @@
+"""Job: errors of every model over all patients, beside what reading the films alone makes.
+
+A rotation since the erect film is made of four readings of tilt, so its error has twice their SD; a
+tilt on a film is one reading less that of the lowest vertebra. Models are held where the film has
+the top, whose own reading is theirs too: the floor is an upper one.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.studies.scoliosis.films import read_films
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import ACCURACY, GROUPS, MEASURES
+from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+REFERENCE = "linear_regions"
+"""The model that Jalalian 2017 compares with."""
+
+READINGS_OF_A_ROTATION = 4
+READINGS_OF_A_TILT = 2
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``accuracy.parquet``."""
+    settings, cohort = study_of_kind(Scoliosis, root, study)
+    read = read_frames(tables)
+    rows = list(accuracy_rows(read["positions"], read["displacements"], read["curves"], noise(settings, cohort)))
+    write(from_rows(ACCURACY, rows), output, provenance("accuracy", settings, cohort))
+
+
+def noise(settings: Scoliosis, cohort: Cohort) -> Array:
+    """(2,) SD of a vertebra's place (mm, each way) and tilt (deg) as films are read; NaN unknown."""
+    told = np.array([read_films(cohort, name).sd for name in cohort.specimen_names])
+    known = told[np.isfinite(told).all(axis=1)]
+    if len(known):
+        right, up, tilt = np.sqrt((known**2).mean(axis=0))
+        return np.array([MM_PER_M * np.sqrt(0.5 * (right**2 + up**2)), DEG_PER_RAD * tilt])
+    stated = (settings.place_sd_mm, settings.tilt_sd_deg)
+    return np.array([np.nan if one is None else one for one in stated])
+
+
+def accuracy_rows(
+    positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame, sd: Array
+) -> Iterator[dict[str, Any]]:
+    """Rows by group of films, measure and model."""
+    floors = {
+        "rotation": np.sqrt(READINGS_OF_A_ROTATION) * sd[1],
+        "tilt": np.sqrt(READINGS_OF_A_TILT) * sd[1],
+        "place": np.sqrt(2.0) * sd[0],
+        "ferguson": np.nan,
+    }
+    for group in GROUPS:
+        chosen = [
+            one[one["fitted"] == (group == "fitted")] for one in (positions, displacements, curves)
+        ]
+        for measure, (unit, _) in MEASURES.items():
+            errors = _errors(measure, *chosen)
+            rows = [
+                {
+                    "films": group,
+                    "measure": measure,
+                    "model": model,
+                    "unit": unit,
+                    **_pooled(errors[errors["model"] == model]),
+                    "reading_noise": _or_none(floors[measure]),
+                    **_about(positions[positions["model"] == model]),
+                }
+                for model in positions["model"].unique()
+            ]
+            yield from _with_reduction(rows)
+
+
+def _errors(
+    measure: str, positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
+) -> pd.DataFrame:
+    """Errors of one measure by patient and model; those of a pose that is not there are NaN."""
+    if measure == "rotation":
+        error, rows = displacements["simulated_deg"] - displacements["measured_deg"], displacements
+    elif measure == "ferguson":
+        error, rows = curves["ferguson_simulated_deg"] - curves["ferguson_measured_deg"], curves
+    else:
+        name = {"place": "place_rmse_mm", "tilt": "tilt_rmse_deg"}[measure]
+        error, rows = positions[name], positions
+    return rows[["specimen", "model"]].assign(square=error.astype(float) ** 2)
+
+
+def _pooled(errors: pd.DataFrame) -> dict[str, Any]:
+    """Over the patients that have a pose on every film of the group."""
+    whole = errors.groupby("specimen", sort=False)["square"].apply(lambda one: one.notna().all())
+    names = list(whole.index[whole])
+    kept = errors[errors["specimen"].isin(names)]
+    own = np.sqrt(kept.groupby("specimen", sort=False)["square"].mean().to_numpy(float))
+    return {
+        "n_patients": len(names),
+        "n": len(kept),
+        "rmse": float(np.sqrt(kept["square"].mean())) if len(kept) else None,
+        "mean_of_patients": float(own.mean()) if len(own) else None,
+        "sd_of_patients": float(own.std(ddof=1)) if len(own) > 1 else None,
+    }
+
+
+def _about(rows: pd.DataFrame) -> dict[str, Any]:
+    """What is the same for all films of a model; curves differ in number, so the most counts."""
+    return {
+        "free_parameters": int(rows["free_parameters"].max()),
+        "scale_from": str(rows["scale_from"].iloc[0]),
+    }
+
+
+def _with_reduction(rows: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    other = next((row["rmse"] for row in rows if row["model"] == REFERENCE), None)
+    for row in rows:
+        known = other and row["rmse"] is not None
+        yield row | {"reduction_percent": 100.0 * (1.0 - row["rmse"] / other) if known else None}
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,66 @@
+"""The kind scoliosis: personal stiffness of scoliotic spines from bending films."""
+
+from dataclasses import dataclass
+
+from spinepipe.cohort import Cohort
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.scoliosis.checks import check_scoliosis
+from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import ACCURACY, CURVES, DISPLACEMENTS, LAWS, POSITIONS
+from spinepipe.studies.study_files import StudyFiles
+
+OF_JOBS = ("laws", "positions", "displacements", "curves")
+"""Tables joined from job files, one for each patient and model."""
+
+_BLOCK = "000"
+
+
+@dataclass(frozen=True)
+class ScoliosisFiles(StudyFiles):
+    """The result files of one study of scoliotic spines."""
+
+    joined = OF_JOBS
+
+    study: Scoliosis
+
+    @classmethod
+    def of(cls, study: Scoliosis, cohort: Cohort) -> "ScoliosisFiles":
+        """The files of a study of a cohort."""
+        return cls(study, cohort.specimen_names)
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """The tables that every study has."""
+        return (*OF_JOBS, "accuracy")
+
+    @property
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The tables that are made of job files."""
+        return OF_JOBS
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        return "personalise"
+
+    def blocks(self, table: str) -> list[tuple[str, str]]:
+        """One block per patient."""
+        return [(name, _BLOCK) for name in self.specimens]
+
+    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
+        """The job files of which a block is made."""
+        place = f"{self.folder}/jobs/specimen={specimen}"
+        return [f"{place}/model={model}/{table}.parquet" for model in self.study.models]
+
+
+KIND = Kind(
+    settings=Scoliosis,
+    files=ScoliosisFiles,
+    checks=(check_scoliosis,),
+    tables=(LAWS, POSITIONS, DISPLACEMENTS, CURVES, ACCURACY),
+    jobs=(
+        Job("personalise", many=True, ignores=ignoring("models", "seed", "enlargements")),
+        Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
+    ),
+    forms=(FILMS, PATIENTS),
+)

@@ -1,0 +1,150 @@
+"""Job: one patient in one model, personalised and held where every film has the top."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.statics.prescribed import Ended
+from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
+from spinepipe.studies.scoliosis.held_spine import HeldSpine, Posed
+from spinepipe.studies.scoliosis.personal import WAYS, Patient, Personal, patient_of
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
+from spinepipe.studies.scoliosis.tangent_laws import ends_of
+from spinepipe.tables import from_rows, write
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+Row = dict[str, Any]
+
+POSED = (Ended.CONVERGED, Ended.UNREACHABLE)
+"""How a solve may end whose pose is held against the film."""
+
+
+def run(
+    root: str,
+    study: str,
+    specimen: str,
+    model: str,
+    laws: str,
+    positions: str,
+    displacements: str,
+    curves: str,
+) -> None:
+    """Write the rows of a patient and a model."""
+    settings, cohort = study_of_kind(Scoliosis, root, study)
+    rows = rows_of(settings, cohort, specimen, model)
+    made_by = provenance("personalise", settings, cohort, [specimen])
+    places = zip((LAWS, POSITIONS, DISPLACEMENTS, CURVES), (laws, positions, displacements, curves), strict=True)
+    for table, path in places:
+        write(from_rows(table, rows[table.name]), path, made_by)
+
+
+def rows_of(
+    settings: Scoliosis, cohort: Cohort, specimen: str, model: str
+) -> dict[str, list[Row]]:
+    """Rows of each table, by its name."""
+    patient = patient_of(settings, cohort, specimen)
+    personal = WAYS[model](patient, settings)
+    spine = HeldSpine(personal.model, patient.erect)
+    known: Row = {"specimen": specimen, "model": model}
+    taken: Row = {"free_parameters": personal.free, "scale_from": settings.scale.of}
+    found: dict[str, list[Row]] = {
+        LAWS.name: [known | row | taken for row in _laws(patient, personal)],
+        POSITIONS.name: [],
+        DISPLACEMENTS.name: [],
+        CURVES.name: [],
+    }
+    for position in patient.read.films:
+        if position == ERECT:
+            continue
+        posed = spine.at(patient.read.films[position].top)
+        where = known | {"position": position, "fitted": position in (RIGHT, LEFT)}
+        ended: Row = {"status": posed.held.status.value}
+        found[POSITIONS.name].append(
+            where | _position(patient, position, posed) | taken | ended | {"message": posed.held.message}
+        )
+        for table, rows in (
+            (DISPLACEMENTS, _displacements(settings, patient, position, posed)),
+            (CURVES, _curves(cohort, patient, position, posed)),
+        ):
+            found[table.name] += [where | row | ended for row in rows]
+    return found
+
+
+def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
+    for number, joint in enumerate(patient.chain.joints):
+        ends = personal.ends
+        yield {
+            "joint": joint,
+            "at_rest_nm_per_rad": float(personal.at_rest[number]),
+            "lower_end_deg": None if ends is None else DEG_PER_RAD * float(ends.lower[number]),
+            "upper_end_deg": None if ends is None else DEG_PER_RAD * float(ends.upper[number]),
+            "opposite": bool(patient.pairs.opposite[number]),
+            "constrained": bool(personal.constrained[number]),
+        }
+
+
+def _position(patient: Patient, position: str, posed: Posed) -> Row:
+    film, there = patient.read.films[position], posed.held.status in POSED
+    missed = posed.held.missed
+    row: Row = {
+        "missed_mm": MM_PER_M * float(np.hypot(*missed[:2])),
+        "missed_deg": DEG_PER_RAD * abs(float(missed[2])),
+        "chord_ratio": patient.read.chord(position),
+        "film_scale": patient.read.scales[position],
+    }
+    names = ("rotation_rmse_deg", "place_rmse_mm", "tilt_rmse_deg")
+    pushes = ("push_right_n", "push_up_n", "push_right_bending_nm")
+    if not there:
+        return row | dict.fromkeys((*names, *pushes))
+    away = np.hypot(posed.film.right - film.right, posed.film.up - film.up)[1:]
+    errors = (
+        DEG_PER_RAD * (posed.r - patient.read.turned(position)),
+        MM_PER_M * away,
+        DEG_PER_RAD * (posed.film.tilt - film.tilt)[1:],
+    )
+    sizes = [float(np.sqrt(np.mean(one**2))) for one in errors]
+    return (
+        row
+        | dict(zip(names, sizes, strict=True))
+        | dict(zip(pushes, posed.held.pushes.tolist(), strict=True))
+    )
+
+
+def _displacements(
+    settings: Scoliosis, patient: Patient, position: str, posed: Posed
+) -> Iterator[Row]:
+    ends = ends_of(patient.pairs, settings.enlargement)
+    measured, there = patient.read.turned(position), posed.held.status in POSED
+    sides = np.where(measured > 0.0, ends.upper, -ends.lower)
+    for number, joint in enumerate(patient.chain.joints):
+        yield {
+            "joint": joint,
+            "measured_deg": DEG_PER_RAD * float(measured[number]),
+            "simulated_deg": DEG_PER_RAD * float(posed.r[number]) if there else None,
+            "share_of_range": abs(float(measured[number])) / float(sides[number]),
+            "opposite": bool(patient.pairs.opposite[number]),
+        }
+
+
+def _curves(cohort: Cohort, patient: Patient, position: str, posed: Posed) -> Iterator[Row]:
+    film, there = patient.read.films[position], posed.held.status in POSED
+    for number, curve in enumerate(patient.curves):
+        simulated = {
+            "cobb_simulated_deg": DEG_PER_RAD * curve.cobb(posed.film) if there else None,
+            "ferguson_simulated_deg": DEG_PER_RAD * curve.ferguson(posed.film) if there else None,
+        }
+        yield {
+            "curve": number,
+            "side": "right" if curve.side > 0 else "left",
+            "lower_vertebra": cohort.vertebrae[curve.lower],
+            "apex_vertebra": cohort.vertebrae[curve.apex],
+            "upper_vertebra": cohort.vertebrae[curve.upper],
+            "cobb_measured_deg": DEG_PER_RAD * curve.cobb(film),
+            "ferguson_measured_deg": DEG_PER_RAD * curve.ferguson(film),
+            **simulated,
+        }
