@@ -6,6 +6,7 @@ doi 10.1016/S0021-9290(01)00222-6).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,8 +71,16 @@ class Pose:
 
 def rotation_zxy(extension: float, right_bending: float, left_rotation: float) -> Array:
     """(3, 3) ``Rz(extension) @ Rx(right_bending) @ Ry(left_rotation)``, angles in rad."""
-    angles = np.array([extension, right_bending, left_rotation])
-    return Rotation.from_euler("ZXY", angles).as_matrix()
+    ce, se = cos(extension), sin(extension)
+    cb, sb = cos(right_bending), sin(right_bending)
+    cl, sl = cos(left_rotation), sin(left_rotation)
+    return np.array(
+        [
+            [ce * cl - se * sb * sl, -se * cb, ce * sl + se * sb * cl],
+            [se * cl + ce * sb * sl, ce * cb, se * sl - ce * sb * cl],
+            [-cb * sl, sb, cb * cl],
+        ]
+    )
 
 
 def zxy_angles(rotation: ArrayLike) -> Array:

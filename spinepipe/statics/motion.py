@@ -30,6 +30,7 @@ class ChainMotion:
     def __init__(self, chain: Chain, q: Array) -> None:
         self.chain = chain
         self.q = q
+        self._known: dict[tuple[int, bytes], Array] = {}
 
     @cached_property
     def axes(self) -> Array:
@@ -59,7 +60,10 @@ class ChainMotion:
 
     def velocities(self, body: int, point: Array) -> Array:
         """(n, 3) velocity of the body's point (neutral position in ground, m)."""
-        return self._jacobian(body, self.chain.local_point(body, point))[0]
+        key = (body, point.tobytes())
+        if key not in self._known:
+            self._known[key] = self._jacobian(body, self.chain.local_point(body, point))[0]
+        return self._known[key]
 
     def angular(self, body: int) -> Array:
         """(n, 3) angular velocity of a body: the axes of the coordinates that carry it."""

@@ -32,12 +32,16 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``accuracy.parquet``."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
     read = read_frames(tables)
-    rows = list(accuracy_rows(read["positions"], read["displacements"], read["curves"], noise(settings, cohort)))
+    rows = list(
+        accuracy_rows(
+            read["positions"], read["displacements"], read["curves"], noise(settings, cohort)
+        )
+    )
     write(from_rows(ACCURACY, rows), output, provenance("accuracy", settings, cohort))
 
 
 def noise(settings: Scoliosis, cohort: Cohort) -> Array:
-    """(2,) SD of a vertebra's place (mm, each way) and tilt (deg) as films are read; NaN unknown."""
+    """(2,) SD of place (mm, each way) and tilt (deg) as films are read; NaN where nothing tells."""
     told = np.array([read_films(cohort, name).sd for name in cohort.specimen_names])
     known = told[np.isfinite(told).all(axis=1)]
     if len(known):

@@ -38,14 +38,16 @@ def run(
     settings, cohort = study_of_kind(Scoliosis, root, study)
     rows = rows_of(settings, cohort, specimen, model)
     made_by = provenance("personalise", settings, cohort, [specimen])
-    places = zip((LAWS, POSITIONS, DISPLACEMENTS, CURVES), (laws, positions, displacements, curves), strict=True)
+    places = zip(
+        (LAWS, POSITIONS, DISPLACEMENTS, CURVES),
+        (laws, positions, displacements, curves),
+        strict=True,
+    )
     for table, path in places:
         write(from_rows(table, rows[table.name]), path, made_by)
 
 
-def rows_of(
-    settings: Scoliosis, cohort: Cohort, specimen: str, model: str
-) -> dict[str, list[Row]]:
+def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     patient = patient_of(settings, cohort, specimen)
     personal = WAYS[model](patient, settings)
@@ -65,7 +67,11 @@ def rows_of(
         where = known | {"position": position, "fitted": position in (RIGHT, LEFT)}
         ended: Row = {"status": posed.held.status.value}
         found[POSITIONS.name].append(
-            where | _position(patient, position, posed) | taken | ended | {"message": posed.held.message}
+            where
+            | _position(patient, position, posed)
+            | taken
+            | ended
+            | {"message": posed.held.message}
         )
         for table, rows in (
             (DISPLACEMENTS, _displacements(settings, patient, position, posed)),

@@ -32,9 +32,7 @@ LAWS = Table(
         SPECIMEN,
         MODEL,
         JOINT,
-        Column(
-            "at_rest_nm_per_rad", "number", "stiffness at the erect pose", "N m/rad", low=0.0
-        ),
+        Column("at_rest_nm_per_rad", "number", "stiffness at the erect pose", "N m/rad", low=0.0),
         _angle("lower_end_deg", "end of the tangent to the left, negative", _LINEAR),
         _angle("upper_end_deg", "end of the tangent to the right", _LINEAR),
         Column("opposite", "flag", "whether it turns against a bend, or not at all"),
