@@ -1,0 +1,108 @@
+"""Rows of patients and models keep their tables, and errors are pooled as they are told."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.studies.scoliosis.accuracy import accuracy_rows, noise
+from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
+from spinepipe.studies.scoliosis.personalise import rows_of
+from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
+from spinepipe.studies.scoliosis.tables import (
+    ACCURACY,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    MEASURES,
+    POSITIONS,
+)
+from spinepipe.tables import from_rows
+from tests.generators import ais_films
+
+STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+TABLES = (LAWS, POSITIONS, DISPLACEMENTS, CURVES)
+
+
+@pytest.fixture(scope="module")
+def cohort(tmp_path_factory: pytest.TempPathFactory) -> cohorts.Cohort:
+    folder = tmp_path_factory.mktemp("films") / "ais"
+    ais_films.write(folder, ais_films.READINGS["ais18_phantom_sd07"], count=2)
+    return cohorts.read(folder, (FILMS, PATIENTS))
+
+
+@pytest.fixture(scope="module")
+def tables(cohort: cohorts.Cohort) -> dict[str, pd.DataFrame]:
+    rows = [rows_of(STUDY, cohort, n, m) for n in cohort.specimen_names for m in MODELS]
+    return {
+        table.name: from_rows(table, [row for one in rows for row in one[table.name]]).to_pandas()
+        for table in TABLES
+    }
+
+
+def test_every_film_but_the_erect_one_is_held_in_every_model(
+    tables: dict[str, pd.DataFrame],
+) -> None:
+    positions = tables["positions"]
+    assert len(positions) == 2 * len(MODELS) * 4
+    assert set(positions["status"]) <= {"converged", "unreachable", "unstable"}
+    fitted = positions[positions["fitted"]]
+    assert set(fitted["position"]) == {"right_bending", "left_bending"}
+    held = positions[positions["status"] == "converged"]
+    assert (held["missed_mm"] < 1e-9).all()
+
+
+def test_published_ends_are_at_five_sixths_on_the_bending_films(
+    tables: dict[str, pd.DataFrame],
+) -> None:
+    rows = tables["displacements"]
+    own = rows[rows["fitted"] & ~rows["opposite"]]
+    np.testing.assert_allclose(own["share_of_range"], 1.0 / 1.2, rtol=1e-9)
+
+
+def test_errors_are_pooled_over_films_segments_and_patients(
+    tables: dict[str, pd.DataFrame], cohort: cohorts.Cohort
+) -> None:
+    parts = (tables["positions"], tables["displacements"], tables["curves"])
+    sd = noise(STUDY, cohort)
+    found = from_rows(ACCURACY, list(accuracy_rows(*parts, sd))).to_pandas()
+    assert len(found) == 2 * len(MEASURES) * len(MODELS)
+    chosen = found.set_index(["films", "measure", "model"]).loc[("fitted", "rotation", "uniform")]
+    rows = tables["displacements"]
+    rows = rows[rows["fitted"] & (rows["model"] == "uniform")]
+    error = rows["simulated_deg"] - rows["measured_deg"]
+    assert chosen["n"] == len(rows) == 2 * 2 * 14
+    assert chosen["rmse"] == pytest.approx(float(np.sqrt(np.mean(error**2))))
+    own = error.groupby(rows["specimen"]).apply(lambda one: float(np.sqrt(np.mean(one**2))))
+    assert chosen["sd_of_patients"] == pytest.approx(own.std(ddof=1))
+    # a reading of tilt has an SD of 0.7 deg, the lowest vertebra's too, and two are averaged
+    assert chosen["reading_noise"] == pytest.approx(2.0 * 0.7, rel=0.3)
+    reference = found[found["model"] == "linear_regions"]
+    np.testing.assert_allclose(reference["reduction_percent"], 0.0, atol=1e-12)
+
+
+def test_a_pose_that_is_not_there_takes_the_patient_out(
+    tables: dict[str, pd.DataFrame],
+) -> None:
+    parts = {name: tables[name].copy() for name in ("positions", "displacements", "curves")}
+    rows = parts["displacements"]
+    lost = (rows["specimen"] == "p01") & (rows["model"] == "uniform") & rows["fitted"]
+    rows.loc[lost & (rows["position"] == "right_bending"), "simulated_deg"] = np.nan
+    found = list(accuracy_rows(*parts.values(), np.array([np.nan, np.nan])))
+    chosen = next(
+        row
+        for row in found
+        if (row["films"], row["measure"], row["model"]) == ("fitted", "rotation", "uniform")
+    )
+    assert (chosen["n_patients"], chosen["n"]) == (1, 28)
+    assert chosen["sd_of_patients"] is None
+    assert chosen["reading_noise"] is None
+
+
+def test_the_generator_writes_the_same_cohort_again(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        ais_films.write(tmp_path / name, ais_films.READINGS["ais18_phantom_sd19"], count=1)
+    one, two = ((tmp_path / name / "films.csv").read_bytes() for name in ("one", "two"))
+    assert one == two
