@@ -26,6 +26,7 @@ REFERENCE = "linear_regions"
 
 READINGS_OF_A_ROTATION = 4
 READINGS_OF_A_TILT = 2
+READINGS_OF_AN_ANGLE = 2
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
@@ -59,6 +60,7 @@ def accuracy_rows(
         "rotation": np.sqrt(READINGS_OF_A_ROTATION) * sd[1],
         "tilt": np.sqrt(READINGS_OF_A_TILT) * sd[1],
         "place": np.sqrt(2.0) * sd[0],
+        "cobb": np.sqrt(READINGS_OF_AN_ANGLE) * sd[1],
         "ferguson": np.nan,
     }
     for group in GROUPS:
@@ -88,8 +90,9 @@ def _errors(
     """Errors of one measure by patient and model; those of a pose that is not there are NaN."""
     if measure == "rotation":
         error, rows = displacements["simulated_deg"] - displacements["measured_deg"], displacements
-    elif measure == "ferguson":
-        error, rows = curves["ferguson_simulated_deg"] - curves["ferguson_measured_deg"], curves
+    elif measure in ("ferguson", "cobb"):
+        error = curves[f"{measure}_simulated_deg"] - curves[f"{measure}_measured_deg"]
+        rows = curves
     else:
         name = {"place": "place_rmse_mm", "tilt": "tilt_rmse_deg"}[measure]
         error, rows = positions[name], positions
@@ -115,6 +118,7 @@ def _about(rows: pd.DataFrame) -> dict[str, Any]:
     """What is the same for all films of a model; curves differ in number, so the most counts."""
     return {
         "free_parameters": int(rows["free_parameters"].max()),
+        "decided_parameters": float(rows["decided_parameters"].mean()),
         "scale_from": str(rows["scale_from"].iloc[0]),
     }
 

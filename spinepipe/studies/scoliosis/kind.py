@@ -59,7 +59,7 @@ KIND = Kind(
     checks=(check_scoliosis,),
     tables=(LAWS, POSITIONS, DISPLACEMENTS, CURVES, ACCURACY),
     jobs=(
-        Job("personalise", many=True, ignores=ignoring("models", "seed", "enlargements")),
+        Job("personalise", many=True, ignores=ignoring("models")),
         Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
     ),
     forms=(FILMS, PATIENTS),

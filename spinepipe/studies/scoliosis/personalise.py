@@ -53,7 +53,11 @@ def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> d
     personal = WAYS[model](patient, settings)
     spine = HeldSpine(personal.model, patient.erect)
     known: Row = {"specimen": specimen, "model": model}
-    taken: Row = {"free_parameters": personal.free, "scale_from": settings.scale.of}
+    taken: Row = {
+        "free_parameters": personal.free,
+        "decided_parameters": float(personal.free),
+        "scale_from": settings.scale.of,
+    }
     found: dict[str, list[Row]] = {
         LAWS.name: [known | row | taken for row in _laws(patient, personal)],
         POSITIONS.name: [],
@@ -82,11 +86,15 @@ def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> d
 
 
 def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
+    ratios = personal.at_rest / np.exp(np.mean(np.log(personal.at_rest)))
     for number, joint in enumerate(patient.chain.joints):
         ends = personal.ends
         yield {
             "joint": joint,
             "at_rest_nm_per_rad": float(personal.at_rest[number]),
+            "ratio": float(ratios[number]),
+            "ratio_low": None,
+            "ratio_high": None,
             "lower_end_deg": None if ends is None else DEG_PER_RAD * float(ends.lower[number]),
             "upper_end_deg": None if ends is None else DEG_PER_RAD * float(ends.upper[number]),
             "opposite": bool(patient.pairs.opposite[number]),

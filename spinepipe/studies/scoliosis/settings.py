@@ -8,7 +8,7 @@ from spinepipe.studies.parts import FORM, EachOnce, PublishedStiffness
 from spinepipe.studies.study import Study
 from spinepipe.units import COORDINATES
 
-ModelName = Literal["tangent", "linear_regions", "linear_per_segment", "uniform"]
+ModelName = Literal["tangent", "tangent_fitted", "linear_regions", "linear_per_segment", "uniform"]
 
 MODELS: tuple[ModelName, ...] = get_args(ModelName)
 

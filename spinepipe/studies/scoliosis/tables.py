@@ -13,11 +13,18 @@ SCALE_FROM = Column(
     allowed=("apical_moment", "mean_stiffness"),
 )
 FREE = Column("free_parameters", "integer", "parameters taken from the patient's films", low=0)
+DECIDED = Column(
+    "decided_parameters",
+    "number",
+    "how many of the free parameters the films decided; the others stay as the population has them",
+    low=0.0,
+)
 FITTED = Column("fitted", "flag", "whether the film took part in personalising the models")
 STATUS = Column("status", "text", "how the solve ended", allowed=tuple(Ended))
 
 _NO_POSE = "the solve found no pose"
 _LINEAR = "the law is linear"
+_NO_INTERVAL = "the model gives none"
 
 
 def _angle(name: str, meaning: str, null: str | None = None) -> Column:
@@ -33,11 +40,20 @@ LAWS = Table(
         MODEL,
         JOINT,
         Column("at_rest_nm_per_rad", "number", "stiffness at the erect pose", "N m/rad", low=0.0),
+        Column(
+            "ratio",
+            "number",
+            "stiffness at the erect pose over the geometric mean of the patient's segments",
+            low=0.0,
+        ),
+        Column("ratio_low", "number", "lower end of its 95 % interval", null=_NO_INTERVAL, low=0.0),
+        Column("ratio_high", "number", "upper end of it", null=_NO_INTERVAL, low=0.0),
         _angle("lower_end_deg", "end of the tangent to the left, negative", _LINEAR),
         _angle("upper_end_deg", "end of the tangent to the right", _LINEAR),
         Column("opposite", "flag", "whether it turns against a bend, or not at all"),
         Column("constrained", "flag", "whether the films asked for less stiffness than is allowed"),
         FREE,
+        DECIDED,
         SCALE_FROM,
     ),
 )
@@ -100,6 +116,7 @@ POSITIONS = Table(
         Column("chord_ratio", "number", "length of the film's spine over the erect one", low=0.0),
         Column("film_scale", "number", "what the film was multiplied by; 1 without corners"),
         FREE,
+        DECIDED,
         SCALE_FROM,
         STATUS,
         MESSAGE,
@@ -135,6 +152,7 @@ MEASURES = {
     "rotation": ("deg", "rotations of segments since the erect film"),
     "place": ("mm", "distance of vertebrae from their places on the film"),
     "tilt": ("deg", "tilts of vertebrae"),
+    "cobb": ("deg", "Cobb angles of the curves"),
     "ferguson": ("deg", "Ferguson angles of the curves"),
 }
 """What models and films are compared by."""
@@ -183,6 +201,114 @@ ACCURACY = Table(
             null="there is no such model",
         ),
         FREE,
+        DECIDED,
         SCALE_FROM,
+    ),
+)
+
+RANGES = {"below_0.2": (0.0, 0.2), "0.2_to_0.8": (0.2, 0.8), "0.8_to_1": (0.8, 1.0)}
+"""Classes of the size of a rotation over the published end of its side (Jalalian 2017 Fig. 7)."""
+BEYOND, EVERY = "beyond", "all"
+
+BY_RANGE = Table(
+    "by_range",
+    "Errors of segments' rotations by how near they come to the published ends: one row per group "
+    "of films, class and model, segments that turn against a bend apart.",
+    ("films", "opposite", "range", "model"),
+    (
+        Column("films", "text", "group of films", allowed=GROUPS),
+        Column("opposite", "flag", "whether the segments turn against a bend, or not at all"),
+        Column(
+            "range",
+            "text",
+            "size of the measured rotation over the published end of its side; beyond: the film "
+            "has the segment where the published law has no load",
+            allowed=(*RANGES, BEYOND, EVERY),
+        ),
+        MODEL,
+        Column("n", "integer", "rotations", low=0),
+        _angle("rmse_deg", "root mean square error", "there is no such rotation"),
+        Column(
+            "reduction_percent",
+            "number",
+            "by how much less than that of linear_regions",
+            "%",
+            null="there is no such model or rotation",
+        ),
+    ),
+)
+
+VARIED = {
+    "enlargement": "ends of the published tangent beyond the rotations of the bending films, in %",
+    "scale": "factor of the lateral stiffness of all segments, other rotations unchanged",
+}
+VARIANT = (
+    Column(
+        "varied",
+        "text",
+        "; ".join(f"{name}: {what}" for name, what in VARIED.items()),
+        allowed=tuple(VARIED),
+    ),
+    Column("value", "number", "its value", "see varied", low=0.0),
+)
+SINGULAR = "singular"
+
+VARIANTS = Table(
+    "variants",
+    "The published tangent model with one choice changed: one row per patient, choice, value and "
+    "position.",
+    ("specimen", "varied", "value", "position"),
+    (
+        SPECIMEN,
+        *VARIANT,
+        POSITION,
+        FITTED,
+        _angle(
+            "law_rmse_deg",
+            "root mean square over both bending films of the laws' rotations under the two forces "
+            "less those of the film",
+            "scale changes no rotation of the laws; or singular",
+        ),
+        _angle("rotation_rmse_deg", "root mean square error of the segments' rotations", _NO_POSE),
+        Column(
+            "place_rmse_mm",
+            "number",
+            "root mean square distance of the vertebrae from their places on the film",
+            "mm",
+            null=_NO_POSE,
+            low=0.0,
+        ),
+        _angle(
+            "moved_deg",
+            "largest change of a segment's rotation from the model as the study has it",
+            _NO_POSE,
+        ),
+        Column(
+            "status",
+            "text",
+            "how the solve ended; singular: the films lie on the ends, where loads are infinite",
+            allowed=(*Ended, SINGULAR),
+        ),
+        MESSAGE,
+    ),
+)
+
+VARIATION = Table(
+    "variation",
+    "The published tangent model with one choice changed, over all patients: one row per choice, "
+    "value and group of films.",
+    ("varied", "value", "films"),
+    (
+        *VARIANT,
+        Column("films", "text", "group of films", allowed=GROUPS),
+        Column("n_patients", "integer", "patients with a pose in every film of the group", low=0),
+        *(
+            Column(name, "number", meaning, unit, null="nobody has a pose", low=0.0)
+            for name, unit, meaning in (
+                ("rotation_rmse_deg", "deg", "root mean square error of all rotations"),
+                ("place_rmse_mm", "mm", "root mean square distance of all vertebrae"),
+                ("moved_deg", "deg", "largest change of a rotation from the model as studied"),
+            )
+        ),
     ),
 )
