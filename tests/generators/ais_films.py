@@ -3,11 +3,12 @@
 ``python -m tests.generators.ais_films`` writes the cohorts ``ais18_phantom*`` again: the 18
 patients of Jalalian 2017 Table 1 by sex, age, Lenke class and Cobb angle, all else drawn here.
 
-A patient is a planar chain that turns about points between its vertebrae. A segment resists by an
-exponential and a stop, other ones to the left and to the right, stiffer near the apex of a curve
-and on its hollow side. Erect it carries its weight and is at rest. It is bent by a sideways pull at
-the top and a righting moment of the head and shoulders, which turns the uppermost segments back.
-Its pose is where its energy is least, found by scipy. Nothing of spinepipe is used.
+A patient is a chain in space that turns about points behind and between its vertebrae. To the side
+a segment resists by an exponential and a stop, other ones to the left and to the right, stiffer
+near the apex of a curve and on its hollow side; about its length and to the front by springs that
+stiffen. Erect it carries its weight and is at rest. It is bent by a sideways pull at the top and a righting effort
+of the head and shoulders, which turns the uppermost segments back. Its pose is where its energy is
+least, found by scipy. Nothing of spinepipe is used.
 """
 
 import csv
@@ -20,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -65,6 +67,9 @@ SHARES = {
 LUMBAR_MODIFIER = {"A": 0.75, "B": 0.9, "C": 1.0}
 
 TRACTION_N = 300.0
+STIFFENING = np.deg2rad(4.0)
+"""Turn about the length or to the front at which its spring is twice as stiff."""
+
 WEIGHTS = np.array([0.025] * (T2 - L4) + [0.16])
 """Share of the body's weight that hangs on each vertebra; head, neck and arms on the uppermost."""
 
@@ -73,14 +78,16 @@ POSITIONS = ("erect", "right_bending", "left_bending", "neutral", "traction")
 
 @dataclass(frozen=True)
 class Patient:
-    """A chain of 15 vertebrae, erect, and what its segments resist with.
+    """A chain of 15 vertebrae, erect, and what its segments resist with; to the front, right and up.
 
     Attributes
     ----------
-    places : (15, 2) m, to the right and up. tilts : (15,) rad, to the right.
-    pivots : (14, 2) m, about which each segment turns.
+    places : (15, 3) m. tilts : (15,) rad, to the right.
+    pivots : (14, 3) m, about which each segment turns.
+    loaded_depth : m to the front, where weight and pulls act.
     stiffness, rate : (14, 2) N m/rad and 1/rad, to the left and to the right.
     gap, stop : (14, 2) rad and N m/rad^3, where a stop begins and how hard it is.
+    others : (14, 2) N m/rad, to the front and about the length.
     """
 
     name: str
@@ -92,57 +99,126 @@ class Patient:
     places: Array
     tilts: Array
     pivots: Array
+    loaded_depth: float
     stiffness: Array
     rate: Array
     gap: Array
     stop: Array
+    others: Array
 
     def energy(self, turns: Array) -> tuple[Array, Array]:
-        """(14,) N m stored in each segment, and its moment."""
-        side = (turns > 0.0).astype(int)
+        """(14,) N m stored by turns (14, 3) about the axes front, right and up, and its slope."""
+        aside = turns[:, 0] * -1.0  # about the axis to the front a turn is to the left
+        side = (aside > 0.0).astype(int)
         rows = np.arange(len(turns))
         k, b, gap, stop = (
             part[rows, side] for part in (self.stiffness, self.rate, self.gap, self.stop)
         )
-        size, sign = np.abs(turns), np.sign(turns)
+        size, sign = np.abs(aside), np.sign(aside)
         over = np.maximum(size - gap, 0.0)
         stored = k * (np.expm1(b * size) - b * size) / b**2 + stop * over**4 / 4.0
-        return stored, sign * (k * np.expm1(b * size) / b + stop * over**3)
+        moments = np.zeros_like(turns)
+        moments[:, 0] = -sign * (k * np.expm1(b * size) / b + stop * over**3)
+        aslant = (turns[:, 1:] / STIFFENING) ** 2
+        moments[:, 1:] = self.others * turns[:, 1:] * (1.0 + aslant)
+        held = 0.5 * self.others * turns[:, 1:] ** 2 * (1.0 + 0.5 * aslant)
+        return stored + held.sum(axis=1), moments
 
-    def moved(self, turns: Array) -> tuple[Array, Array]:
-        """Places (15, 2) and tilts (15,) when every segment has turned so far to the right."""
-        places, _ = self._chain(turns)
-        return places, self.tilts + np.concatenate([[0.0], np.cumsum(turns)])
-
-    def _chain(self, turns: Array) -> tuple[Array, list[Array]]:
-        """Places (15, 2), and where the pivots are."""
-        places, pivots, turned = [self.places[0]], [], 0.0
+    def moved(self, turns: Array) -> "Posed":
+        """The chain when every segment has turned so far against the one below."""
+        way, at = np.eye(3), self.places[0]
+        ways, places, pivots = [way], [at], []
         for below, pivot, above, turn in zip(
             self.places[:-1], self.pivots, self.places[1:], turns, strict=True
         ):
-            pivots.append(places[-1] + _turned(turned, pivot - below))
-            turned += turn
-            places.append(pivots[-1] + _turned(turned, above - pivot))
-        return np.array(places), pivots
+            pivots.append(at + way @ (pivot - below))
+            way = way @ Rotation.from_rotvec(turn).as_matrix()
+            at = pivots[-1] + way @ (above - pivot)
+            ways.append(way)
+            places.append(at)
+        return Posed(self, np.array(ways), np.array(places), np.array(pivots))
 
-    def settled(self, forces: Array, moment: float) -> Array:
-        """(14,) rad: where the energy is least under forces (15, 2) N and a moment on the top."""
+    def settled(self, forces: Array, effort: float) -> "Posed":
+        """Where the energy is least under forces (15, 3) N and an effort (N m) to tilt the top."""
 
-        def work(turns: Array) -> tuple[float, Array]:
-            stored, moments = self.energy(turns)
-            places, pivots = self._chain(turns)
-            slope = moments - moment
-            for segment, pivot in enumerate(pivots):
-                arms = places[segment + 1 :] - pivot
-                pull = forces[segment + 1 :]
-                slope[segment] -= np.sum(arms[:, 1] * pull[:, 0] - arms[:, 0] * pull[:, 1])
-            lifted = np.sum((places - self.places) * forces) + moment * turns.sum()
-            return float(stored.sum() - lifted), slope
+        def work(flat: Array) -> tuple[float, Array]:
+            turns = flat.reshape(14, 3)
+            stored, slope = self.energy(turns)
+            posed, rest = self.moved(turns), self.moved(np.zeros((14, 3)))
+            lifted = np.sum((posed.loaded - rest.loaded) * forces)
+            lifted += effort * (posed.tilts[-1] - rest.tilts[-1])
+            slope = slope - posed.driven(turns, forces, effort)
+            return float(stored.sum() - lifted), slope.ravel()
 
         found = minimize(
-            work, np.zeros(14), jac=True, method="BFGS", options={"gtol": 1e-9, "maxiter": 3000}
+            work, np.zeros(42), jac=True, method="BFGS", options={"gtol": 1e-7, "maxiter": 2000}
         )
-        return np.asarray(found.x)
+        return self.moved(found.x.reshape(14, 3))
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A pose of a patient.
+
+    Attributes
+    ----------
+    ways : (15, 3, 3) orientations. places, pivots : (15, 3) and (14, 3) m.
+    """
+
+    patient: Patient
+    ways: Array
+    places: Array
+    pivots: Array
+
+    @property
+    def loaded(self) -> Array:
+        """(15, 3) m: where weight and pulls act."""
+        return self.places + self.patient.loaded_depth * self.ways[:, :, 0]
+
+    @property
+    def lines(self) -> Array:
+        """(15, 3) along the vertebrae."""
+        tilts = self.patient.tilts
+        up = np.stack([np.zeros(15), np.sin(tilts), np.cos(tilts)], axis=1)
+        found: Array = np.einsum("vij,vj->vi", self.ways, up)
+        return found
+
+    @property
+    def tilts(self) -> Array:
+        """(15,) rad to the right, as a film of the coronal plane shows them."""
+        found: Array = np.arctan2(self.lines[:, 1], self.lines[:, 2])
+        return found
+
+    @property
+    def film(self) -> tuple[Array, Array]:
+        """Places (15, 2) to the right and up, m, and tilts (15,)."""
+        return self.places[:, 1:], self.tilts
+
+    def driven(self, turns: Array, forces: Array, effort: float) -> Array:
+        """(14, 3) N m: what forces and effort do per turn of each segment."""
+        found, top = np.empty((14, 3)), self.lines[-1]
+        by_line = np.array([0.0, top[2], -top[1]]) / (top[1] ** 2 + top[2] ** 2)
+        tilting = effort * np.cross(top, by_line)
+        arms = self.loaded[1:]
+        torques = np.cross(arms, forces[1:])
+        above = np.cumsum(torques[::-1], axis=0)[::-1]
+        pulls = np.cumsum(forces[:0:-1], axis=0)[::-1]
+        for segment, turn in enumerate(turns):
+            torque = above[segment] - np.cross(self.pivots[segment], pulls[segment]) + tilting
+            found[segment] = _by_turn(turn).T @ self.ways[segment].T @ torque
+        return found
+
+
+def _by_turn(turn: Array) -> Array:
+    """(3, 3) small rotation, seen from below, for a small change of the turn."""
+    size = float(np.linalg.norm(turn))
+    x, y, z = turn
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if size < 1e-6:
+        return np.eye(3) + 0.5 * cross
+    one, two = (1.0 - np.cos(size)) / size**2, (size - np.sin(size)) / size**3
+    found: Array = np.eye(3) + one * cross + two * cross @ cross
+    return found
 
 
 def _turned(angle: float, vector: Array) -> Array:
@@ -164,6 +240,8 @@ def patient(number: int, seed: int = 2017) -> Patient:
     steps = rise[:, None] * np.stack([np.sin(between), np.cos(between)], axis=1)
     places = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
     share = rng.uniform(0.36, 0.44, 14)[:, None]
+    depth = size * rng.normal(16e-3, 2e-3, 14)
+    others = np.array([120.0, 90.0]) * np.exp(rng.normal(0.0, 0.3, (14, 2)))
     return Patient(
         f"p{number:02d}",
         sex,
@@ -171,10 +249,12 @@ def patient(number: int, seed: int = 2017) -> Patient:
         lenke,
         float(cobb),
         9.81 * (48.0 if sex == "female" else 58.0) * size,
-        places,
+        np.column_stack([np.zeros(15), places]),
         tilts,
-        places[:-1] + share * steps,
+        np.column_stack([-depth, places[:-1] + share * steps]),
+        size * rng.uniform(-18e-3, -8e-3),
         *_resistance(tilts, apices, rng),
+        others,
     )
 
 
@@ -219,19 +299,19 @@ def _resistance(
 def filmed(one: Patient, seed: int = 2017) -> dict[str, tuple[Array, Array]]:
     """Places and tilts at every position, without error."""
     rng = np.random.default_rng([seed, 1, int(one.name[1:])])
-    nothing, films = np.zeros((15, 2)), {}
-    films["erect"] = one.moved(np.zeros(14))
+    nothing, films = np.zeros((15, 3)), {}
+    films["erect"] = one.moved(np.zeros((14, 3))).film
     for position, side in (("right_bending", 1.0), ("left_bending", -1.0)):
         pull = nothing.copy()
-        pull[-1, 0] = side * rng.uniform(140.0, 240.0)
-        righting = -side * rng.uniform(5.0, 15.0)
-        films[position] = one.moved(one.settled(pull, righting))
+        pull[-1, 1] = side * rng.uniform(110.0, 200.0)
+        righting = -side * rng.uniform(2.0, 8.0)
+        films[position] = one.settled(pull, righting).film
     relieved = nothing.copy()
-    relieved[:, 1] = one.weight_n * WEIGHTS
-    films["neutral"] = one.moved(one.settled(relieved, 0.0))
+    relieved[:, 2] = one.weight_n * WEIGHTS
+    films["neutral"] = one.settled(relieved, 0.0).film
     stretched = relieved.copy()
-    stretched[-1, 1] += TRACTION_N
-    films["traction"] = one.moved(one.settled(stretched, 0.0))
+    stretched[-1, 2] += TRACTION_N
+    films["traction"] = one.settled(stretched, 0.0).film
     return films
 
 
@@ -338,7 +418,7 @@ gravity: false
 
 def _truth(one: Patient, films: Mapping[str, tuple[Array, Array]]) -> dict[str, object]:
     """What was hidden: laws, pivots and every film without error."""
-    parts = ("stiffness", "rate", "gap", "stop", "pivots")
+    parts = ("stiffness", "rate", "gap", "stop", "others", "pivots")
     return {
         **{name: np.round(getattr(one, name), 9).tolist() for name in parts},
         "films": {

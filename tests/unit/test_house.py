@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *("status", "units", "problems", "files", "frames", "decomposition", "marks", "anatomy"),
+    *("status", "units", "problems", "files", "progress", "frames", "decomposition", "marks", "anatomy"),
     *("effects", "model", "world", "statics", "calibrate"),
     *("designs", "statistics", "sensitivity", "cohort", "tables", "comparison"),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),

@@ -5,7 +5,24 @@ PATIENTS = results_of("scoliosis")
 HELD = "specimen={specimen}/model={model,[a-z_]+}"
 
 
+rule population:
+    output:
+        output=f"{PATIENTS}/population.parquet",
+    log:
+        f"{LOGS}/population.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("population"),
+    run:
+        run_job(rule, "population", wildcards, input, output, log)
+
+
 rule personalise:
+    input:
+        population=lambda wildcards: layout(wildcards.study).population_files(
+            wildcards.model
+        ),
     output:
         laws=f"{PATIENTS}/jobs/{HELD}/laws.parquet",
         positions=f"{PATIENTS}/jobs/{HELD}/positions.parquet",
@@ -19,3 +36,16 @@ rule personalise:
         digest=digest("personalise"),
     run:
         run_job(rule, "personalise", wildcards, input, output, log)
+
+
+rule variants:
+    output:
+        output=f"{PATIENTS}/variants/specimen={{specimen}}.parquet",
+    log:
+        f"{LOGS}/variants/specimen={{specimen}}.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("variants"),
+    run:
+        run_job(rule, "variants", wildcards, input, output, log)

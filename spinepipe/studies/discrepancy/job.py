@@ -21,6 +21,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import KEY, with_mark
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
 from spinepipe.studies.discrepancy.rows import (
@@ -46,7 +47,6 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import fitted_values, model_file
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store

@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.scoliosis.films import read_films
+from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import ACCURACY, GROUPS, MEASURES
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 REFERENCE = "linear_regions"
 """The model that Jalalian 2017 compares with."""
@@ -35,21 +33,13 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     read = read_frames(tables)
     rows = list(
         accuracy_rows(
-            read["positions"], read["displacements"], read["curves"], noise(settings, cohort)
+            read["positions"],
+            read["displacements"],
+            read["curves"],
+            reading_noise(settings, cohort),
         )
     )
     write(from_rows(ACCURACY, rows), output, provenance("accuracy", settings, cohort))
-
-
-def noise(settings: Scoliosis, cohort: Cohort) -> Array:
-    """(2,) SD of place (mm, each way) and tilt (deg) as films are read; NaN where nothing tells."""
-    told = np.array([read_films(cohort, name).sd for name in cohort.specimen_names])
-    known = told[np.isfinite(told).all(axis=1)]
-    if len(known):
-        right, up, tilt = np.sqrt((known**2).mean(axis=0))
-        return np.array([MM_PER_M * np.sqrt(0.5 * (right**2 + up**2)), DEG_PER_RAD * tilt])
-    stated = (settings.place_sd_mm, settings.tilt_sd_deg)
-    return np.array([np.nan if one is None else one for one in stated])
 
 
 def accuracy_rows(

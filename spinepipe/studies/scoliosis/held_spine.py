@@ -106,6 +106,9 @@ class HeldSpine:
         top = model.n_joints - 1
         point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _line(erect.tilt[-1])
         self.grips = (Place(top, point, RIGHT), Place(top, point, UP), Tilt(top, line, UP, RIGHT))
+        self.tilts = tuple(
+            Tilt(body, _line(tilt), UP, RIGHT) for body, tilt in enumerate(erect.tilt[1:])
+        )
 
     def with_model(self, model: SpineModel) -> "HeldSpine":
         """The same spine on other stiffness."""
@@ -118,6 +121,11 @@ class HeldSpine:
         held = hold_at(self.system, self.grips, top, self.free, start)
         film = self.film(held.q)
         return Posed(held, film, film.turned - self.erect.turned)
+
+    def tilts_by(self, q: Array) -> Array:
+        """(S, n) change of all tilts on a film but the lowest with the pose q (n,)."""
+        motion = ChainMotion(self.system.chain, q)
+        return np.array([one.slope(motion) for one in self.tilts])
 
     def film(self, q: Array) -> Film:
         """What a film of the pose q (n,) shows."""

@@ -1,13 +1,24 @@
 """The kind scoliosis: personal stiffness of scoliotic spines from bending films."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import ACCURACY, CURVES, DISPLACEMENTS, LAWS, POSITIONS
+from spinepipe.studies.scoliosis.tables import (
+    ACCURACY,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    POPULATION,
+    POSITIONS,
+    VARIANTS,
+    VARIATION,
+)
 from spinepipe.studies.study_files import StudyFiles
 
 OF_JOBS = ("laws", "positions", "displacements", "curves")
@@ -15,12 +26,18 @@ OF_JOBS = ("laws", "positions", "displacements", "curves")
 
 _BLOCK = "000"
 
+POOLED = "tangent_fitted"
+"""The model that reads the films of all patients."""
+
+VARIED_MODEL = "tangent"
+"""The model whose choices are varied."""
+
 
 @dataclass(frozen=True)
 class ScoliosisFiles(StudyFiles):
     """The result files of one study of scoliotic spines."""
 
-    joined = OF_JOBS
+    joined = (*OF_JOBS, "variants")
 
     study: Scoliosis
 
@@ -31,17 +48,28 @@ class ScoliosisFiles(StudyFiles):
 
     @property
     def tables(self) -> tuple[str, ...]:
-        """The tables that every study has."""
-        return (*OF_JOBS, "accuracy")
+        """The tables that this study has."""
+        population = ("population",) if POOLED in self.study.models else ()
+        varied = ("variants", "variation") if VARIED_MODEL in self.study.models else ()
+        return (*OF_JOBS, *population, "accuracy", *varied)
+
+    def population_files(self, model: str) -> list[str]:
+        """What a model reads of the population of all patients."""
+        return self.table_files(("population",)) if model == POOLED else []
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
-        """The tables that are made of job files."""
+        """The tables that are made of the job files of models."""
         return OF_JOBS
+
+    @property
+    def by_specimen(self) -> tuple[str, ...]:
+        """The tables with one job file per patient."""
+        return ("variants",)
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        return "personalise"
+        return "variants" if table == "variants" else "personalise"
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per patient."""
@@ -53,13 +81,21 @@ class ScoliosisFiles(StudyFiles):
         return [f"{place}/model={model}/{table}.parquet" for model in self.study.models]
 
 
+def _population(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Mark of the population that a model belongs to."""
+    return [expected.of_job("population", {})] if place["model"] == POOLED else []
+
+
 KIND = Kind(
     settings=Scoliosis,
     files=ScoliosisFiles,
     checks=(check_scoliosis,),
-    tables=(LAWS, POSITIONS, DISPLACEMENTS, CURVES, ACCURACY),
+    tables=(LAWS, POPULATION, POSITIONS, DISPLACEMENTS, CURVES, ACCURACY, VARIANTS, VARIATION),
     jobs=(
-        Job("personalise", many=True, ignores=ignoring("models")),
+        Job("personalise", many=True, ignores=ignoring("models"), also=_population),
+        Job("population", "learn", ignores=ignoring("models")),
+        Job("variants", ignores=ignoring("models")),
+        Job("variation", "", ("variants",), ("variation",)),
         Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
     ),
     forms=(FILMS, PATIENTS),

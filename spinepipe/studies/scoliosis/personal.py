@@ -1,8 +1,9 @@
 """The stiffness of a patient's segments in each of the models that are compared.
 
 What a film of bending gives, and what all models share: geometry, the other rotations, and the
-force that bends, a pull at the uppermost vertebra. Films decide ratios between segments; the size
-comes from outside (`settings.Scale`), so that models differ by what they make of the films alone.
+force that bends, a pull at the uppermost vertebra. Films decide ratios between segments; the size,
+the geometric mean over segments of the stiffness at rest, comes from outside (`settings.Scale`) and
+is one for all models, so that they differ by what they make of the films alone.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,11 +26,10 @@ from spinepipe.studies.scoliosis.held_spine import (
     with_laws,
     with_springs,
 )
-from spinepipe.studies.scoliosis.settings import Scale, Scoliosis
+from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     Ends,
     Flags,
-    Laws,
     Pairs,
     Straight,
     characterise,
@@ -51,16 +51,19 @@ class Patient:
 
     Attributes
     ----------
-    chain : without effects. springs : (S, 6) stiffness of all segments before personalisation.
-    apex : segment below the apical vertebra of the thoracolumbar or lumbar curve.
+    chain : without effects.
+    size : geometric mean over segments of the lateral stiffness at rest in all models, N m/rad.
+    springs : (S, 6) stiffness of all segments before personalisation: as published to each other,
+        lateral bending of that size.
+    pairs : what the bending films give.
     """
 
     name: str
     read: Read
     chain: SpineModel
+    size: float
     springs: Array
     pairs: Pairs
-    apex: int
 
     @property
     def erect(self) -> Film:
@@ -81,8 +84,10 @@ class Personal:
     ----------
     at_rest : (S,) N m/rad, lateral stiffness at the erect pose.
     ends : of a tangent law; none of a linear one.
-    constrained : (S,) segments whose stiffness was held at the least.
+    constrained : (S,) segments whose stiffness was held at the least or at the most.
     free : number of parameters taken from this patient's films.
+    decided : of how many the films decided; all, where the model draws them to no population.
+    ratio_range : (2, S) 95 % interval of the segments' ratios; none where the model gives none.
     """
 
     model: SpineModel
@@ -90,7 +95,14 @@ class Personal:
     ends: Ends | None
     constrained: Flags
     free: int
-    force_ratio: float | None = None
+    decided: float
+    ratio_range: Array | None = None
+
+    @property
+    def ratio(self) -> Array:
+        """(S,) stiffness at rest over the geometric mean of the segments."""
+        found: Array = self.at_rest / geometric_mean(self.at_rest)
+        return found
 
 
 def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
@@ -106,14 +118,16 @@ def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
         )
         for position in (RIGHT, LEFT)
     )
-    return Patient(
-        name,
-        read,
-        chain,
-        np.tile(np.array(study.stiffness.in_order(), dtype=float), (chain.n_joints, 1)),
-        Pairs(read.turned(RIGHT), read.turned(LEFT), right, left),
-        max(lumbar_apex(erect, cohort.vertebrae) - 1, 0),
-    )
+    pairs = Pairs(read.turned(RIGHT), read.turned(LEFT), right, left, _apex(erect, cohort))
+    size = size_of(pairs, study)
+    stated = np.array(study.stiffness.in_order(), dtype=float)
+    springs = np.tile(stated * size / stated[BENDING], (chain.n_joints, 1))
+    return Patient(name, read, chain, size, springs, pairs)
+
+
+def _apex(erect: Film, cohort: Cohort) -> int:
+    """The segment below the apical vertebra of the thoracolumbar or lumbar curve."""
+    return max(lumbar_apex(erect, cohort.vertebrae) - 1, 0)
 
 
 def arms(share: float, film: Film, across_chord: bool) -> Array:
@@ -131,45 +145,55 @@ def arms(share: float, film: Film, across_chord: bool) -> Array:
     return found
 
 
+def size_of(pairs: Pairs, study: Scoliosis) -> float:
+    """Geometric mean over segments of the stiffness at rest that all models have, N m/rad."""
+    if study.scale.of == "mean_stiffness":
+        return study.scale.mean_stiffness_nm_per_rad
+    ends = ends_of(pairs, study.enlargement)
+    laws = characterise(pairs, ends, study.scale.apical_moment_nm)
+    return geometric_mean(ends.at_rest(laws.stretch))
+
+
+def geometric_mean(values: Array) -> float:
+    """Of positive values."""
+    return float(np.exp(np.mean(np.log(values))))
+
+
 def tangent(patient: Patient, study: Scoliosis) -> Personal:
     """The published model: tangent laws of the two bending films."""
     ends = ends_of(patient.pairs, study.enlargement)
-    laws = characterise(patient.pairs, ends, patient.apex, study.scale.apical_moment_nm)
-    b, c = ends.shape
-    at_rest = laws.stretch * b * (1.0 + np.tan(c) ** 2)
-    factor = _factor(study.scale, at_rest)
+    laws = characterise(patient.pairs, ends, study.scale.apical_moment_nm)
+    at_rest = ends.at_rest(laws.stretch)
+    factor = patient.size / geometric_mean(at_rest)
     values = np.column_stack([factor * laws.stretch, ends.lower, ends.upper])
     model = with_laws(patient.chain, patient.springs, values)
-    return _personal(model, factor * at_rest, ends, laws, 3 * len(at_rest) + 1)
+    free = 3 * len(at_rest) + 1
+    return Personal(model, factor * at_rest, ends, laws.constrained, free, free)
 
 
 def linear_per_segment(patient: Patient, study: Scoliosis) -> Personal:
     """A spring for each segment from the same pairs."""
-    laws = characterise(patient.pairs, Straight(), patient.apex, study.scale.apical_moment_nm)
-    at_rest = _factor(study.scale, laws.stretch) * laws.stretch
+    laws = characterise(patient.pairs, Straight(), study.scale.apical_moment_nm)
+    at_rest = laws.stretch * patient.size / geometric_mean(laws.stretch)
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
-    return _personal(model, at_rest, None, laws, len(at_rest) + 1)
-
-
-def _personal(
-    model: SpineModel, at_rest: Array, ends: Ends | None, laws: Laws, free: int
-) -> Personal:
-    return Personal(model, at_rest, ends, laws.constrained, free, laws.ratio)
+    free = len(at_rest) + 1
+    return Personal(model, at_rest, None, laws.constrained, free, free)
 
 
 def uniform(patient: Patient, study: Scoliosis) -> Personal:
     """The same spring everywhere: nothing is taken from the films."""
-    stated = patient.springs[:, BENDING]
-    at_rest = _factor(study.scale, stated) * stated
+    return _springs(patient, patient.springs[:, BENDING], 0)
+
+
+def _springs(patient: Patient, at_rest: Array, free: int) -> Personal:
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
-    return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), 0)
+    return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
 
 
 def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     """Petit's scheme: a multiplier of the springs for each curve, by the curves' Ferguson angles.
 
-    With the uppermost vertebra held in place only ratios of the multipliers count: their geometric
-    mean is one.
+    With the uppermost vertebra held in place only ratios of the multipliers count.
     """
     regions = _regions(patient)
     count = int(regions.max()) + 1
@@ -177,8 +201,8 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     spine = HeldSpine(start.model, patient.erect)
 
     def stiffness(logs: Array) -> Array:
-        every = np.append(logs, -logs.sum())
-        found: Array = start.at_rest * np.exp(every[regions])
+        every = np.append(logs, 0.0)[regions]
+        found: Array = start.at_rest * np.exp(every - every.mean())
         return found
 
     near: dict[str, Held] = {}
@@ -201,9 +225,7 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
             missed, best, _differences(missed), (-reach, reach), xtol=LAST_STEP
         )
         best = ended.x
-    at_rest = stiffness(best)
-    model = with_springs(patient.chain, _with_bending(patient, at_rest))
-    return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), count - 1)
+    return _springs(patient, stiffness(best), count - 1)
 
 
 def _differences(missed: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -230,17 +252,10 @@ def _with_bending(patient: Patient, at_rest: Array) -> Array:
     return springs
 
 
-def _factor(scale: Scale, at_rest: Array) -> float:
-    """What the laws are to be multiplied by for the size that is stated from outside."""
-    if scale.of == "apical_moment":
-        return 1.0
-    return scale.mean_stiffness_nm_per_rad / float(at_rest.mean())
-
-
 WAYS: Mapping[str, Callable[[Patient, Scoliosis], Personal]] = {
     "tangent": tangent,
     "linear_regions": linear_regions,
     "linear_per_segment": linear_per_segment,
     "uniform": uniform,
 }
-"""How each model is personalised, by its name in a study."""
+"""How a model is personalised from the films of one patient alone, by its name in a study."""

@@ -4,24 +4,30 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.statics.prescribed import Ended
+from spinepipe.marks import read_mark
+from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import HeldSpine, Posed
+from spinepipe.studies.scoliosis.misses import POSED, miss_of
 from spinepipe.studies.scoliosis.personal import WAYS, Patient, Personal, patient_of
+from spinepipe.studies.scoliosis.population_table import population_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
 from spinepipe.studies.scoliosis.tangent_laws import ends_of
-from spinepipe.tables import from_rows, write
+from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.tables.shared import joined
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 Row = dict[str, Any]
 
-POSED = (Ended.CONVERGED, Ended.UNREACHABLE)
-"""How a solve may end whose pose is held against the film."""
+NOT_ARRIVED = "the fit to the films did not settle"
+
+PUSHES = ("push_right_n", "push_up_n", "push_right_bending_nm")
 
 
 def run(
@@ -33,11 +39,14 @@ def run(
     positions: str,
     displacements: str,
     curves: str,
+    population: list[str],
 ) -> None:
-    """Write the rows of a patient and a model."""
+    """Write the rows of a patient and a model; a model of a population reads that of all."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
-    rows = rows_of(settings, cohort, specimen, model)
-    made_by = provenance("personalise", settings, cohort, [specimen])
+    learned = [read_frame(path) for path in population]
+    rows = rows_of(settings, cohort, specimen, model, *learned)
+    marks = [read_mark(path) for path in population]
+    made_by = provenance("personalise", settings, cohort, [specimen], marks)
     places = zip(
         (LAWS, POSITIONS, DISPLACEMENTS, CURVES),
         (laws, positions, displacements, curves),
@@ -47,15 +56,21 @@ def run(
         write(from_rows(table, rows[table.name]), path, made_by)
 
 
-def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> dict[str, list[Row]]:
+def rows_of(
+    settings: Scoliosis,
+    cohort: Cohort,
+    specimen: str,
+    model: str,
+    population: pd.DataFrame | None = None,
+) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     patient = patient_of(settings, cohort, specimen)
-    personal = WAYS[model](patient, settings)
+    personal, message = _personal(settings, patient, model, population)
     spine = HeldSpine(personal.model, patient.erect)
     known: Row = {"specimen": specimen, "model": model}
     taken: Row = {
         "free_parameters": personal.free,
-        "decided_parameters": float(personal.free),
+        "decided_parameters": personal.decided,
         "scale_from": settings.scale.of,
     }
     found: dict[str, list[Row]] = {
@@ -75,7 +90,7 @@ def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> d
             | _position(patient, position, posed)
             | taken
             | ended
-            | {"message": posed.held.message}
+            | {"message": joined(message, posed.held.message)}
         )
         for table, rows in (
             (DISPLACEMENTS, _displacements(settings, patient, position, posed)),
@@ -85,16 +100,30 @@ def rows_of(settings: Scoliosis, cohort: Cohort, specimen: str, model: str) -> d
     return found
 
 
+def _personal(
+    settings: Scoliosis, patient: Patient, model: str, population: pd.DataFrame | None
+) -> tuple[Personal, str]:
+    """The model, and what is to be said of how it was come by."""
+    if population is None:
+        return WAYS[model](patient, settings), ""
+    everyone, tilt_sd = population_of(population)
+    fit = FilmFit(patient, tilt_sd)
+    try:
+        fitted = fit.fit(everyone)
+    except NoFit as why:
+        return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
+    return fit.personal(fitted), "" if fitted.arrived else NOT_ARRIVED
+
+
 def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
-    ratios = personal.at_rest / np.exp(np.mean(np.log(personal.at_rest)))
+    ends, reach = personal.ends, personal.ratio_range
     for number, joint in enumerate(patient.chain.joints):
-        ends = personal.ends
         yield {
             "joint": joint,
             "at_rest_nm_per_rad": float(personal.at_rest[number]),
-            "ratio": float(ratios[number]),
-            "ratio_low": None,
-            "ratio_high": None,
+            "ratio": float(personal.ratio[number]),
+            "ratio_low": None if reach is None else float(reach[0, number]),
+            "ratio_high": None if reach is None else float(reach[1, number]),
             "lower_end_deg": None if ends is None else DEG_PER_RAD * float(ends.lower[number]),
             "upper_end_deg": None if ends is None else DEG_PER_RAD * float(ends.upper[number]),
             "opposite": bool(patient.pairs.opposite[number]),
@@ -103,30 +132,16 @@ def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
 
 
 def _position(patient: Patient, position: str, posed: Posed) -> Row:
-    film, there = patient.read.films[position], posed.held.status in POSED
     missed = posed.held.missed
-    row: Row = {
+    pushes = posed.held.pushes.tolist() if posed.held.status in POSED else [None] * len(PUSHES)
+    return {
         "missed_mm": MM_PER_M * float(np.hypot(*missed[:2])),
         "missed_deg": DEG_PER_RAD * abs(float(missed[2])),
         "chord_ratio": patient.read.chord(position),
         "film_scale": patient.read.scales[position],
+        **miss_of(patient, position, posed),
+        **dict(zip(PUSHES, pushes, strict=True)),
     }
-    names = ("rotation_rmse_deg", "place_rmse_mm", "tilt_rmse_deg")
-    pushes = ("push_right_n", "push_up_n", "push_right_bending_nm")
-    if not there:
-        return row | dict.fromkeys((*names, *pushes))
-    away = np.hypot(posed.film.right - film.right, posed.film.up - film.up)[1:]
-    errors = (
-        DEG_PER_RAD * (posed.r - patient.read.turned(position)),
-        MM_PER_M * away,
-        DEG_PER_RAD * (posed.film.tilt - film.tilt)[1:],
-    )
-    sizes = [float(np.sqrt(np.mean(one**2))) for one in errors]
-    return (
-        row
-        | dict(zip(names, sizes, strict=True))
-        | dict(zip(pushes, posed.held.pushes.tolist(), strict=True))
-    )
 
 
 def _displacements(

@@ -1,6 +1,6 @@
 """What a study of scoliotic spines asks."""
 
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, Field
 
@@ -9,6 +9,9 @@ from spinepipe.studies.study import Study
 from spinepipe.units import COORDINATES
 
 ModelName = Literal["tangent", "tangent_fitted", "linear_regions", "linear_per_segment", "uniform"]
+
+Percent = Annotated[float, Field(ge=0, le=200)]
+Factor = Annotated[float, Field(gt=0, le=1e3)]
 
 MODELS: tuple[ModelName, ...] = get_args(ModelName)
 
@@ -31,7 +34,8 @@ class Scale(BaseModel):
         default=PublishedStiffness().in_order()[COORDINATES.index("right_bending")],
         gt=0,
         le=1e5,
-        description="mean lateral stiffness at rest, N m/rad (Gould 2024b Table 2)",
+        description="geometric mean over segments of the lateral stiffness at rest, N m/rad; "
+        "by default that of Gould 2024b Table 2",
     )
 
 
@@ -51,6 +55,21 @@ class Profile(BaseModel):
     )
 
 
+class Variants(BaseModel):
+    """Choices of the published tangent that are varied one at a time."""
+
+    model_config = FORM
+
+    enlargement_percent: EachOnce[Percent] = Field(
+        default=(0.0, 10.0, 20.0, 30.0, 40.0),
+        description="how far the ends are beyond the rotations of the bending films",
+    )
+    scale: EachOnce[Factor] = Field(
+        default=(0.1, 0.3, 3.0, 10.0),
+        description="factor of the lateral stiffness of all segments, other rotations unchanged",
+    )
+
+
 class Scoliosis(Study):
     """Patients whose stiffness is found from bending films, and what other films say of it."""
 
@@ -62,6 +81,7 @@ class Scoliosis(Study):
         le=3.0,
         description="ends of the tangent over the rotations of the bending films",
     )
+    variants: Variants = Field(default=Variants(), description="choices of tangent that are varied")
     arm: Literal["erect", "film"] = Field(
         default="film", description="film on which the arms of the bending force are measured"
     )
@@ -73,9 +93,16 @@ class Scoliosis(Study):
     scale: Scale = Field(default=Scale(), description="where the size of the stiffness comes from")
     stiffness: PublishedStiffness = Field(
         default=PublishedStiffness(),
-        description="stiffness of the other rotations; start of the lateral one",
+        description="of the rotations to each other: all follow the size of the lateral one",
     )
     profile: Profile = Field(default=Profile(), description="depth that the films lack")
+    model_sd_deg: float = Field(
+        default=0.5,
+        gt=0,
+        le=20,
+        description="SD by which a chain of tangents misses tilts that are read without error; "
+        "tangent_fitted trusts films no further",
+    )
     tilt_sd_deg: float | None = Field(
         default=None, gt=0, le=20, description="SD of a vertebra's tilt, where no repeats tell it"
     )

@@ -1,6 +1,7 @@
 """Tables of studies of kind scoliosis."""
 
 from spinepipe.statics.prescribed import Ended
+from spinepipe.studies.scoliosis.population import PER_SEGMENT
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table
 
@@ -55,6 +56,44 @@ LAWS = Table(
         FREE,
         DECIDED,
         SCALE_FROM,
+    ),
+)
+
+POPULATION = Table(
+    "population",
+    "What the segments of all patients have in common, towards which tangent_fitted draws those of "
+    "which films tell little: one row per quantity and joint.",
+    ("quantity", "joint"),
+    (
+        Column(
+            "quantity",
+            "text",
+            "ratio: stiffness at the erect pose over the patient's geometric mean; or the size of "
+            "an end",
+            allowed=PER_SEGMENT,
+        ),
+        JOINT,
+        Column("unit", "text", "unit of mean, low and high; none of a ratio"),
+        *(
+            Column(name, "number", meaning, "see unit", low=0.0)
+            for name, meaning in (
+                ("mean", "geometric mean over patients"),
+                ("low", "lower end of the range of 95 % of patients"),
+                ("high", "upper end of it"),
+            )
+        ),
+        Column("sd_log", "number", "SD between segments of one level, of the logarithm", low=0.0),
+        Column("n_patients", "integer", "patients it was learned from", low=0),
+        Column("rounds", "integer", "times that all patients were fitted", low=1),
+        Column(
+            "last_change",
+            "number",
+            "largest change of a logarithm in the last round",
+            null="nobody has a fit",
+            low=0.0,
+        ),
+        _angle("tilt_sd_deg", "SD of a tilt on a film less the model's, as films were weighed"),
+        MESSAGE,
     ),
 )
 

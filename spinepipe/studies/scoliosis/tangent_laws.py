@@ -24,8 +24,9 @@ Flags = NDArray[np.bool_]
 SMALLEST_END = float(np.deg2rad(0.1))
 """Step in which tilt was read on the films: a segment moves by no less."""
 
-LEAST_SHARE = 0.05
-"""Least A, as a share of the patient's median: films may ask for a negative one."""
+LEAST_SHARE, MOST_SHARE = 0.1, 10.0
+"""Least and largest A, over the patient's median: films may ask for a negative one, or for one
+without limit where a segment stood still."""
 
 FARTHEST_RATIO = np.log(30.0)
 """The two forces differ by less than this factor."""
@@ -41,12 +42,14 @@ class Pairs:
     ----------
     right, left : (S,) rad, r on the right and on the left bending film.
     arm_right, arm_left : (S,) m, from each segment's joint to the line of the force.
+    apex : the segment below the apical vertebra of the thoracolumbar or lumbar curve.
     """
 
     right: Array
     left: Array
     arm_right: Array
     arm_left: Array
+    apex: int
 
     @cached_property
     def opposite(self) -> Flags:
@@ -71,6 +74,12 @@ class Ends:
         """(S,) tau / A at r (S,): tan(B r + C) + D, Eqs 1 and 3."""
         b, c = self.shape
         found: Array = np.tan(b * r + c) - np.tan(c)
+        return found
+
+    def at_rest(self, stretch: Array) -> Array:
+        """(S,) N m/rad: the slope at r = 0 for A (S,)."""
+        b, c = self.shape
+        found: Array = stretch * b * (1.0 + np.tan(c) ** 2)
         return found
 
     def rotation(self, load: Array) -> Array:
@@ -120,7 +129,7 @@ class Laws:
     shape : of the laws. ratio : force of the left bend over that of the right one.
     stretch : (S,) A, N m (of linear laws the stiffness, N m/rad), for forces of which the larger
         has an apical moment as asked.
-    constrained : (S,) whether A would have been less than it may be.
+    constrained : (S,) whether A would have been less or more than it may be.
     errors : (S, 2) rad, r of the law less r of the film, right and left bend.
     force_right_n, force_left_n : size of the two forces.
     """
@@ -139,33 +148,32 @@ class Laws:
         return float(np.sqrt((self.errors**2).mean(axis=1)).sum())
 
 
-def characterise(pairs: Pairs, shape: Shape, apex: int, apical_nm: float) -> Laws:
+def characterise(pairs: Pairs, shape: Shape, apical_nm: float) -> Laws:
     """The laws whose rotations under two forces are nearest those of the films.
 
     Parameters
     ----------
-    apex : segment below the apical vertebra of the thoracolumbar or lumbar curve.
-    apical_nm : the larger of the two moments about it.
+    apical_nm : the larger of the two moments about the apical segment, N m.
     """
 
     def rmse(log_ratio: float) -> float:
-        return _laws(pairs, shape, float(np.exp(log_ratio)), apex, apical_nm).rmse
+        return _laws(pairs, shape, float(np.exp(log_ratio)), apical_nm).rmse
 
     tried = np.linspace(-FARTHEST_RATIO, FARTHEST_RATIO, RATIOS_TRIED)
     best = int(np.argmin([rmse(one) for one in tried]))
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
     found = minimize_scalar(rmse, bounds=(low, high), method="bounded", options={"xatol": 1e-10})
-    return _laws(pairs, shape, float(np.exp(found.x)), apex, apical_nm)
+    return _laws(pairs, shape, float(np.exp(found.x)), apical_nm)
 
 
-def _laws(pairs: Pairs, shape: Shape, ratio: float, apex: int, apical_nm: float) -> Laws:
+def _laws(pairs: Pairs, shape: Shape, ratio: float, apical_nm: float) -> Laws:
     """The laws with forces of one ratio, regression through the origin (Eq 4)."""
-    force = apical_nm / max(pairs.arm_right[apex], ratio * pairs.arm_left[apex])
+    force = apical_nm / max(pairs.arm_right[pairs.apex], ratio * pairs.arm_left[pairs.apex])
     moments = np.stack([force * pairs.arm_right, -ratio * force * pairs.arm_left], axis=1)
     rotations = np.stack([pairs.right, pairs.left], axis=1)
     g = np.stack([shape.load(one) for one in rotations.T], axis=1)
     asked = (moments * g).sum(axis=1) / (g**2).sum(axis=1)
-    least = LEAST_SHARE * float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
-    stretch = np.maximum(asked, least)
+    middle = float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
+    stretch = np.clip(asked, LEAST_SHARE * middle, MOST_SHARE * middle)
     reached = np.stack([shape.rotation(one / stretch) for one in moments.T], axis=1)
-    return Laws(shape, ratio, stretch, asked < least, reached - rotations, force, ratio * force)
+    return Laws(shape, ratio, stretch, asked != stretch, reached - rotations, force, ratio * force)

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from spinepipe import cohort as cohorts
-from spinepipe.studies.scoliosis.accuracy import accuracy_rows, noise
+from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.personalise import rows_of
+from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -66,7 +67,7 @@ def test_errors_are_pooled_over_films_segments_and_patients(
     tables: dict[str, pd.DataFrame], cohort: cohorts.Cohort
 ) -> None:
     parts = (tables["positions"], tables["displacements"], tables["curves"])
-    sd = noise(STUDY, cohort)
+    sd = reading_noise(STUDY, cohort)
     found = from_rows(ACCURACY, list(accuracy_rows(*parts, sd))).to_pandas()
     assert len(found) == 2 * len(MEASURES) * len(MODELS)
     chosen = found.set_index(["films", "measure", "model"]).loc[("fitted", "rotation", "uniform")]

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Supposed, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Solved
-from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,

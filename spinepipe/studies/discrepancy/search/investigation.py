@@ -8,6 +8,7 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
@@ -27,7 +28,6 @@ from spinepipe.studies.discrepancy.search.noise import (
 from spinepipe.studies.discrepancy.search.nuisance import as_si
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.search.prediction import recorded
-from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy

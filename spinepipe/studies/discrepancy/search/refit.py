@@ -9,6 +9,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from spinepipe.effects import Parameter, Spread
 from spinepipe.effects.contract import Array
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import (
     STRENGTH_SDS,
@@ -18,7 +19,6 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Variant,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
-from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, Tried
 from spinepipe.studies.discrepancy.store import Run
 

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.effects import Spread
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.gaps import Gap, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
@@ -25,7 +26,6 @@ from spinepipe.studies.discrepancy.search.inquiry import (
     Standing,
 )
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
-from spinepipe.studies.discrepancy.search.progress import Progress
 from spinepipe.studies.discrepancy.search.refit import Refit, standing
 from spinepipe.studies.discrepancy.search.screen import Screen, exceeded
 from spinepipe.studies.discrepancy.store import Run

@@ -1,4 +1,4 @@
-"""What a search says while it works: a line for each round, and every few seconds of a long one."""
+"""What long work says of itself: a line for each round, and every few seconds of a long one."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -1,0 +1,235 @@
+"""Tangents of all segments fitted at once to both bending films, through the simulator.
+
+The unknowns of a patient are the logarithms of `population`. A pose is found where the film has the
+uppermost vertebra, its tilts are compared with the film's, and its exact answer to each unknown is
+taken from the equations of equilibrium. What the films leave open stays as the population has it;
+the spread of what is left is the curvature at the optimum (Laplace).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from spinepipe.calibrate.descent import Settled, descend
+from spinepipe.effects.bounded_tangent import BoundedTangent, argument
+from spinepipe.effects.contract import Array
+from spinepipe.model import SpineModel
+from spinepipe.statics.prescribed import Ended, Held
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT
+from spinepipe.studies.scoliosis.held_spine import BENDING, HeldSpine, with_laws
+from spinepipe.studies.scoliosis.personal import Patient, Personal
+from spinepipe.studies.scoliosis.population import Known, Population, assumed
+from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, Ends
+
+FARTHEST = 5.0
+"""Numbers stay within so many SD of the population's mean."""
+
+BEYOND_THE_FILM = 1.3
+"""A fit begins with ends at least so far beyond the rotations of the films."""
+
+SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
+"""A ten-thousandth of a number's logarithm is far within its spread."""
+
+LEVEL = 0.95
+"""Of the intervals of ratios."""
+
+READINGS_OF_A_CHANGE = 2
+"""Tilts are read on the film and on the erect one."""
+
+NO_POSE = "no pose of the first guess has the uppermost vertebra where the films have it"
+
+
+class NoFit(Exception):
+    """The films cannot be fitted; the message says why."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the films say of the numbers near a fit, apart from any population.
+
+    Attributes
+    ----------
+    matrix : (3 S, 3 S) and vector : (3 S,), of half the sum of squares x matrix x / 2 - vector x.
+    """
+
+    matrix: Array
+    vector: Array
+
+    def known(self, population: Population) -> Known:
+        """The numbers, where the patient is of a population."""
+        covariance = np.linalg.inv(self.matrix + population.precision)
+        mean = covariance @ (self.vector + population.precision @ population.mean)
+        return Known(mean.astype(float, copy=False), covariance.astype(float, copy=False))
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The end of a fit.
+
+    Attributes
+    ----------
+    numbers : (3 S,), the likeliest. known : they and their covariance.
+    decided : of how many the films, not the population, decided.
+    """
+
+    numbers: Array
+    told: Told
+    known: Known
+    arrived: bool
+
+    @property
+    def decided(self) -> float:
+        """Sum over numbers of the films' share of what is known of them."""
+        return float(np.trace(self.known.covariance @ self.told.matrix))
+
+
+def ends_of(numbers: Array) -> tuple[Array, Array]:
+    """(S,) rad each: lower and upper ends."""
+    _, lower, upper = numbers.reshape(3, -1)
+    return -np.exp(lower), np.exp(upper)
+
+
+def laws_of(numbers: Array, size: float) -> Array:
+    """(S, 3) stretch (N m) and ends (rad) of the tangents whose mean at rest is a size, N m/rad."""
+    lower, upper = ends_of(numbers)
+    b, c = argument(lower, upper)
+    at_rest = size * np.exp(numbers.reshape(3, -1)[0])
+    return np.column_stack([at_rest / (b * (1.0 + np.tan(c) ** 2)), lower, upper])
+
+
+def by_numbers(numbers: Array, size: float) -> Array:
+    """(S, 3, 3) derivative of each segment's law by its own three numbers."""
+    stretch, lower, upper = laws_of(numbers, size).T
+    b, c = argument(lower, upper)
+    found = np.zeros((len(lower), 3, 3))
+    found[:, 0, 0] = stretch
+    for column, sign, end in ((1, 1.0, lower), (2, -1.0, upper)):
+        b_by_end = sign * b**2 / np.pi
+        c_by_end = -0.5 * (b_by_end * (lower + upper) + b)
+        found[:, 0, column] = -stretch * (b_by_end / b + 2.0 * np.tan(c) * c_by_end) * end
+        found[:, column, column] = end
+    return found
+
+
+class FilmFit:
+    """The films of one patient as a least squares problem; its chain is the one that is loaded."""
+
+    def __init__(self, patient: Patient, tilt_sd: float) -> None:
+        """Load the chain.
+
+        Parameters
+        ----------
+        tilt_sd : rad, of a vertebra's tilt on a film less the model's.
+        """
+        self.patient, self.size, self.tilt_sd = patient, patient.size, tilt_sd
+        self.segments, erect = patient.chain.n_joints, patient.erect
+        self.spine = HeldSpine(self._model(self._beyond_films(assumed(self.segments).mean)), erect)
+        self.near: dict[str, Held] = {}
+
+    def fit(self, population: Population, start: Array | None = None) -> Fitted:
+        """The likeliest numbers, and what is known of them.
+
+        Raises
+        ------
+        NoFit : where no pose begins the fit.
+        """
+        root, reach = population.root, FARTHEST * population.sd
+        low, high = population.mean - reach, population.mean + reach
+        begin = self._beyond_films(population.mean) if start is None else start
+        begin = np.clip(begin, low + 1e-9, high - 1e-9)
+        looked: dict[bytes, tuple[Array, Array] | None] = {}
+
+        def point(numbers: Array) -> tuple[Array, Array] | None:
+            key = numbers.tobytes()
+            if key not in looked:
+                found = self.missed(numbers)
+                away = root @ (numbers - population.mean)
+                looked[key] = found and (np.append(found[0], away), np.vstack([found[1], root]))
+            return looked[key]
+
+        if point(begin) is None:
+            raise NoFit(NO_POSE)
+        size = 2 * (self.segments - 1) + len(begin)
+        ended = descend(point, begin, (low, high), population.sd, size, SETTLED)
+        found = self.missed(ended.x)
+        assert found is not None  # a descent ends where there is a pose
+        errors, slopes = found
+        matrix = slopes.T @ slopes
+        told = Told(matrix, matrix @ ended.x - slopes.T @ errors)
+        known = replace(told.known(population), mean=ended.x)
+        return Fitted(ended.x, told, known, ended.arrived)
+
+    def personal(self, fitted: Fitted) -> Personal:
+        """The model of a fit."""
+        return self._personal(fitted.known, fitted.decided)
+
+    def unfitted(self, population: Population) -> Personal:
+        """The model of a patient of whom no film was fitted."""
+        nothing = np.zeros((len(population.mean),) * 2)
+        known = Told(nothing, nothing[0]).known(population)
+        return self._personal(Known(self._beyond_films(known.mean), known.covariance), 0.0)
+
+    def _personal(self, known: Known, decided: float) -> Personal:
+        s = self.segments
+        centred = np.eye(s) - 1.0 / s
+        ratio, spread = centred @ known.mean[:s], centred @ known.covariance[:s, :s] @ centred
+        reach = float(norm.ppf(0.5 + 0.5 * LEVEL)) * np.sqrt(np.diag(spread))
+        return Personal(
+            self._model(known.mean),
+            self.size * np.exp(known.mean[:s]),
+            Ends(*ends_of(known.mean)),
+            np.zeros(s, dtype=bool),
+            len(known.mean) - 1,  # their common size is no part of the films' answer
+            decided,
+            np.exp(np.stack([ratio - reach, ratio + reach])),
+        )
+
+    def missed(self, numbers: Array) -> tuple[Array, Array] | None:
+        """Errors of the tilts between the ends, both films, over their SD; and by each number.
+
+        Returns
+        -------
+        (2 (S - 1),) and (2 (S - 1), 3 S), or None where a film has no pose.
+        """
+        laws = laws_of(numbers, self.size)
+        spine = self.spine.with_model(self._model(numbers))
+        errors, slopes = [], []
+        for position in (RIGHT, LEFT):
+            film = self.patient.read.films[position]
+            posed = spine.at(film.top, self.near.get(position))
+            if posed.held.status is not Ended.CONVERGED:
+                return None
+            self.near[position] = posed.held
+            assert posed.held.answers is not None  # a pose that converged has them
+            change, _ = posed.held.answers.to(self._held_by(posed.held.q, laws, numbers))
+            errors.append((posed.film.tilt - film.tilt)[1:-1])
+            slopes.append(spine.tilts_by(posed.held.q)[:-1] @ change)
+        return np.concatenate(errors) / self.tilt_sd, np.vstack(slopes) / self.tilt_sd
+
+    def _model(self, numbers: Array) -> SpineModel:
+        laws = laws_of(numbers, self.size)
+        return with_laws(self.patient.chain, self.patient.springs, laws)
+
+    def _held_by(self, q: Array, laws: Array, numbers: Array) -> Array:
+        """(6 S, 3 S) change of what the joints hold with each number."""
+        by_law = BoundedTangent().by_parameter(q.reshape(-1, 6), laws, np.empty(0))[:, BENDING]
+        each = np.einsum("sp,spn->sn", by_law, by_numbers(numbers, self.size))
+        s = self.segments
+        found = np.zeros((s, 6, 3, s))
+        rows = np.arange(s)
+        found[rows, BENDING, :, rows] = each
+        return found.reshape(6 * s, 3 * s)
+
+    def _beyond_films(self, numbers: Array) -> Array:
+        """The numbers (3 S,), with ends beyond the rotations of both films."""
+        pairs, s = self.patient.pairs, self.segments
+        least = -np.minimum(pairs.right, pairs.left)
+        most = np.maximum(pairs.right, pairs.left)
+        reached = BEYOND_THE_FILM * np.maximum(np.concatenate([least, most]), SMALLEST_END)
+        return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
+
+
+def tilt_sd(reading_deg: float, model_deg: float) -> float:
+    """SD of a vertebra's tilt on a film less the model's, rad, which takes the erect film's."""
+    return float(np.deg2rad(np.hypot(np.sqrt(READINGS_OF_A_CHANGE) * reading_deg, model_deg)))

@@ -1,0 +1,99 @@
+"""Job: the population of a cohort, learned from the films of all its patients.
+
+Patients are fitted one by one; what the films of each say near its fit is a parabola, on which
+means and spreads of the population are learned until they stand still. Then all are fitted anew
+under it, as the parabolas hold near the fits alone.
+"""
+
+import sys
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.progress import Progress
+from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, tilt_sd
+from spinepipe.studies.scoliosis.personal import Patient, patient_of
+from spinepipe.studies.scoliosis.population import Population, assumed, learned
+from spinepipe.studies.scoliosis.population_table import Learned, population_rows
+from spinepipe.studies.scoliosis.reading_noise import reading_noise
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import POPULATION
+from spinepipe.tables import from_rows, write
+
+MOST_ROUNDS = 5
+LAST_ROUND = 0.03
+"""Rounds end when no mean of a logarithm and no spread changes by more."""
+
+MOST_STEPS = 500
+LAST_STEP = 1e-4
+"""The same of the steps on parabolas."""
+
+
+def run(root: str, study: str, output: str) -> None:
+    """Write ``population.parquet``."""
+    settings, cohort = study_of_kind(Scoliosis, root, study)
+    progress = Progress(partial(_say, study))
+    sd = assumed_tilt_sd(settings, cohort)
+    found = learn(settings, cohort, sd, progress)
+    rows = population_rows(found, cohort.joint_names, sd)
+    write(from_rows(POPULATION, list(rows)), output, provenance("population", settings, cohort))
+
+
+def _say(study: str, line: str) -> None:
+    print(f"{study}: {line}", file=sys.stderr, flush=True)
+
+
+def assumed_tilt_sd(settings: Scoliosis, cohort: Cohort) -> float:
+    """Rad; films of which nothing tells how they were read count as read without error."""
+    return tilt_sd(float(np.nan_to_num(reading_noise(settings, cohort)[1])), settings.model_sd_deg)
+
+
+def learn(settings: Scoliosis, cohort: Cohort, sd: float, progress: Progress) -> Learned:
+    """Rounds of fits of all patients, until the population stands still."""
+    patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
+    population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, Fitted]()
+    for number in range(1, MOST_ROUNDS + 1):
+        names = progress.through(list(patients), f"population, round {number}: patients")
+        fits = dict(_fits(names, patients, sd, population, fits))
+        before, population = population, _settled(population, [one.told for one in fits.values()])
+        change = _change(before, population)
+        if change < LAST_ROUND or not fits:
+            break
+    unfitted = tuple(name for name in patients if name not in fits)
+    return Learned(population, number, change, len(fits), unfitted)
+
+
+def _fits(
+    names: Iterator[str],
+    patients: Mapping[str, Patient],
+    sd: float,
+    population: Population,
+    before: Mapping[str, Fitted],
+) -> Iterator[tuple[str, Fitted]]:
+    for name in names:
+        start = before[name].numbers if name in before else None
+        try:
+            yield name, FilmFit(patients[name], sd).fit(population, start)
+        except NoFit:
+            continue
+
+
+def _settled(population: Population, patients: list[Told]) -> Population:
+    """The population that is likeliest for what the films of all patients say."""
+    for _ in range(MOST_STEPS):
+        if not patients:
+            break
+        after = learned(population, [one.known(population) for one in patients])
+        change, population = _change(population, after), after
+        if change < LAST_STEP:
+            break
+    return population
+
+
+def _change(one: Population, other: Population) -> float:
+    spreads = np.log([other.ratio_sd / one.ratio_sd, other.end_sd / one.end_sd])
+    return float(max(np.abs(spreads).max(), np.abs(other.mean - one.mean).max()))
