@@ -255,6 +255,7 @@ SOLVING = {
         *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
     },
     "range_of_motion": {"simulate"},
+    "scoliosis": {"personalise"},
 }
 """Jobs that solve equilibria."""
 
