@@ -130,7 +130,9 @@ def opposite(study: Scoliosis, results: Results) -> Iterator[str]:
 
 def _joints(rows: pd.DataFrame) -> str:
     """Joints by how many patients they are of, most first."""
-    counts = rows["joint"].astype(str).value_counts().sort_values(ascending=False, kind="stable")
+    own = rows.assign(joint=rows["joint"].astype(str))
+    counts = own.groupby("joint", sort=False)["specimen"].nunique()
+    counts = counts.sort_values(ascending=False, kind="stable")
     words = [f"{joint} in {count(int(n), 'patient')}" for joint, n in counts.items()]
     return _some(words)
 
@@ -219,8 +221,8 @@ def parameters(study: Scoliosis, results: Results) -> Iterator[str]:
         of_which = f", of which the films decide {fixed(decided, 1)} on average" if few else ""
         told.append(f"{IN_WORDS[name]} {free}{of_which}")
     yield (
-        f"Parameters taken from each patient's two bending films: {'; '.join(told)}. More of them "
-        "fit these films better; only held-out films say whether they are worth it."
+        f"Parameters taken from each patient's two bending films: {'; '.join(told)}. Only "
+        "held-out films say whether they are worth it."
     )
 
 

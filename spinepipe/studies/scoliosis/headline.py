@@ -4,6 +4,7 @@ It hangs on rotations of segments, pooled over held-out films and patients; diff
 models are tested over patients (table ``statistics``).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -81,9 +82,17 @@ def headline(results: Results) -> Headline:
     if not held_out.models:
         fitted = Standing.of(accuracy, "fitted", DECIDING)
         return Headline(_without(positions), _of_fitted(fitted), doubts)
-    p = p_of(results.table("statistics"), "held_out", DECIDING, *held_out.models[:2])
-    sure = (_sure(held_out, p), above_noise(held_out))
-    return Headline(_answer(held_out, p), " ".join(part for part in sure if part), doubts)
+    best, *_ = held_out.models
+    tests = results.table("statistics")
+    ps = {name: p_of(tests, "held_out", DECIDING, best, name) for name in _compared(held_out)}
+    sure = (_sure(held_out, ps), above_noise(held_out))
+    return Headline(_answer(held_out, ps), " ".join(part for part in sure if part), doubts)
+
+
+def _compared(standing: Standing) -> list[str]:
+    """The models that the first one is held against: the next, and the paper's reference."""
+    others = standing.models[1:]
+    return [*others[:1], *(name for name in others[1:] if name == REFERENCE)]
 
 
 def _without(positions: pd.DataFrame) -> str:
@@ -108,17 +117,17 @@ def _of_fitted(fitted: Standing) -> str:
     )
 
 
-def _answer(held_out: Standing, p: float | None) -> str:
-    best, *others = held_out.models
+def _answer(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+    best, *_ = held_out.models
+    p = next(iter(ps.values()), None)
     told = f"{capital(TOLD[best])} has the least error on positions that it has not seen"
     if p is not None and p < SIGNIFICANT:
         told = f"{capital(TOLD[best])} reproduces positions that it has not seen best"
     told = f"{told}: rotations of segments are off by {held_out.sized(best)} (root mean square)"
-    if not others:
+    if not ps:
         return f"{told}. There is no other model to compare it with."
-    compared = [_beside(held_out, best, others[0], "the next, ")]
-    if REFERENCE in others[1:]:
-        compared.append(_beside(held_out, best, REFERENCE, ""))
+    which = ("the next, ", "")
+    compared = [_beside(held_out, best, *one) for one in zip(ps, which, strict=False)]
     answer = f"{told}, {' and '.join(compared)}."
     if p is not None and p >= SIGNIFICANT:
         answer += " From the next it cannot be told apart."
@@ -133,21 +142,28 @@ def _beside(standing: Standing, best: str, other: str, which: str) -> str:
     return f"{less} {which}{TOLD[other]} ({standing.sized(other)})"
 
 
-def _sure(held_out: Standing, p: float | None) -> str:
-    """Whether the first and the second model differ over patients."""
-    if len(held_out.models) < 2:
+def _sure(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+    """Whether the first model differs from those it is held against, over patients."""
+    if not ps:
         return ""
-    patients = count(int(held_out.rows["n_patients"].iloc[:2].min()), "patient")
-    if p is None:
+    patients = count(int(held_out.rows["n_patients"].min()), "patient")
+    if not any(p is not None for p in ps.values()):
         return (
-            f"Whether the difference from the next is more than chance over {patients} is not "
-            "known: there is no test of it."
+            f"Whether the difference is more than chance over {patients} is not known: there is no "
+            "test of it."
         )
-    what = "significant" if p < SIGNIFICANT else "not significant"
+    which = ("the next", *(TOLD[name] for name in list(ps)[1:]))
+    told = [f"from {name} it is {_verdict(p)}" for name, p in zip(which, ps.values(), strict=True)]
     return (
-        f"Over {patients} the difference from the next is {what} (paired Wilcoxon test, corrected "
-        f"by Holm's method: p {number(p, 2)})."
+        f"The difference over {patients}, by paired Wilcoxon tests corrected by Holm's method: "
+        f"{', '.join(told)}."
     )
+
+
+def _verdict(p: float | None) -> str:
+    if p is None:
+        return "not tested"
+    return f"{'significant' if p < SIGNIFICANT else 'not significant'} (p {number(p, 2)})"
 
 
 def above_noise(standing: Standing) -> str:

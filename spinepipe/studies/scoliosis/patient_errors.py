@@ -30,7 +30,7 @@ def square_errors(
 
 def of_whole_patients(squares: pd.DataFrame) -> pd.DataFrame:
     """The rows of one model and of the patients that have a pose on every film."""
-    whole = squares.groupby("specimen", sort=False)["square"].apply(lambda one: one.notna().all())
+    whole = squares["square"].notna().groupby(squares["specimen"], sort=False).all()
     return squares[squares["specimen"].isin(list(whole.index[whole]))]
 
 

@@ -13,7 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.report.panels import explain_marks
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
-from spinepipe.report.words import capital, number, plain, short
+from spinepipe.report.words import capital, fixed, number, plain, short
 from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import ERECT, Film, read_films
 from spinepipe.studies.scoliosis.patient_errors import held_out_error
@@ -26,12 +26,13 @@ RANKS = (0.0, 0.5, 1.0)
 """Patients that are shown, by the rank of their error from the smallest to the largest."""
 
 _ROW_MM, _ABOVE_MM, _KEY_MM = 62.0, 8.0, 16.0
-LEAST_MM = 0.1
+LEAST_MM = 1.0
 """What is off is drawn to this scale at least."""
 
 _SHARES = [1.6, 1.0]
 """Widths of a spine and of what is beside it."""
 
+_TICKS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 _OFF = ["off_right_mm", "off_up_mm"]
 
 
@@ -115,7 +116,8 @@ def _row(
 
 def _scales(axes: "np.ndarray[tuple[int, int], np.dtype[np.object_]]", rows: pd.DataFrame) -> None:
     """Sideways: one scale for the films of a patient, one for all that is off."""
-    largest = max(float(rows[_OFF[0]].abs().max()), LEAST_MM)
+    largest = float(np.nanmax([LEAST_MM, *rows[_OFF[0]].abs().to_numpy(float)]))
+    tick = max(value for value in _TICKS_MM if value <= largest)
     for line in axes:
         ends = [axis.dataLim.intervalx for axis in line[::2]]
         low, high = min(end[0] for end in ends), max(end[1] for end in ends)
@@ -123,7 +125,7 @@ def _scales(axes: "np.ndarray[tuple[int, int], np.dtype[np.object_]]", rows: pd.
             axis.set_xlim(low - 0.08 * (high - low), high + 0.08 * (high - low))
             axis.xaxis.set_major_locator(MaxNLocator(3))
             beside.set_xlim(-1.08 * largest, 1.08 * largest)
-            beside.xaxis.set_major_locator(MaxNLocator(3, symmetric=True))
+            beside.set_xticks([-tick, 0.0, tick], [fixed(-tick, 0), "0", fixed(tick, 0)])
     for axis, beside in zip(axes[-1, ::2], axes[-1, 1::2], strict=True):
         axis.set_xlabel("right (mm)")
         beside.set_xlabel("off (mm)")
