@@ -21,6 +21,9 @@ _LOOKS: Mapping[str, tuple[str, str, Dashes]] = {
     "fitted": (VERMILLION, "s", (0, (4, 2))),
     "held_out": (BLUE, "o", "-"),
 }
+LEAST_DEG = 1e-3
+"""Axes reach to this at least, where all is rounding."""
+
 _HEIGHT_MM, _KEY_MM = 62.0, 16.0
 
 
@@ -97,7 +100,7 @@ def _axes(axis: Axes, rows: pd.DataFrame, name: str, column: str, studied: float
         axis.set_xlabel("enlargement of the ends (%)")
         axis.set_xticks(sorted(rows["value"].unique()))
         axis.axvline(studied, color=GREY, lw=0.6, zorder=0)
-    axis.set_ylim(bottom=0.0)
+    axis.set_ylim(0.0, 1.1 * max(float(rows[column].max()), LEAST_DEG))
     axis.set_ylabel(
         "rotation, root mean square error (°)" if column == ROTATION else "rotation moves by (°)"
     )
