@@ -20,3 +20,12 @@ class Status(StrEnum):
 
 USABLE = tuple(status.value for status in Status if status.usable)
 """Status of rows whose numbers are a solution, as tables have it."""
+
+
+class Ended(StrEnum):
+    """Outcome of holding a spine in a place (`spinepipe.statics.prescribed`)."""
+
+    CONVERGED = "converged"
+    UNSTABLE = "unstable"
+    UNREACHABLE = "unreachable"
+    NOT_CONVERGED = "not_converged"

@@ -10,6 +10,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
+from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS
 
 
@@ -69,7 +70,7 @@ def _study_task(root: Path, name: str) -> Task:
 
 
 def _cohort_task(root: Path, name: str) -> Task:
-    return f"cohort {name}", lambda: _described(cohorts.read(root / COHORTS / name))
+    return f"cohort {name}", lambda: _described(cohorts.read(root / COHORTS / name, every_form()))
 
 
 def _selection(root: Path) -> str:
@@ -85,7 +86,11 @@ def _described(cohort: Cohort) -> str:
         count(len(cohort.tests), "test"),
         count(readings, "row of motion", "rows of motion"),
     )
-    return ", ".join(parts)
+    further = (
+        count(len(rows), f"row of {name}", f"rows of {name}")
+        for name, rows in cohort.further.items()
+    )
+    return ", ".join((*parts, *further))
 
 
 def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:

@@ -7,6 +7,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies import read as studies
+from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, Study
 
 STUDIES = Path("config") / "studies"
@@ -33,9 +34,9 @@ def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
     if name in study_names(root):
         return studies.check(root, name)
     if name in cohort_names(root):
-        return None, cohorts.read(root / COHORTS / name)
+        return None, cohorts.read(root / COHORTS / name, every_form())
     if (root / name).is_dir() and "/" in name:
-        return None, cohorts.read(root / name)
+        return None, cohorts.read(root / name, every_form())
     raise InputError([unknown("name", name, [*study_names(root), *cohort_names(root)])])
 
 

@@ -40,6 +40,9 @@ def run(options: argparse.Namespace) -> int:
     specimen = specimen_of(cohort, options.specimen)
     view = view_of(cohort, specimen, *_loading(study))
     print(describe(cohort, view))
+    if not cohort.has_frames:
+        print(f"\nno picture: {cohort.name} has neither landmarks.csv nor joints.csv to draw")
+        return 0
     with style():
         save(draw_specimen(cohort, view), output)
     print(f"\npicture: {output}")

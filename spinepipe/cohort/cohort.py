@@ -110,6 +110,11 @@ class Cohort:
         """Tests in the order in which ``loads.csv`` first names them."""
         return () if self.loads is None else tuple(self.loads["test"].unique())
 
+    @property
+    def has_frames(self) -> bool:
+        """Whether it tells where joints are in space: by themselves, or by landmarks."""
+        return self.landmarks is not None or self.joints is not None
+
     def digest_of(self, specimens: Sequence[str]) -> str:
         """sha256 over what a job reads that looks at these specimens alone.
 

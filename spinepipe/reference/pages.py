@@ -27,7 +27,7 @@ from spinepipe.effects import Effect, Parameter, Trial, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.read import Selection
-from spinepipe.studies.registry import every_kind
+from spinepipe.studies.registry import every_form, every_kind
 from spinepipe.tables.schema import Column, Table
 
 _HEAD = ("parameter", "unit", "bounds", "off", "default", "prior SD", "meaning")
@@ -105,7 +105,9 @@ def generators() -> dict[str, Callable[[], str]]:
     }
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
-        for name, form in cohort_columns.TABLES.items()
+        for name, form in (
+            cohort_columns.TABLES | {form.stem: form for form in every_form()}
+        ).items()
     }
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)

@@ -46,7 +46,8 @@ class SpecimenView:
 
     Attributes
     ----------
-    frames : of the joints, caudal to cranial. points : landmarks, empty where there are none.
+    frames : of the joints, caudal to cranial; none where the cohort does not tell them.
+    points : landmarks, empty where there are none.
     bodies : the moving vertebrae that have a mass. tested : one per test and cycle.
     """
 
@@ -82,7 +83,7 @@ def view_of(
     )
     return SpecimenView(
         specimen=specimen,
-        frames=joint_frames(cohort, specimen),
+        frames=joint_frames(cohort, specimen) if cohort.has_frames else (),
         points={} if cohort.landmarks is None else landmarks(cohort, specimen),
         bodies=tuple(body for body in bodies(cohort, specimen) if body.mass > 0.0),
         tested=tested,

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import zxy_angles
@@ -20,6 +21,7 @@ def describe(cohort: Cohort, view: SpecimenView) -> str:
         _section("bodies", _bodies(view)),
         _section("loads in ground axes, point at the neutral pose", _loads(cohort, view)),
         _section("measured motion", _motion(cohort, view)),
+        *(_section(name, _further(rows, view)) for name, rows in cohort.further.items()),
     ]
     return "\n\n".join(parts)
 
@@ -47,7 +49,8 @@ def _section(title: str, rows: Iterator[Cells]) -> str:
 
 def _frames(cohort: Cohort, view: SpecimenView) -> Iterator[Cells]:
     yield ("joint", "x_mm", "y_mm", "z_mm", *(f"{name}_deg" for name in ROTATIONS))
-    for joint, frame in zip(cohort.joint_names, view.frames, strict=True):
+    joints = cohort.joint_names if view.frames else ()
+    for joint, frame in zip(joints, view.frames, strict=True):
         angles = np.rad2deg(zxy_angles(frame.rotation))
         yield (joint, *(frame.origin * MM_PER_M), *angles)
 
@@ -80,6 +83,13 @@ def _motion(cohort: Cohort, view: SpecimenView) -> Iterator[Cells]:
             for joint, row in zip(cohort.joint_names, measured, strict=True):
                 if np.isfinite(row).any():
                     yield (case.test, case.cycle, step.step, joint, *row)
+
+
+def _further(rows: pd.DataFrame, view: SpecimenView) -> Iterator[Cells]:
+    """A file of a kind of its own, without its empty columns."""
+    own = rows[rows["specimen"] == view.specimen].drop(columns="specimen").dropna(axis=1, how="all")
+    yield tuple(own.columns)
+    yield from own.itertuples(index=False, name=None)
 
 
 def _table(rows: Sequence[Cells]) -> str:

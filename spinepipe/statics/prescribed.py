@@ -15,7 +15,6 @@ compliance, W^2 e, which is let go to nothing (W: 1 mm, 1 deg).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +30,7 @@ from spinepipe.statics.equilibrium import (
 )
 from spinepipe.statics.motion import ChainMotion
 from spinepipe.statics.system import System
+from spinepipe.status import Ended
 
 Flags = NDArray[np.bool_]
 
@@ -53,15 +53,6 @@ REACHED = 0.1
 
 UNREACHABLE = "no pose has all that is prescribed"
 UNSTABLE = "the spine buckles out of what is prescribed"
-
-
-class Ended(StrEnum):
-    """How a solve ended."""
-
-    CONVERGED = "converged"
-    UNSTABLE = "unstable"
-    UNREACHABLE = "unreachable"
-    NOT_CONVERGED = "not_converged"
 
 
 class Prescription(Protocol):

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import TableForm
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles
@@ -34,6 +35,12 @@ def kind_of(name: str) -> Kind:
 def every_kind() -> dict[str, Kind]:
     """All kinds by name."""
     return {name: kind_of(name) for name in kind_names()}
+
+
+def every_form() -> tuple[TableForm, ...]:
+    """Files that some kind reads besides those of every cohort, each once."""
+    forms = (form for kind in every_kind().values() for form in kind.forms)
+    return tuple({form.stem: form for form in forms}.values())
 
 
 def files_of(study: Study, cohort: Cohort) -> StudyFiles:

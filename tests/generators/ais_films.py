@@ -78,7 +78,7 @@ POSITIONS = ("erect", "right_bending", "left_bending", "neutral", "traction")
 
 @dataclass(frozen=True)
 class Patient:
-    """A chain of 15 vertebrae, erect, and what its segments resist with; to the front, right and up.
+    """A chain of 15 vertebrae, erect; the axes are front, right and up.
 
     Attributes
     ----------

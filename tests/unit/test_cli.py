@@ -11,6 +11,7 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
 from spinepipe.cli.engine import relative_error
+from tests.generators import ais_films
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -276,3 +277,20 @@ def test_as_a_program() -> None:
     command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
+def test_a_cohort_of_films_is_sound_and_shown_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "config" / "cohorts" / "ais"
+    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=2)
+    code, out, _ = run(capsys, "--root", tmp_path, "check", "ais")
+    assert code == 0
+    assert "2 specimens, 14 joints, 0 tests, 0 rows of motion, 150 rows of films" in out
+    picture = tmp_path / "a.png"
+    code, out, _ = run(capsys, "--root", tmp_path, "show", "ais", "p02", "-o", picture)
+    assert code == 0
+    assert "joint frames in ground, neutral pose: none" in out
+    assert "  traction" in out
+    assert out.endswith("no picture: ais has neither landmarks.csv nor joints.csv to draw\n")
+    assert not picture.exists()

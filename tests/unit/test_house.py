@@ -16,7 +16,17 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *("status", "units", "problems", "files", "progress", "frames", "decomposition", "marks", "anatomy"),
+    *(
+        "status",
+        "units",
+        "problems",
+        "files",
+        "progress",
+        "frames",
+        "decomposition",
+        "marks",
+        "anatomy",
+    ),
     *("effects", "model", "world", "statics", "calibrate"),
     *("designs", "statistics", "sensitivity", "cohort", "tables", "comparison"),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),
@@ -255,6 +265,7 @@ SOLVING = {
         *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
     },
     "range_of_motion": {"simulate"},
+    "scoliosis": {"personalise"},
 }
 """Jobs that solve equilibria."""
 

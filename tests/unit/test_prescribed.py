@@ -14,7 +14,8 @@ from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System
 from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import Ended, Held, Place, Prescription, Tilt, hold_at
+from spinepipe.statics.prescribed import Held, Place, Prescription, Tilt, hold_at
+from spinepipe.status import Ended
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 

@@ -129,7 +129,8 @@ class Document:
     Attributes
     ----------
     findings : sentences, the most urgent first. left_out : parts that the settings leave out.
-    poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled.
+    poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled. A cohort
+        that does not tell where joints are has no 3-D view.
     metadata : what each table's file says of where it comes from.
     with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
     tests, load_shift_mm : what the view shows of a study that chooses tests or moves their loads.
@@ -154,7 +155,7 @@ class Document:
             autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
         template = environment.from_string(_part("page.html"))
-        views = self._views(cohort)
+        views = self._views(cohort) if cohort.has_frames else []
         drawn = scenes(views, cohort, self.poses)
         return template.render(
             study=study,
@@ -168,13 +169,13 @@ class Document:
             origin=origin(study, self.metadata),
             left_out=self.left_out,
             drawn=list(drawn),
-            still=_address(_still(views[0], cohort)),
+            still=_address(_still(views[0], cohort)) if views else "",
             groups=groups_of(drawn),
             most_poses=MOST_POSES,
             scenes=Markup(as_script(drawn)),  # as_script leaves nothing that could end the element
             style=Markup(_part("page.css")),
             script=Markup(_part("page.js.html")),
-            plotly=Markup(get_plotlyjs()),
+            plotly=Markup(get_plotlyjs()) if views else "",
         )
 
     def _views(self, cohort: Cohort) -> list[SpecimenView]:

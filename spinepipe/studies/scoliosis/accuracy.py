@@ -14,6 +14,11 @@ import pandas as pd
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.studies.scoliosis.patient_errors import (
+    of_whole_patients,
+    rmse_of_patients,
+    square_errors,
+)
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import ACCURACY, GROUPS, MEASURES
@@ -58,7 +63,7 @@ def accuracy_rows(
             one[one["fitted"] == (group == "fitted")] for one in (positions, displacements, curves)
         ]
         for measure, (unit, _) in MEASURES.items():
-            errors = _errors(measure, *chosen)
+            errors = square_errors(measure, *chosen)
             rows = [
                 {
                     "films": group,
@@ -74,29 +79,12 @@ def accuracy_rows(
             yield from _with_reduction(rows)
 
 
-def _errors(
-    measure: str, positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
-) -> pd.DataFrame:
-    """Errors of one measure by patient and model; those of a pose that is not there are NaN."""
-    if measure == "rotation":
-        error, rows = displacements["simulated_deg"] - displacements["measured_deg"], displacements
-    elif measure in ("ferguson", "cobb"):
-        error = curves[f"{measure}_simulated_deg"] - curves[f"{measure}_measured_deg"]
-        rows = curves
-    else:
-        name = {"place": "place_rmse_mm", "tilt": "tilt_rmse_deg"}[measure]
-        error, rows = positions[name], positions
-    return rows[["specimen", "model"]].assign(square=error.astype(float) ** 2)
-
-
 def _pooled(errors: pd.DataFrame) -> dict[str, Any]:
     """Over the patients that have a pose on every film of the group."""
-    whole = errors.groupby("specimen", sort=False)["square"].apply(lambda one: one.notna().all())
-    names = list(whole.index[whole])
-    kept = errors[errors["specimen"].isin(names)]
-    own = np.sqrt(kept.groupby("specimen", sort=False)["square"].mean().to_numpy(float))
+    kept = of_whole_patients(errors)
+    own = rmse_of_patients(errors).to_numpy(float)
     return {
-        "n_patients": len(names),
+        "n_patients": len(own),
         "n": len(kept),
         "rmse": float(np.sqrt(kept["square"].mean())) if len(kept) else None,
         "mean_of_patients": float(own.mean()) if len(own) else None,

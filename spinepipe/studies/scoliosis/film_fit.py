@@ -15,7 +15,8 @@ from spinepipe.calibrate.descent import Settled, descend
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Ended, Held
+from spinepipe.statics.prescribed import Held
+from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import BENDING, HeldSpine, with_laws
 from spinepipe.studies.scoliosis.personal import Patient, Personal

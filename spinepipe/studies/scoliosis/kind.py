@@ -11,6 +11,7 @@ from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
+    BY_RANGE,
     CURVES,
     DISPLACEMENTS,
     LAWS,
@@ -19,7 +20,8 @@ from spinepipe.studies.scoliosis.tables import (
     VARIANTS,
     VARIATION,
 )
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.tables.shared import STATISTICS
 
 OF_JOBS = ("laws", "positions", "displacements", "curves")
 """Tables joined from job files, one for each patient and model."""
@@ -38,6 +40,38 @@ class ScoliosisFiles(StudyFiles):
     """The result files of one study of scoliotic spines."""
 
     joined = (*OF_JOBS, "variants")
+    drawings = (
+        Figure(
+            "fitted_and_held_out",
+            "Errors of fitted and of held-out films",
+            "figures.fitted_and_held_out:fitted_and_held_out_figure",
+            ("accuracy", "positions", "displacements", "curves"),
+        ),
+        Figure(
+            "film_overlay",
+            "Films, and the models held in them",
+            "figures.film_overlay:film_overlay_figure",
+            ("positions", "displacements"),
+        ),
+        Figure(
+            "errors_by_range",
+            "Errors by size of the rotation",
+            "figures.errors_by_range:errors_by_range_figure",
+            ("displacements", "accuracy"),
+        ),
+        Figure(
+            "load_displacement",
+            "Laws of the segments of one patient",
+            "figures.load_displacement:load_displacement_figure",
+            ("laws", "displacements", "positions"),
+        ),
+        Figure(
+            "enlargement",
+            "Enlargement of the ends, and the scale that films do not tell",
+            "figures.enlargement:enlargement_figure",
+            ("variation",),
+        ),
+    )
 
     study: Scoliosis
 
@@ -90,7 +124,10 @@ KIND = Kind(
     settings=Scoliosis,
     files=ScoliosisFiles,
     checks=(check_scoliosis,),
-    tables=(LAWS, POPULATION, POSITIONS, DISPLACEMENTS, CURVES, ACCURACY, VARIANTS, VARIATION),
+    tables=(
+        *(LAWS, POPULATION, POSITIONS, DISPLACEMENTS, CURVES),
+        *(ACCURACY, BY_RANGE, STATISTICS, VARIANTS, VARIATION),
+    ),
     jobs=(
         Job("personalise", many=True, ignores=ignoring("models"), also=_population),
         Job("population", "learn", ignores=ignoring("models")),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from spinepipe.statics.prescribed import Ended
+from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.held_spine import Posed
 from spinepipe.studies.scoliosis.personal import Patient
 from spinepipe.units import DEG_PER_RAD, MM_PER_M

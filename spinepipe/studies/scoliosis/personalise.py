@@ -147,7 +147,8 @@ def _position(patient: Patient, position: str, posed: Posed) -> Row:
 def _displacements(
     settings: Scoliosis, patient: Patient, position: str, posed: Posed
 ) -> Iterator[Row]:
-    ends = ends_of(patient.pairs, settings.enlargement)
+    ends, film = ends_of(patient.pairs, settings.enlargement), patient.read.films[position]
+    off = MM_PER_M * np.stack([posed.film.right - film.right, posed.film.up - film.up], axis=1)[1:]
     measured, there = patient.read.turned(position), posed.held.status in POSED
     sides = np.where(measured > 0.0, ends.upper, -ends.lower)
     for number, joint in enumerate(patient.chain.joints):
@@ -155,6 +156,8 @@ def _displacements(
             "joint": joint,
             "measured_deg": DEG_PER_RAD * float(measured[number]),
             "simulated_deg": DEG_PER_RAD * float(posed.r[number]) if there else None,
+            "off_right_mm": float(off[number, 0]) if there else None,
+            "off_up_mm": float(off[number, 1]) if there else None,
             "share_of_range": abs(float(measured[number])) / float(sides[number]),
             "opposite": bool(patient.pairs.opposite[number]),
         }

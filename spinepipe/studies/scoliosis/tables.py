@@ -1,6 +1,6 @@
 """Tables of studies of kind scoliosis."""
 
-from spinepipe.statics.prescribed import Ended
+from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.population import PER_SEGMENT
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table
@@ -99,8 +99,8 @@ POPULATION = Table(
 
 DISPLACEMENTS = Table(
     "displacements",
-    "Lateral rotation of every segment since the erect film, right positive: one row per patient, "
-    "model, position and joint.",
+    "Lateral rotation of every segment since the erect film, right positive, and where its upper "
+    "vertebra is: one row per patient, model, position and joint.",
     ("specimen", "model", "position", "joint"),
     (
         SPECIMEN,
@@ -110,6 +110,17 @@ DISPLACEMENTS = Table(
         JOINT,
         _angle("measured_deg", "rotation on the film"),
         _angle("simulated_deg", "rotation of the model", _NO_POSE),
+        *(
+            Column(
+                f"off_{way}_mm",
+                "number",
+                "place of the segment's upper vertebra in the model less that on the film, "
+                f"{where}",
+                "mm",
+                null=_NO_POSE,
+            )
+            for way, where in (("right", "to the right"), ("up", "up"))
+        ),
         Column(
             "share_of_range",
             "number",

@@ -1,0 +1,150 @@
+"""Figure: errors of films that models were fitted to and of films that they have not seen."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.report.marks import spread_out
+from spinepipe.report.panels import explain_marks, head, side_by_side
+from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
+from spinepipe.report.words import count
+from spinepipe.statistics import mean_of
+from spinepipe.studies.scoliosis.figures.looks import LOOKS
+from spinepipe.studies.scoliosis.patient_errors import rmse_of_patients, square_errors
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import GROUPS
+from spinepipe.studies.scoliosis.words import IN_WORDS, in_order
+
+PANELS = {
+    "rotation": ("Rotation of segments", "°"),
+    "place": ("Place of vertebrae", "mm"),
+    "tilt": ("Tilt of vertebrae", "°"),
+    "ferguson": ("Ferguson angles of curves", "°"),
+}
+
+NOTHING_HELD_OUT = "Nothing is held out: no patient has a film besides erect and bending."
+
+LEAST = 1e-3
+"""Axes reach to this at least, where all errors are rounding."""
+
+_TABLES = ("positions", "displacements", "curves")
+_HEIGHT = {"held_out": 0.2, "fitted": -0.2}
+"""Where each group of films stands in the row of a model."""
+
+_STRIP, _ROW_MM, _AROUND_MM, _KEY_MM = 0.14, 9.0, 15.0, 16.0
+_DASHES = (0, (4, 2))
+
+
+def fitted_and_held_out_figure(
+    study: Scoliosis, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """A panel for each measure, a row for each model, fitted films below held-out ones."""
+    found = errors_of_patients(*(tables[name] for name in _TABLES))
+    if found.empty:
+        return saying("No error can be shown: no model has a pose on any film.")
+    models = in_order(found["model"])[::-1]
+    fitted = tables["positions"]["fitted"]
+    groups = [name for name in GROUPS if (fitted == (name == "fitted")).any()]
+    down = -(-len(PANELS) // 2)
+    figure = blank(down * (_ROW_MM * len(models) + _AROUND_MM) + _KEY_MM)
+    axes = side_by_side(figure, len(PANELS), 2, sharey=True)
+    for index, (axis, (measure, (title, unit))) in enumerate(
+        zip(axes, PANELS.items(), strict=True)
+    ):
+        head(axis, index, title)
+        axis.set_xlabel(f"root mean square error ({unit})")
+        _rows(axis, models)
+        rows = found[found["measure"] == measure]
+        for name in models:
+            _strips(axis, models.index(name), rows[rows["model"] == name], groups)
+        floor = _floor(tables["accuracy"], measure)
+        axis.axvline(floor, color=GREY, ls=_DASHES, lw=0.9, zorder=1)
+        largest = np.nanmax([*rows["error"].to_numpy(float), floor, LEAST])
+        axis.set_xlim(0.0, 1.05 * float(largest))
+    _explain(figure, groups, tables["accuracy"])
+    return figure
+
+
+def errors_of_patients(
+    positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
+) -> pd.DataFrame:
+    """Columns films, measure, model, specimen, error: of patients with a pose on every film."""
+    parts = []
+    for group in GROUPS:
+        chosen = [
+            one[one["fitted"].astype(bool) == (group == "fitted")]
+            for one in (positions, displacements, curves)
+        ]
+        for measure in PANELS:
+            squares = square_errors(measure, *chosen)
+            for model, rows in squares.groupby("model", sort=False):
+                own = rmse_of_patients(rows).rename("error").reset_index()
+                parts.append(own.assign(films=group, measure=measure, model=model))
+    columns = ["films", "measure", "model", "specimen", "error"]
+    return pd.concat(parts)[columns] if parts else pd.DataFrame(columns=columns)
+
+
+def _rows(axis: Axes, models: Sequence[str]) -> None:
+    axis.set_yticks(range(len(models)), [IN_WORDS[name] for name in models])
+    axis.set_ylim(-0.55, len(models) - 0.45)
+    axis.spines["left"].set_visible(False)
+    for y in range(len(models)):
+        axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=0)
+
+
+def _strips(axis: Axes, y: int, rows: pd.DataFrame, groups: Sequence[str]) -> None:
+    """Patients of one model as dots, their mean and its interval."""
+    for group in groups:
+        values = rows.loc[rows["films"] == group, "error"].to_numpy(float)
+        middle = y + (_HEIGHT[group] if len(groups) > 1 else 0.0)
+        if not len(values):
+            note(axis, 0.02, middle, "no patient has all poses", GREY)
+            continue
+        color = LOOKS[str(rows["model"].iloc[0])].color
+        filled = group == "held_out"
+        _dots(axis, values, middle, color if filled else WHITE, color)
+        _mean(axis, values, middle)
+
+
+def _dots(axis: Axes, values: Array, y: float, face: str, edge: str) -> None:
+    heights = y + _STRIP * spread_out(len(values))
+    axis.plot(values, heights, "o", ms=3.0, mfc=face, mec=edge, mew=0.6, alpha=0.7, zorder=3)
+
+
+def _mean(axis: Axes, values: Array, y: float) -> None:
+    found = mean_of(values)
+    if found.interval is not None:
+        ends = max(0.0, found.interval[0]), found.interval[1]
+        axis.plot(ends, [y, y], color=BLACK, lw=1.1, solid_capstyle="butt", zorder=4)
+    axis.plot([values.mean()], [y], "D", color=BLACK, ms=3.2, mec=WHITE, mew=0.4, zorder=5)
+
+
+def _floor(accuracy: pd.DataFrame, measure: str) -> float:
+    """What reading films alone makes; NaN where nobody knows."""
+    known = accuracy.loc[accuracy["measure"] == measure, "reading_noise"].dropna()
+    return float(known.iloc[0]) if len(known) else np.nan
+
+
+def _explain(figure: Figure, groups: Sequence[str], accuracy: pd.DataFrame) -> None:
+    dot = {"color": GREY, "marker": "o", "ms": 3.0, "ls": "", "mew": 0.6}
+    handles = [Line2D([], [], **dot, mfc=WHITE, label="a patient, fitted films")]  # type: ignore[arg-type]
+    if "held_out" in groups:
+        handles.append(Line2D([], [], **dot, mfc=GREY, label="a patient, held-out films"))  # type: ignore[arg-type]
+    mean = "mean of patients with 95 % interval"
+    handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
+    words = ["" if "held_out" in groups else NOTHING_HELD_OUT]
+    if accuracy["reading_noise"].notna().any():
+        handles.append(
+            Line2D([], [], color=GREY, ls=_DASHES, lw=0.9, label="what reading films alone makes")
+        )
+    else:
+        words.append("How exactly the films are read is not known.")
+    most = int(accuracy["n_patients"].max()) if len(accuracy) else 0
+    words.append(f"{count(most, 'patient')}.")
+    explain_marks(figure, handles, " ".join(word for word in words if word), len(handles))

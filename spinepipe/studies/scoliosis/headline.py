@@ -1,0 +1,225 @@
+"""The answer for a surgeon: which model reproduces films it has not seen, and how sure that is.
+
+It hangs on rotations of segments, pooled over held-out films and patients; differences between
+models are tested over patients (table ``statistics``).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.words import capital, count, number
+from spinepipe.status import Ended
+from spinepipe.studies.scoliosis.accuracy import REFERENCE
+from spinepipe.studies.scoliosis.settings import MODELS
+from spinepipe.studies.scoliosis.words import TOLD
+
+DECIDING = "rotation"
+"""The measure that the answer hangs on."""
+
+SIGNIFICANT = 0.05
+"""p-values below this, corrected by Holm's method, are called significant."""
+
+NOT_PERSONAL = "uniform"
+"""The model that takes nothing from a patient's films but their shape."""
+
+NO_POSE = (Ended.UNSTABLE, Ended.NOT_CONVERGED)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Models by their error in a measure on a group of films, the least first.
+
+    Attributes
+    ----------
+    rows : of the table accuracy, those that have an error.
+    """
+
+    rows: pd.DataFrame
+
+    @classmethod
+    def of(cls, accuracy: pd.DataFrame, films: str, measure: str) -> "Standing":
+        """From the table ``accuracy``, which may have no rows."""
+        if accuracy.empty:
+            return cls(accuracy)
+        own = accuracy[(accuracy["films"] == films) & (accuracy["measure"] == measure)]
+        return cls(own.dropna(subset=["rmse"]).sort_values("rmse", kind="stable"))
+
+    @property
+    def models(self) -> list[str]:
+        """Names, the least error first."""
+        return [] if self.rows.empty else list(self.rows["model"])
+
+    def error(self, model: str) -> float:
+        """Root mean square error of a model."""
+        return float(self.rows.loc[self.rows["model"] == model, "rmse"].iloc[0])
+
+    def sized(self, model: str) -> str:
+        """The same with its unit."""
+        unit = "°" if self.rows["unit"].iloc[0] == "deg" else " mm"
+        return f"{number(self.error(model))}{unit}"
+
+    def less(self, model: str, other: str) -> float:
+        """Share by which the error of a model is less than that of another."""
+        return 1.0 - self.error(model) / self.error(other)
+
+    @property
+    def noise(self) -> float | None:
+        """What reading films alone makes; None where nobody knows."""
+        if self.rows.empty:
+            return None
+        known = self.rows["reading_noise"].dropna()
+        return float(known.iloc[0]) if len(known) else None
+
+
+def headline(results: Results) -> Headline:
+    """The answer, how sure it is, and what casts doubt on it."""
+    accuracy, positions = results.table("accuracy"), results.table("positions")
+    held_out = Standing.of(accuracy, "held_out", DECIDING)
+    doubts = tuple(_doubts(positions, held_out))
+    if not held_out.models:
+        fitted = Standing.of(accuracy, "fitted", DECIDING)
+        return Headline(_without(positions), _of_fitted(fitted), doubts)
+    best, *_ = held_out.models
+    tests = results.table("statistics")
+    ps = {name: p_of(tests, "held_out", DECIDING, best, name) for name in _compared(held_out)}
+    sure = (_sure(held_out, ps), above_noise(held_out))
+    return Headline(_answer(held_out, ps), " ".join(part for part in sure if part), doubts)
+
+
+def _compared(standing: Standing) -> list[str]:
+    """The models that the first one is held against: the next, and the paper's reference."""
+    others = standing.models[1:]
+    return [*others[:1], *(name for name in others[1:] if name == REFERENCE)]
+
+
+def _without(positions: pd.DataFrame) -> str:
+    """Why nothing can be said of films that models have not seen."""
+    if positions.empty or positions["fitted"].all():
+        return (
+            "Nothing is held out: no patient has a film besides erect and bending, so nothing can "
+            "be said of positions that a model has not seen."
+        )
+    return "No model has a pose on all held-out films of any patient."
+
+
+def _of_fitted(fitted: Standing) -> str:
+    if not fitted.models:
+        return ""
+    best = fitted.models[0]
+    free = int(fitted.rows["free_parameters"].iloc[0])
+    return (
+        f"On the films that models were personalised on, {TOLD[best]} has the least error of "
+        f"rotations, {fitted.sized(best)}, with {count(free, 'parameter')} taken from these films; "
+        "that it would hold elsewhere does not follow."
+    )
+
+
+def _answer(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+    best, *_ = held_out.models
+    p = next(iter(ps.values()), None)
+    told = f"{capital(TOLD[best])} has the least error on positions that it has not seen"
+    if p is not None and p < SIGNIFICANT:
+        told = f"{capital(TOLD[best])} reproduces positions that it has not seen best"
+    told = f"{told}: rotations of segments are off by {held_out.sized(best)} (root mean square)"
+    if not ps:
+        return f"{told}. There is no other model to compare it with."
+    which = ("the next, ", "")
+    compared = [_beside(held_out, best, *one) for one in zip(ps, which, strict=False)]
+    answer = f"{told}, {' and '.join(compared)}."
+    if p is not None and p >= SIGNIFICANT:
+        answer += " From the next it cannot be told apart."
+    if best == NOT_PERSONAL:
+        answer += " Nothing that the others take from the bending films makes them better than it."
+    return answer
+
+
+def _beside(standing: Standing, best: str, other: str, which: str) -> str:
+    share = 100.0 * standing.less(best, other)
+    less = "as much as" if share <= 0.0 else f"{number(share, 2)} % less than"
+    return f"{less} {which}{TOLD[other]} ({standing.sized(other)})"
+
+
+def _sure(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+    """Whether the first model differs from those it is held against, over patients."""
+    if not ps:
+        return ""
+    patients = count(int(held_out.rows["n_patients"].min()), "patient")
+    if not any(p is not None for p in ps.values()):
+        return (
+            f"Whether the difference is more than chance over {patients} is not known: there is no "
+            "test of it."
+        )
+    which = ("the next", *(TOLD[name] for name in list(ps)[1:]))
+    told = [f"from {name} it is {_verdict(p)}" for name, p in zip(which, ps.values(), strict=True)]
+    return (
+        f"The difference over {patients}, by paired Wilcoxon tests corrected by Holm's method: "
+        f"{', '.join(told)}."
+    )
+
+
+def _verdict(p: float | None) -> str:
+    if p is None:
+        return "not tested"
+    return f"{'significant' if p < SIGNIFICANT else 'not significant'} (p {number(p, 2)})"
+
+
+def above_noise(standing: Standing) -> str:
+    """Whether the least error is more than what reading films makes."""
+    best = standing.models[0]
+    if standing.noise is None:
+        return (
+            "How exactly the films are read is not known, so no error can be held against what "
+            "reading alone makes."
+        )
+    alone = f"Reading the films alone makes {number(standing.noise, 2)}°"
+    if standing.error(best) > standing.noise:
+        return f"{alone}; the error is above that, so the model itself is off."
+    near = [name for name in standing.models if standing.error(name) <= standing.noise]
+    if len(near) == len(standing.models):
+        return f"{alone}; no model is above that, so these films hardly tell models apart."
+    return f"{alone}; {count(len(near), 'model is', 'models are')} not above that."
+
+
+def p_of(statistics: pd.DataFrame, films: str, measure: str, one: str, other: str) -> float | None:
+    """p of the paired test of two models over patients, corrected by Holm; None without a test."""
+    if statistics.empty:
+        return None
+    rows = statistics[statistics["family"] == f"{films}/{measure}"]
+    pair = rows[rows["factor"].map(lambda words: named(str(words)) == {one, other}).astype(bool)]
+    known = pair["p_holm"].dropna()
+    return float(known.iloc[0]) if len(known) else None
+
+
+def named(words: str) -> set[str]:
+    """Models that are named in some words."""
+    found: set[str] = set()
+    left = words
+    for name in sorted(MODELS, key=len, reverse=True):
+        if name in left:
+            found.add(name)
+            left = left.replace(name, "")
+    return found
+
+
+def _doubts(positions: pd.DataFrame, held_out: Standing) -> list[str]:
+    """What should be looked at before the answer is believed."""
+    if positions.empty:
+        return []
+    doubts = []
+    lost = positions[positions["status"].isin([status.value for status in NO_POSE])]
+    if len(lost):
+        patients = lost["specimen"].nunique()
+        doubts.append(
+            f"Look at this first: {len(lost)} of {count(len(positions), 'pose')} were not found, "
+            f"in {count(patients, 'patient')}; errors leave these patients out."
+        )
+    counts = [] if held_out.rows.empty else sorted(set(held_out.rows["n_patients"]))
+    if len(counts) > 1:
+        doubts.append(
+            f"Models are compared on unlike patients: some have all poses of {counts[0]}, others "
+            f"of {counts[-1]}."
+        )
+    return doubts
