@@ -3,6 +3,7 @@
 from spinepipe.statics.prescribed import Ended
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table
+from spinepipe.tables.shared import against_paper
 
 MODEL = Column("model", "text", "model of the spine", allowed=MODELS)
 POSITION = Column("position", "text", "position that the patient was filmed in")
@@ -312,3 +313,5 @@ VARIATION = Table(
         ),
     ),
 )
+
+AGAINST_JALALIAN_2017 = against_paper("against_jalalian_2017")
