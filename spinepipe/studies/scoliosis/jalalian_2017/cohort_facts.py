@@ -5,7 +5,6 @@ angle of each patient's main curve as it is on the erect film.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -257,5 +256,7 @@ def _rotations(tilts: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pearson(one: pd.DataFrame, other: pd.DataFrame) -> float:
-    values: Any = (one.to_numpy(float).ravel(), other.reindex(one.index).to_numpy(float).ravel())
-    return float(np.corrcoef(*values)[0, 1])
+    first, second = one.to_numpy(float).ravel(), other.reindex(one.index).to_numpy(float).ravel()
+    if not (np.ptp(first) > 0.0 and np.ptp(second) > 0.0):
+        raise NotComputed("readings that do not vary, or are missing, have no correlation")
+    return float(np.corrcoef(first, second)[0, 1])

@@ -15,6 +15,7 @@ from spinepipe.studies.scoliosis.jalalian_2017.paper import (
     BENDING,
     ERRORS,
     EXAMPLE,
+    EXAMPLE_SMALLER_PERCENT,
     FERGUSON,
     FILMS,
     GROUP,
@@ -170,6 +171,16 @@ def _example() -> Iterator[Claim]:
             _not_our_patient,
             "",
         )
+    yield Claim(
+        "errors.fig6_example.smaller_by",
+        "section 4, Fig 6",
+        "by how much place and tilt errors of the left spine are below those of the right one",
+        "%",
+        EXAMPLE_SMALLER_PERCENT,
+        exactly(EXAMPLE_SMALLER_PERCENT),
+        _not_our_patient,
+        "",
+    )
 
 
 def _not_our_patient(run: Run) -> Ours:

@@ -120,7 +120,7 @@ def _reductions() -> Iterator[Claim]:
         )
     fig6 = REDUCTION[FERGUSON, "fig6_example"]
     yield recomputed(
-        "ferguson_angle.fig6_example",
+        "improvement.ferguson_angle.fig6_example",
         "section 4, Fig 6",
         "reduction of the Ferguson error from the right to the left spine",
         "%",

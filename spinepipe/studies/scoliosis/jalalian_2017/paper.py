@@ -85,6 +85,8 @@ over everything, of places and tilts means over patients of such."""
 EXAMPLE = {"left": 1.5, "right": 4.0}
 """Ferguson errors of the two spines of Fig 6, deg."""
 
+EXAMPLE_SMALLER_PERCENT = 20.0
+
 REDUCTION = {
     (ROTATION, "four_positions"): 44.0,
     (ROTATION, BENDING): 44.0,
@@ -134,8 +136,8 @@ YES_NO = "1: yes, 0: no"
 
 PHANTOM = "phantom: says nothing of the patients"
 OTHER_TRUTH = (
-    "the phantom's segments obey another law (exponential and stop) of made-up size, bent by "
-    "made-up forces and read with made-up errors"
+    "the phantom's segments obey another law (exponential and stop) of made-up size, under "
+    "made-up forces"
 )
 
 
