@@ -15,14 +15,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, read_films
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import (
-    ACCURACY,
-    CURVES,
-    DISPLACEMENTS,
-    LAWS,
-    POSITIONS,
-    VARIATION,
-)
+from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
+from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, VARIATION
 from spinepipe.tables import from_rows
 from spinepipe.tables.schema import Table
 from tests.generators import ais_films
@@ -201,7 +195,8 @@ def paired_test(films: str, measure: str, pair: tuple[str, str], p: float | None
     """A row of the table statistics: a paired test of two models over patients."""
     return {
         "family": f"{films}/{measure}",
-        "factor": " against ".join(pair),
+        "response": pair[0],
+        "factor": pair[1],
         "p_holm": p,
         "status": "too_few" if p is None else "done",
     }

@@ -6,9 +6,9 @@ patients of Jalalian 2017 Table 1 by sex, age, Lenke class and Cobb angle, all e
 A patient is a chain in space that turns about points behind and between its vertebrae. To the side
 a segment resists by an exponential and a stop, other ones to the left and to the right, stiffer
 near the apex of a curve and on its hollow side; about its length and to the front by springs that
-stiffen. Erect it carries its weight and is at rest. It is bent by a sideways pull at the top and a righting effort
-of the head and shoulders, which turns the uppermost segments back. Its pose is where its energy is
-least, found by scipy. Nothing of spinepipe is used.
+stiffen. Erect it carries its weight and is at rest. It is bent by a sideways pull at the top and a
+righting effort of the head and shoulders, which turns the uppermost segments back. Its pose is
+where its energy is least, found by scipy. Nothing of spinepipe is used.
 """
 
 import csv

@@ -265,7 +265,7 @@ SOLVING = {
         *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
     },
     "range_of_motion": {"simulate"},
-    "scoliosis": {"personalise"},
+    "scoliosis": {"personalise", "population", "variants"},
 }
 """Jobs that solve equilibria."""
 

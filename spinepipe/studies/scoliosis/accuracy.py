@@ -14,18 +14,11 @@ import pandas as pd
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.scoliosis.patient_errors import (
-    of_whole_patients,
-    rmse_of_patients,
-    square_errors,
-)
+from spinepipe.studies.scoliosis.errors import REFERENCE, by_patient, of_group, squares, whole
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import ACCURACY, GROUPS, MEASURES
+from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, GROUPS, MEASURES
 from spinepipe.tables import from_rows, read_frames, write
-
-REFERENCE = "linear_regions"
-"""The model that Jalalian 2017 compares with."""
 
 READINGS_OF_A_ROTATION = 4
 READINGS_OF_A_TILT = 2
@@ -59,11 +52,9 @@ def accuracy_rows(
         "ferguson": np.nan,
     }
     for group in GROUPS:
-        chosen = [
-            one[one["fitted"] == (group == "fitted")] for one in (positions, displacements, curves)
-        ]
+        chosen = [of_group(one, group) for one in (positions, displacements, curves)]
         for measure, (unit, _) in MEASURES.items():
-            errors = square_errors(measure, *chosen)
+            errors = squares(measure, *chosen)
             rows = [
                 {
                     "films": group,
@@ -81,8 +72,8 @@ def accuracy_rows(
 
 def _pooled(errors: pd.DataFrame) -> dict[str, Any]:
     """Over the patients that have a pose on every film of the group."""
-    kept = of_whole_patients(errors)
-    own = rmse_of_patients(errors).to_numpy(float)
+    kept, own = whole(errors), by_patient(errors).to_numpy(float)
+    own = own[np.isfinite(own)]
     return {
         "n_patients": len(own),
         "n": len(kept),

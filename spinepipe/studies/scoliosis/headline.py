@@ -12,8 +12,7 @@ import pandas as pd
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.report.words import capital, count, number
 from spinepipe.status import Ended
-from spinepipe.studies.scoliosis.accuracy import REFERENCE
-from spinepipe.studies.scoliosis.settings import MODELS
+from spinepipe.studies.scoliosis.errors import REFERENCE
 from spinepipe.studies.scoliosis.words import TOLD
 
 DECIDING = "rotation"
@@ -188,20 +187,9 @@ def p_of(statistics: pd.DataFrame, films: str, measure: str, one: str, other: st
     if statistics.empty:
         return None
     rows = statistics[statistics["family"] == f"{films}/{measure}"]
-    pair = rows[rows["factor"].map(lambda words: named(str(words)) == {one, other}).astype(bool)]
-    known = pair["p_holm"].dropna()
+    pair = {one, other}
+    known = rows[rows["response"].isin(pair) & rows["factor"].isin(pair)]["p_holm"].dropna()
     return float(known.iloc[0]) if len(known) else None
-
-
-def named(words: str) -> set[str]:
-    """Models that are named in some words."""
-    found: set[str] = set()
-    left = words
-    for name in sorted(MODELS, key=len, reverse=True):
-        if name in left:
-            found.add(name)
-            left = left.replace(name, "")
-    return found
 
 
 def _doubts(positions: pd.DataFrame, held_out: Standing) -> list[str]:

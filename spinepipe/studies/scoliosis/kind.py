@@ -8,15 +8,13 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
+from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import (
+from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
+from spinepipe.studies.scoliosis.tables_of_errors import (
     ACCURACY,
+    AGAINST_JALALIAN_2017,
     BY_RANGE,
-    CURVES,
-    DISPLACEMENTS,
-    LAWS,
-    POPULATION,
-    POSITIONS,
     VARIANTS,
     VARIATION,
 )
@@ -25,6 +23,20 @@ from spinepipe.tables.shared import STATISTICS
 
 OF_JOBS = ("laws", "positions", "displacements", "curves")
 """Tables joined from job files, one for each patient and model."""
+
+_ANALYSES = (
+    Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
+    Job("variation", "", ("variants",), ("variation",)),
+    Job("by_range", "", ("displacements",), ("by_range",)),
+    Job("statistics", "significance", ("positions", "displacements", "curves"), ("statistics",)),
+    Job(
+        "against_jalalian_2017",
+        "jalalian_2017.against",
+        ("laws", "positions", "displacements", "accuracy", "by_range", "variants", "variation"),
+        ("against_jalalian_2017",),
+    ),
+)
+"""What is computed from tables."""
 
 _BLOCK = "000"
 
@@ -37,7 +49,12 @@ VARIED_MODEL = "tangent"
 
 @dataclass(frozen=True)
 class ScoliosisFiles(StudyFiles):
-    """The result files of one study of scoliotic spines."""
+    """The result files of one study of scoliotic spines.
+
+    Attributes
+    ----------
+    rebuilt : whether the cohort stands for that of a paper.
+    """
 
     joined = (*OF_JOBS, "variants")
     drawings = (
@@ -74,18 +91,25 @@ class ScoliosisFiles(StudyFiles):
     )
 
     study: Scoliosis
+    rebuilt: bool
 
     @classmethod
     def of(cls, study: Scoliosis, cohort: Cohort) -> "ScoliosisFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names)
+        return cls(study, cohort.specimen_names, stands_for(cohort.name))
 
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
         population = ("population",) if POOLED in self.study.models else ()
-        varied = ("variants", "variation") if VARIED_MODEL in self.study.models else ()
-        return (*OF_JOBS, *population, "accuracy", *varied)
+        varied = ("variants",) if VARIED_MODEL in self.study.models else ()
+        analysed = (
+            job.name
+            for job in _ANALYSES
+            if (self.rebuilt or not job.name.startswith("against"))
+            and (varied or job.name != "variation")
+        )
+        return (*OF_JOBS, *population, *varied, *analysed)
 
     def population_files(self, model: str) -> list[str]:
         """What a model reads of the population of all patients."""
@@ -126,14 +150,13 @@ KIND = Kind(
     checks=(check_scoliosis,),
     tables=(
         *(LAWS, POPULATION, POSITIONS, DISPLACEMENTS, CURVES),
-        *(ACCURACY, BY_RANGE, STATISTICS, VARIANTS, VARIATION),
+        *(ACCURACY, BY_RANGE, STATISTICS, VARIANTS, VARIATION, AGAINST_JALALIAN_2017),
     ),
     jobs=(
         Job("personalise", many=True, ignores=ignoring("models"), also=_population),
         Job("population", "learn", ignores=ignoring("models")),
         Job("variants", ignores=ignoring("models")),
-        Job("variation", "", ("variants",), ("variation",)),
-        Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
+        *_ANALYSES,
     ),
     forms=(FILMS, PATIENTS),
 )

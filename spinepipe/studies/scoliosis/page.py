@@ -6,16 +6,15 @@ from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import (
+from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
+from spinepipe.studies.scoliosis.tables_of_errors import (
     ACCURACY,
+    AGAINST_JALALIAN_2017,
     BY_RANGE,
-    CURVES,
-    DISPLACEMENTS,
-    LAWS,
-    POSITIONS,
     VARIATION,
 )
-from spinepipe.tables.shared import STATISTICS
+from spinepipe.tables.schema import Column, Table
+from spinepipe.tables.shared import STATISTICS, against_as_shown
 
 QUESTION = (
     "Which model of a scoliotic spine, personalised on two bending films, reproduces positions "
@@ -27,7 +26,9 @@ _TITLES = {
     STATISTICS: "Do models differ over patients?",
     BY_RANGE: "Errors by size of the rotation",
     VARIATION: "Enlargement and scale",
+    AGAINST_JALALIAN_2017: "Beside Jalalian et al. 2017",
     LAWS: "Stiffness of every segment",
+    POPULATION: "What patients have in common",
     POSITIONS: "Every patient on every film",
     CURVES: "Cobb and Ferguson angles",
 }
@@ -59,11 +60,16 @@ def _joined(words: str) -> str:
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
     found = [
-        sortable(shape.name, title, shape.about, results.table(shape.name), shape.columns)
+        sortable(shape.name, title, shape.about, results.table(shape.name), _columns(shape))
         for shape, title in _TITLES.items()
         if len(results.table(shape.name))
     ]
     return [table for table in found if table.rows]
+
+
+def _columns(shape: Table) -> tuple[Column, ...]:
+    """What a reader of the paper compares stands first."""
+    return against_as_shown(shape) if shape is AGAINST_JALALIAN_2017 else shape.columns
 
 
 def left_out(study: Scoliosis, cohort: Cohort) -> tuple[str, ...]:

@@ -24,9 +24,12 @@ Flags = NDArray[np.bool_]
 SMALLEST_END = float(np.deg2rad(0.1))
 """Step in which tilt was read on the films: a segment moves by no less."""
 
-LEAST_SHARE, MOST_SHARE = 0.1, 10.0
-"""Least and largest A, over the patient's median: films may ask for a negative one, or for one
-without limit where a segment stood still."""
+STANDS_STILL = 1e-9
+"""Rad: what a difference of equal tilts rounds to is less."""
+
+LEAST_SHARE, MOST_SHARE = 0.05, 20.0
+"""Least and largest A, over the patient's median. Films may ask for a negative one, or for one
+without limit where a segment stood still; arms of a force at the top differ some 20 times."""
 
 FARTHEST_RATIO = np.log(30.0)
 """The two forces differ by less than this factor."""
@@ -54,7 +57,7 @@ class Pairs:
     @cached_property
     def opposite(self) -> Flags:
         """(S,) segments that turn against a bend, or not at all."""
-        found: Flags = (self.right <= 0.0) | (self.left >= 0.0)
+        found: Flags = (self.right < STANDS_STILL) | (self.left > -STANDS_STILL)
         return found
 
 

@@ -10,16 +10,12 @@ from spinepipe import cohort as cohorts
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.personalise import rows_of
+from spinepipe.studies.scoliosis.population import assumed
+from spinepipe.studies.scoliosis.population_table import Learned, population_rows
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import (
-    ACCURACY,
-    CURVES,
-    DISPLACEMENTS,
-    LAWS,
-    MEASURES,
-    POSITIONS,
-)
+from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
+from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, MEASURES
 from spinepipe.tables import from_rows
 from tests.generators import ais_films
 
@@ -36,7 +32,14 @@ def cohort(tmp_path_factory: pytest.TempPathFactory) -> cohorts.Cohort:
 
 @pytest.fixture(scope="module")
 def tables(cohort: cohorts.Cohort) -> dict[str, pd.DataFrame]:
-    rows = [rows_of(STUDY, cohort, n, m) for n in cohort.specimen_names for m in MODELS]
+    usual = Learned(assumed(len(cohort.joint_names)), 1, 0.0, 0, ())
+    population = from_rows(POPULATION, list(population_rows(usual, cohort.joint_names, 0.01)))
+    read = {"tangent_fitted": (population.to_pandas(),)}
+    rows = [
+        rows_of(STUDY, cohort, n, m, *read.get(m, ()))
+        for n in cohort.specimen_names
+        for m in MODELS
+    ]
     return {
         table.name: from_rows(table, [row for one in rows for row in one[table.name]]).to_pandas()
         for table in TABLES

@@ -12,6 +12,7 @@ from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of
 
 from spinepipe import cohort as cohorts
 from spinepipe.report.style import WIDTH_MM, style
+from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.errors_by_range import classified
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen, places, posed
 from spinepipe.studies.scoliosis.figures.fitted_and_held_out import errors_of_patients
@@ -19,7 +20,6 @@ from spinepipe.studies.scoliosis.figures.load_displacement import curve
 from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT
 from spinepipe.studies.scoliosis.held_spine import HeldSpine
 from spinepipe.studies.scoliosis.kind import KIND
-from spinepipe.studies.scoliosis.patient_errors import held_out_error
 from spinepipe.studies.scoliosis.personal import patient_of, tangent
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.tables import DISPLACEMENTS

@@ -9,7 +9,7 @@ from scoliosis_cases import ERRORS, Size, paired_test, study_of, tables_of
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.findings import findings
-from spinepipe.studies.scoliosis.headline import headline, named
+from spinepipe.studies.scoliosis.headline import headline
 
 PAIR = ("tangent_fitted", "tangent")
 
@@ -83,11 +83,6 @@ def test_best_is_said_only_where_the_difference_is_significant() -> None:
 )
 def test_a_test_of_something_else_says_nothing_of_the_answer(row: dict[str, Any]) -> None:
     assert "is not known" in answer(Size(), statistics=statistics(row)).how_sure
-
-
-def test_models_are_found_in_the_name_of_a_pair() -> None:
-    assert named("tangent_fitted against tangent") == {"tangent_fitted", "tangent"}
-    assert named("tangent_fitted_linear_per_segment") == {"tangent_fitted", "linear_per_segment"}
 
 
 def test_errors_are_held_against_what_reading_makes() -> None:

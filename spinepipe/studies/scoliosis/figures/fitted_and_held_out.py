@@ -15,10 +15,10 @@ from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
 from spinepipe.report.words import count
 from spinepipe.statistics import mean_of
+from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
 from spinepipe.studies.scoliosis.figures.looks import LOOKS
-from spinepipe.studies.scoliosis.patient_errors import rmse_of_patients, square_errors
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import GROUPS
+from spinepipe.studies.scoliosis.tables_of_errors import GROUPS
 from spinepipe.studies.scoliosis.words import IN_WORDS, in_order
 
 PANELS = {
@@ -77,15 +77,12 @@ def errors_of_patients(
     """Columns films, measure, model, specimen, error: of patients with a pose on every film."""
     parts = []
     for group in GROUPS:
-        chosen = [
-            one[one["fitted"].astype(bool) == (group == "fitted")]
-            for one in (positions, displacements, curves)
-        ]
+        chosen = [of_group(one, group) for one in (positions, displacements, curves)]
         for measure in PANELS:
-            squares = square_errors(measure, *chosen)
-            for model, rows in squares.groupby("model", sort=False):
-                own = rmse_of_patients(rows).rename("error").reset_index()
-                parts.append(own.assign(films=group, measure=measure, model=model))
+            own = by_patient(squares(measure, *chosen))
+            each = own.melt(ignore_index=False, var_name="model", value_name="error").dropna()
+            each = each.rename_axis("specimen").reset_index()
+            parts.append(each.assign(films=group, measure=measure))
     columns = ["films", "measure", "model", "specimen", "error"]
     return pd.concat(parts)[columns] if parts else pd.DataFrame(columns=columns)
 

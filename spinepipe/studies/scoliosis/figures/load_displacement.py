@@ -14,10 +14,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.report.panels import explain_marks, side_by_side
 from spinepipe.report.style import BLACK, GREY, SMALL_PT, blank, saying
 from spinepipe.report.words import short
+from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen
 from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
-from spinepipe.studies.scoliosis.patient_errors import held_out_error
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Ends
 from spinepipe.studies.scoliosis.words import in_order

@@ -1,0 +1,68 @@
+"""Errors of models against films, by patient and model: what comparisons of models begin with."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+REFERENCE = "linear_regions"
+"""The model that Jalalian 2017 compares with."""
+
+_OF_FILMS = {"place": "place_rmse_mm", "tilt": "tilt_rmse_deg"}
+"""Column of `positions`; films have equally many vertebrae, so mean squares may be averaged."""
+
+
+def of_group(rows: pd.DataFrame, group: str) -> pd.DataFrame:
+    """The rows of the fitted, or of the held-out films."""
+    return rows[rows["fitted"].astype(bool) == (group == "fitted")]
+
+
+def squares(
+    measure: str, positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
+) -> pd.DataFrame:
+    """Squared errors of a measure beside ``specimen`` and ``model``; NaN where there is no pose."""
+    if measure == "rotation":
+        rows, error = displacements, of_rotations(displacements)
+    elif measure in _OF_FILMS:
+        rows, error = positions, positions[_OF_FILMS[measure]]
+    else:
+        rows = curves
+        error = curves[f"{measure}_simulated_deg"] - curves[f"{measure}_measured_deg"]
+    return rows[["specimen", "model"]].assign(square=error.astype(float) ** 2)
+
+
+def of_rotations(displacements: pd.DataFrame) -> "pd.Series[Any]":
+    """Simulated less measured rotation, deg; NaN where there is no pose."""
+    error: pd.Series[Any] = displacements["simulated_deg"] - displacements["measured_deg"]
+    return error.astype(float)
+
+
+def whole(errors: pd.DataFrame) -> pd.DataFrame:
+    """The rows of each model's patients that have an error on every film."""
+    own = errors["square"].notna().groupby([errors["specimen"], errors["model"]])
+    return errors[own.transform("all")]
+
+
+def by_patient(errors: pd.DataFrame) -> pd.DataFrame:
+    """Root mean square errors, a row per patient and a column per model; NaN where one is missing.
+
+    A patient without a pose on one of the films has none in that model.
+    """
+    means = whole(errors).groupby(["specimen", "model"], sort=False)["square"].mean()
+    found: pd.DataFrame = np.sqrt(means).unstack("model")
+    return found.reindex(index=errors["specimen"].unique(), columns=errors["model"].unique())
+
+
+def held_out_error(positions: pd.DataFrame) -> pd.Series:
+    """Error of rotations by patient (deg), the models together, smallest first.
+
+    On the films that took no part in fitting; on the others where there are no such films, or no
+    pose on them.
+    """
+    named = ["specimen", "model"]
+    for rows in (positions[~positions["fitted"]], positions[positions["fitted"]]):
+        squares = rows[named].assign(square=rows["rotation_rmse_deg"].astype(float) ** 2)
+        found = np.sqrt(squares.dropna().groupby("specimen", sort=False)["square"].mean())
+        if len(found):
+            return found.sort_values(kind="stable")
+    return pd.Series(dtype=float)
