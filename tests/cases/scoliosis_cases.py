@@ -159,7 +159,7 @@ def _rows(
 
 def _position(error: float, gone: bool) -> dict[str, Any]:
     names = ("rotation_rmse_deg", "place_rmse_mm", "tilt_rmse_deg")
-    pushes = ("push_right_n", "push_up_n", "push_right_bending_nm")
+    pushes = ("push_right_n", "push_up_n", "push_right_bending_nm", "push_extension_nm")
     return {
         **dict.fromkeys(names, None if gone else error),
         **dict.fromkeys(pushes, None if gone else 1.0),

@@ -1,9 +1,9 @@
 """Tangents of all segments fitted at once to both bending films, through the simulator.
 
 The unknowns of a patient are the logarithms of `population`. A pose is found where the film has the
-uppermost vertebra, its tilts are compared with the film's, and its exact answer to each unknown is
-taken from the equations of equilibrium. What the films leave open stays as the population has it;
-the spread of what is left is the curvature at the optimum (Laplace).
+uppermost vertebra, places and tilts of its vertebrae are compared with the film's, and its exact
+answer to each unknown is taken from the equations of equilibrium. What the films leave open stays
+as the population has it; the spread of what is left is the curvature at the optimum (Laplace).
 """
 
 from dataclasses import dataclass, replace
@@ -18,10 +18,11 @@ from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import Held
 from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
-from spinepipe.studies.scoliosis.held_spine import BENDING, HeldSpine, with_laws
+from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.personal import Patient, Personal
 from spinepipe.studies.scoliosis.population import Known, Population, assumed
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, Ends
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 FARTHEST = 5.0
 """Numbers stay within so many SD of the population's mean."""
@@ -36,7 +37,8 @@ LEVEL = 0.95
 """Of the intervals of ratios."""
 
 READINGS_OF_A_CHANGE = 2
-"""Tilts are read on the film and on the erect one."""
+"""On the film and on the erect one."""
+"""On the film and on the erect one."""
 
 NO_POSE = "no pose of the first guess has the uppermost vertebra where the films have it"
 
@@ -116,16 +118,16 @@ def by_numbers(numbers: Array, size: float) -> Array:
 class FilmFit:
     """The films of one patient as a least squares problem; its chain is the one that is loaded."""
 
-    def __init__(self, patient: Patient, tilt_sd: float) -> None:
+    def __init__(self, patient: Patient, sd: Array) -> None:
         """Load the chain.
 
         Parameters
         ----------
-        tilt_sd : rad, of a vertebra's tilt on a film less the model's.
+        sd : (3,) m, m and rad, of a vertebra's place and tilt on a film less the model's.
         """
-        self.patient, self.size, self.tilt_sd = patient, patient.size, tilt_sd
-        self.segments, erect = patient.chain.n_joints, patient.erect
-        self.spine = HeldSpine(self._model(self._beyond_films(assumed(self.segments).mean)), erect)
+        self.patient, self.size, self.sd = patient, patient.size, sd
+        self.segments = patient.chain.n_joints
+        self.spine = patient.held(self._model(self._beyond_films(assumed(self.segments).mean)))
         self.near: dict[str, Held] = {}
 
     def fit(self, population: Population, start: Array | None = None) -> Fitted:
@@ -151,7 +153,7 @@ class FilmFit:
 
         if point(begin) is None:
             raise NoFit(NO_POSE)
-        size = 2 * (self.segments - 1) + len(begin)
+        size = 2 * 3 * (self.segments - 1) + len(begin)
         ended = descend(point, begin, (low, high), population.sd, size, SETTLED)
         found = self.missed(ended.x)
         assert found is not None  # a descent ends where there is a pose
@@ -187,11 +189,11 @@ class FilmFit:
         )
 
     def missed(self, numbers: Array) -> tuple[Array, Array] | None:
-        """Errors of the tilts between the ends, both films, over their SD; and by each number.
+        """Errors of places and tilts between the ends, both films, over their SD; by each number.
 
         Returns
         -------
-        (2 (S - 1),) and (2 (S - 1), 3 S), or None where a film has no pose.
+        (6 (S - 1),) and (6 (S - 1), 3 S), or None where a film has no pose.
         """
         laws = laws_of(numbers, self.size)
         spine = self.spine.with_model(self._model(numbers))
@@ -204,9 +206,11 @@ class FilmFit:
             self.near[position] = posed.held
             assert posed.held.answers is not None  # a pose that converged has them
             change, _ = posed.held.answers.to(self._held_by(posed.held.q, laws, numbers))
-            errors.append((posed.film.tilt - film.tilt)[1:-1])
-            slopes.append(spine.tilts_by(posed.held.q)[:-1] @ change)
-        return np.concatenate(errors) / self.tilt_sd, np.vstack(slopes) / self.tilt_sd
+            off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
+            by = spine.film_by(posed.held.q)[:, :-1] @ change / self.sd[:, None, None]
+            errors.append(off.ravel())
+            slopes.append(by.reshape(len(errors[-1]), -1))
+        return np.concatenate(errors), np.vstack(slopes)
 
     def _model(self, numbers: Array) -> SpineModel:
         laws = laws_of(numbers, self.size)
@@ -231,6 +235,9 @@ class FilmFit:
         return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
 
 
-def tilt_sd(reading_deg: float, model_deg: float) -> float:
-    """SD of a vertebra's tilt on a film less the model's, rad, which takes the erect film's."""
-    return float(np.deg2rad(np.hypot(np.sqrt(READINGS_OF_A_CHANGE) * reading_deg, model_deg)))
+def weighed_with(reading_mm: float, reading_deg: float, model_mm: float, model_deg: float) -> Array:
+    """(3,) m, m and rad: SD of a place and a tilt on a film less the model's, which has the erect
+    film's."""
+    read = np.sqrt(READINGS_OF_A_CHANGE) * np.array([reading_mm, reading_deg])
+    place, tilt = np.hypot(read, [model_mm, model_deg])
+    return np.array([place / MM_PER_M, place / MM_PER_M, tilt / DEG_PER_RAD])

@@ -95,6 +95,11 @@ class Film:
         return found
 
     @property
+    def rows(self) -> Array:
+        """(3, V) right, up and tilt."""
+        return np.stack([self.right, self.up, self.tilt])
+
+    @property
     def top(self) -> Array:
         """(3,) place and tilt of the uppermost vertebra."""
         return np.array([self.right[-1], self.up[-1], self.tilt[-1]])

@@ -2,7 +2,9 @@
 
 Films show the coronal plane; the model is a chain in space. Joints sit at the back end of the
 superior endplate of the lower vertebra and turn about three axes; translations are locked. The
-erect film is the neutral pose. Ground axes: anterior, up, right; the lowest vertebra is ground.
+uppermost vertebra is put where a film has it; it may be kept from tipping to the front or back,
+which no coronal film shows (docs/decisions/0019). The erect film is the neutral pose. Ground axes:
+anterior, up, right; the lowest vertebra is ground.
 """
 
 from collections.abc import Sequence
@@ -17,14 +19,14 @@ from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System
 from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import Held, Place, Tilt, hold_at
+from spinepipe.statics.prescribed import Held, Place, Prescription, Tilt, hold_at
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.settings import Profile
 from spinepipe.units import COORDINATES, MM_PER_M
 from spinepipe.world import Chain
 
 BENDING = COORDINATES.index("right_bending")
-UP, RIGHT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+ANTERIOR, UP, RIGHT = np.eye(3)
 
 LEAST_NM_PER_RAD = 1e-4
 """The least that a bushing may have: a millionth of a joint, which the tangent carries."""
@@ -98,16 +100,25 @@ class Posed:
 class HeldSpine:
     """A model whose uppermost vertebra is put where a film has it."""
 
-    def __init__(self, model: SpineModel, erect: Film) -> None:
-        """Load the chain."""
+    def __init__(self, model: SpineModel, erect: Film, level: bool) -> None:
+        """Load the chain; `level` tells whether the uppermost vertebra may not tip to the front."""
         case = LoadCase("held", 1, (LoadStep(0, ()),))
         self.system, self.erect = System(Chain(model), model, case), erect
         self.free = np.tile([False] * 3 + [True] * 3, model.n_joints)
         top = model.n_joints - 1
         point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _line(erect.tilt[-1])
-        self.grips = (Place(top, point, RIGHT), Place(top, point, UP), Tilt(top, line, UP, RIGHT))
-        self.tilts = tuple(
-            Tilt(body, _line(tilt), UP, RIGHT) for body, tilt in enumerate(erect.tilt[1:])
+        self.grips: tuple[Prescription, ...] = (
+            Place(top, point, RIGHT),
+            Place(top, point, UP),
+            Tilt(top, line, UP, RIGHT),
+        )
+        if level:
+            self.grips = (*self.grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
+        centres = [np.array([0.0, *at]) for at in zip(erect.up[1:], erect.right[1:], strict=True)]
+        self.shown: tuple[tuple[Prescription, ...], ...] = (
+            tuple(Place(body, at, RIGHT) for body, at in enumerate(centres)),
+            tuple(Place(body, at, UP) for body, at in enumerate(centres)),
+            tuple(Tilt(body, _line(t), UP, RIGHT) for body, t in enumerate(erect.tilt[1:])),
         )
 
     def with_model(self, model: SpineModel) -> "HeldSpine":
@@ -118,14 +129,15 @@ class HeldSpine:
 
     def at(self, top: Array, start: Held | None = None) -> Posed:
         """The pose with the uppermost vertebra at a place (right, up; m) and tilt (rad)."""
-        held = hold_at(self.system, self.grips, top, self.free, start)
+        wanted = np.concatenate([top, np.zeros(len(self.grips) - len(top))])
+        held = hold_at(self.system, self.grips, wanted, self.free, start)
         film = self.film(held.q)
         return Posed(held, film, film.turned - self.erect.turned)
 
-    def tilts_by(self, q: Array) -> Array:
-        """(S, n) change of all tilts on a film but the lowest with the pose q (n,)."""
+    def film_by(self, q: Array) -> Array:
+        """(3, S, n) change of right, up and tilt of all vertebrae but the lowest with q (n,)."""
         motion = ChainMotion(self.system.chain, q)
-        return np.array([one.slope(motion) for one in self.tilts])
+        return np.array([[one.slope(motion) for one in each] for each in self.shown])
 
     def film(self, q: Array) -> Film:
         """What a film of the pose q (n,) shows."""

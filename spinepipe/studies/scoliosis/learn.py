@@ -12,10 +12,11 @@ from functools import partial
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
-from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, tilt_sd
+from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, weighed_with
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
@@ -37,7 +38,7 @@ def run(root: str, study: str, output: str) -> None:
     """Write ``population.parquet``."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
     progress = Progress(partial(_say, study))
-    sd = assumed_tilt_sd(settings, cohort)
+    sd = weights(settings, cohort)
     found = learn(settings, cohort, sd, progress)
     rows = population_rows(found, cohort.joint_names, sd)
     write(from_rows(POPULATION, list(rows)), output, provenance("population", settings, cohort))
@@ -47,12 +48,13 @@ def _say(study: str, line: str) -> None:
     print(f"{study}: {line}", file=sys.stderr, flush=True)
 
 
-def assumed_tilt_sd(settings: Scoliosis, cohort: Cohort) -> float:
-    """Rad; films of which nothing tells how they were read count as read without error."""
-    return tilt_sd(float(np.nan_to_num(reading_noise(settings, cohort)[1])), settings.model_sd_deg)
+def weights(settings: Scoliosis, cohort: Cohort) -> Array:
+    """(3,) m, m and rad; films of which nothing tells how they were read count as exact."""
+    place, tilt = np.nan_to_num(reading_noise(settings, cohort))
+    return weighed_with(float(place), float(tilt), settings.model_sd_mm, settings.model_sd_deg)
 
 
-def learn(settings: Scoliosis, cohort: Cohort, sd: float, progress: Progress) -> Learned:
+def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> Learned:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
     population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, Fitted]()
@@ -70,7 +72,7 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: float, progress: Progress) ->
 def _fits(
     names: Iterator[str],
     patients: Mapping[str, Patient],
-    sd: float,
+    sd: Array,
     population: Population,
     before: Mapping[str, Fitted],
 ) -> Iterator[tuple[str, Fitted]]:

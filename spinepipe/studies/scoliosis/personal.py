@@ -56,6 +56,7 @@ class Patient:
     springs : (S, 6) stiffness of all segments before personalisation: as published to each other,
         lateral bending of that size.
     pairs : what the bending films give.
+    level : whether the uppermost vertebra is kept from tipping to the front.
     """
 
     name: str
@@ -64,11 +65,16 @@ class Patient:
     size: float
     springs: Array
     pairs: Pairs
+    level: bool
 
     @property
     def erect(self) -> Film:
         """The film that all others are held against."""
         return self.read.films[ERECT]
+
+    def held(self, model: SpineModel) -> HeldSpine:
+        """A model of the patient, to be held where films have its top; the one that is loaded."""
+        return HeldSpine(model, self.erect, self.level)
 
     @cached_property
     def curves(self) -> tuple[Curve, ...]:
@@ -122,7 +128,7 @@ def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
     size = size_of(pairs, study)
     stated = np.array(study.stiffness.in_order(), dtype=float)
     springs = np.tile(stated * size / stated[BENDING], (chain.n_joints, 1))
-    return Patient(name, read, chain, size, springs, pairs)
+    return Patient(name, read, chain, size, springs, pairs, not study.top_may_tip)
 
 
 def _apex(erect: Film, cohort: Cohort) -> int:
@@ -198,7 +204,7 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     regions = _regions(patient)
     count = int(regions.max()) + 1
     start = uniform(patient, study)
-    spine = HeldSpine(start.model, patient.erect)
+    spine = patient.held(start.model)
 
     def stiffness(logs: Array) -> Array:
         every = np.append(logs, 0.0)[regions]

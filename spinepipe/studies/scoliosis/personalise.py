@@ -12,7 +12,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import read_mark
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
-from spinepipe.studies.scoliosis.held_spine import HeldSpine, Posed
+from spinepipe.studies.scoliosis.held_spine import Posed
 from spinepipe.studies.scoliosis.misses import POSED, miss_of
 from spinepipe.studies.scoliosis.personal import WAYS, Patient, Personal, patient_of
 from spinepipe.studies.scoliosis.population_table import population_of
@@ -27,7 +27,7 @@ Row = dict[str, Any]
 
 NOT_ARRIVED = "the fit to the films did not settle"
 
-PUSHES = ("push_right_n", "push_up_n", "push_right_bending_nm")
+PUSHES = ("push_right_n", "push_up_n", "push_right_bending_nm", "push_extension_nm")
 
 
 def run(
@@ -66,7 +66,7 @@ def rows_of(
     """Rows of each table, by its name."""
     patient = patient_of(settings, cohort, specimen)
     personal, message = _personal(settings, patient, model, population)
-    spine = HeldSpine(personal.model, patient.erect)
+    spine = patient.held(personal.model)
     known: Row = {"specimen": specimen, "model": model}
     taken: Row = {
         "free_parameters": personal.free,
@@ -106,8 +106,8 @@ def _personal(
     """The model, and what is to be said of how it was come by."""
     if population is None:
         return WAYS[model](patient, settings), ""
-    everyone, tilt_sd = population_of(population)
-    fit = FilmFit(patient, tilt_sd)
+    everyone, sd = population_of(population)
+    fit = FilmFit(patient, sd)
     try:
         fitted = fit.fit(everyone)
     except NoFit as why:
@@ -133,14 +133,15 @@ def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
 
 def _position(patient: Patient, position: str, posed: Posed) -> Row:
     missed = posed.held.missed
-    pushes = posed.held.pushes.tolist() if posed.held.status in POSED else [None] * len(PUSHES)
+    there = posed.held.status in POSED
+    pushes = dict(zip(PUSHES, posed.held.pushes.tolist(), strict=False)) if there else {}
     return {
         "missed_mm": MM_PER_M * float(np.hypot(*missed[:2])),
         "missed_deg": DEG_PER_RAD * abs(float(missed[2])),
         "chord_ratio": patient.read.chord(position),
         "film_scale": patient.read.scales[position],
         **miss_of(patient, position, posed),
-        **dict(zip(PUSHES, pushes, strict=True)),
+        **{name: pushes.get(name) for name in PUSHES},
     }
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
+from spinepipe.effects.contract import Array
 from spinepipe.studies.scoliosis.population import PER_SEGMENT, Population
-from spinepipe.units import DEG_PER_RAD
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Learned:
     unfitted: tuple[str, ...]
 
 
-def population_rows(found: Learned, joints: Sequence[str], sd: float) -> Iterator[dict[str, Any]]:
+def population_rows(found: Learned, joints: Sequence[str], sd: Array) -> Iterator[dict[str, Any]]:
     """A row for each quantity and joint."""
     population = found.population
     means = population.mean.reshape(len(PER_SEGMENT), -1)
@@ -49,7 +50,8 @@ def population_rows(found: Learned, joints: Sequence[str], sd: float) -> Iterato
                 "n_patients": found.patients,
                 "rounds": found.rounds,
                 "last_change": found.change if np.isfinite(found.change) else None,
-                "tilt_sd_deg": DEG_PER_RAD * sd,
+                "place_sd_mm": MM_PER_M * float(sd[0]),
+                "tilt_sd_deg": DEG_PER_RAD * float(sd[2]),
                 "message": _without(found.unfitted),
             }
 
@@ -58,13 +60,14 @@ def _without(names: tuple[str, ...]) -> str:
     return f"without {', '.join(names)}: no fit" if names else ""
 
 
-def population_of(rows: pd.DataFrame) -> tuple[Population, float]:
-    """The population of a table's rows, and the SD (rad) that tilts were weighed with."""
+def population_of(rows: pd.DataFrame) -> tuple[Population, Array]:
+    """The population of a table's rows, and (3,) m, m and rad: SD that films were weighed with."""
     parts, spreads = [], []
     for quantity in PER_SEGMENT:
         chosen = rows[rows["quantity"] == quantity]
         unit = 1.0 if quantity == "ratio" else DEG_PER_RAD
         parts.append(np.log(chosen["mean"].to_numpy(float) / unit))
         spreads.append(float(chosen["sd_log"].iloc[0]))
-    tilt_sd = float(rows["tilt_sd_deg"].iloc[0]) / DEG_PER_RAD
-    return Population(np.concatenate(parts), spreads[0], spreads[1]), tilt_sd
+    place = float(rows["place_sd_mm"].iloc[0]) / MM_PER_M
+    sd = np.array([place, place, float(rows["tilt_sd_deg"].iloc[0]) / DEG_PER_RAD])
+    return Population(np.concatenate(parts), spreads[0], spreads[1]), sd

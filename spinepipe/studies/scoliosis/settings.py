@@ -96,12 +96,20 @@ class Scoliosis(Study):
         description="of the rotations to each other: all follow the size of the lateral one",
     )
     profile: Profile = Field(default=Profile(), description="depth that the films lack")
+    top_may_tip: bool = Field(
+        default=False,
+        description="whether the uppermost vertebra may tip to the front or back while films hold "
+        "it; coronal films do not show it",
+    )
     model_sd_deg: float = Field(
         default=0.5,
         gt=0,
         le=20,
         description="SD by which a chain of tangents misses tilts that are read without error; "
         "tangent_fitted trusts films no further",
+    )
+    model_sd_mm: float = Field(
+        default=1.0, gt=0, le=50, description="the same of a vertebra's place on a film, each way"
     )
     tilt_sd_deg: float | None = Field(
         default=None, gt=0, le=20, description="SD of a vertebra's tilt, where no repeats tell it"

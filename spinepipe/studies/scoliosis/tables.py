@@ -93,7 +93,10 @@ POPULATION = Table(
             null="nobody has a fit",
             low=0.0,
         ),
-        angle("tilt_sd_deg", "SD of a tilt on a film less the model's, as films were weighed"),
+        Column(
+            "place_sd_mm", "number", "SD of a place on a film less the model's, as weighed", "mm"
+        ),
+        angle("tilt_sd_deg", "SD of a tilt on a film less the model's, as weighed"),
         MESSAGE,
     ),
 )
@@ -161,6 +164,13 @@ POSITIONS = Table(
             "moment to the right at the top",
             "N m",
             null=NO_POSE,
+        ),
+        Column(
+            "push_extension_nm",
+            "number",
+            "moment at the top that keeps it from tipping to the front or back",
+            "N m",
+            null="the solve found no pose, or the top may tip",
         ),
         Column("missed_mm", "number", "distance by which the top misses its place", "mm", low=0.0),
         angle("missed_deg", "angle by which the top misses its tilt"),

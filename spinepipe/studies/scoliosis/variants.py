@@ -41,7 +41,7 @@ def variant_rows(settings: Scoliosis, cohort: Cohort, specimen: str) -> Iterator
     """A row for each choice, value and position."""
     patient = patient_of(settings, cohort, specimen)
     studied = tangent(patient, settings).model
-    spine = HeldSpine(studied, patient.erect)
+    spine = patient.held(studied)
     usual = {name: spine.at(film.top) for name, film in _others(patient)}
     for percent in settings.variants.enlargement_percent:
         known: Row = {"specimen": specimen, "varied": "enlargement", "value": percent}

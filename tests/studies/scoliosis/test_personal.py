@@ -9,7 +9,7 @@ import pytest
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.films import ERECT, FILMS, LEFT, PATIENTS, RIGHT, Read
-from spinepipe.studies.scoliosis.held_spine import HeldSpine, geometry, with_laws
+from spinepipe.studies.scoliosis.held_spine import geometry, with_laws
 from spinepipe.studies.scoliosis.personal import (
     WAYS,
     Patient,
@@ -49,6 +49,7 @@ def mirrored(patient: Patient) -> Patient:
         patient.size,
         patient.springs,
         Pairs(-pairs.left, -pairs.right, pairs.arm_left, pairs.arm_right, pairs.apex),
+        patient.level,
     )
 
 
@@ -57,7 +58,7 @@ def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> 
     other = mirrored(patient)
     for position, opposite in ((RIGHT, LEFT), ("neutral", "neutral")):
         one, two = (
-            HeldSpine(WAYS[model](who, STUDY).model, who.erect).at(who.read.films[film].top)
+            who.held(WAYS[model](who, STUDY).model).at(who.read.films[film].top)
             for who, film in ((patient, position), (other, opposite))
         )
         assert one.held.status == two.held.status == "converged"
@@ -68,7 +69,7 @@ def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> 
 
 @pytest.mark.parametrize("model", list(WAYS))
 def test_the_uppermost_vertebra_is_where_the_film_has_it(patient: Patient, model: str) -> None:
-    spine = HeldSpine(WAYS[model](patient, STUDY).model, patient.erect)
+    spine = patient.held(WAYS[model](patient, STUDY).model)
     for film in patient.read.films.values():
         posed = spine.at(film.top)
         assert posed.held.status == "converged"
@@ -78,7 +79,7 @@ def test_the_uppermost_vertebra_is_where_the_film_has_it(patient: Patient, model
 
 
 def test_the_erect_film_takes_no_push(patient: Patient) -> None:
-    spine = HeldSpine(tangent(patient, STUDY).model, patient.erect)
+    spine = patient.held(tangent(patient, STUDY).model)
     posed = spine.at(patient.erect.top)
     assert np.abs(posed.held.pushes).max() < 1e-9
     assert np.abs(posed.r).max() < 1e-12
@@ -92,7 +93,7 @@ def test_films_do_not_tell_how_stiff_a_spine_is_in_all(patient: Patient) -> None
     stiffer = with_laws(patient.chain, 10.0 * springs, laws)
     for position in (RIGHT, "traction"):
         top = patient.read.films[position].top
-        one, two = (HeldSpine(m, patient.erect).at(top) for m in (personal.model, stiffer))
+        one, two = (patient.held(m).at(top) for m in (personal.model, stiffer))
         np.testing.assert_allclose(two.r, one.r, rtol=0, atol=1e-6)
 
 

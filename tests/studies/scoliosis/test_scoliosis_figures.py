@@ -18,7 +18,6 @@ from spinepipe.studies.scoliosis.figures.film_overlay import chosen, places, pos
 from spinepipe.studies.scoliosis.figures.fitted_and_held_out import errors_of_patients
 from spinepipe.studies.scoliosis.figures.load_displacement import curve
 from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT
-from spinepipe.studies.scoliosis.held_spine import HeldSpine
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.personal import patient_of, tangent
 from spinepipe.studies.scoliosis.personalise import rows_of
@@ -135,7 +134,7 @@ def test_models_stand_where_their_poses_are(tmp_path: Path) -> None:
         DISPLACEMENTS, rows_of(study, cohort, "p01", "tangent")["displacements"]
     ).to_pandas()
     film = patient.read.films["traction"]
-    held = HeldSpine(tangent(patient, study).model, patient.erect).at(film.top)
+    held = patient.held(tangent(patient, study).model).at(film.top)
     drawn = posed(film, rows[rows["position"] == "traction"])
     np.testing.assert_allclose(drawn, places(held.film), rtol=0, atol=1e-9)
     np.testing.assert_allclose(drawn[-1], places(film)[-1], rtol=0, atol=1e-9)
