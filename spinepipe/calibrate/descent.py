@@ -14,6 +14,19 @@ Point = Callable[[Array], tuple[Array, Array] | None]
 OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
 
 
+def once(point: Point) -> Point:
+    """The same, which looks at each x once: a descent asks for residuals, then for the Jacobian."""
+    looked: dict[bytes, tuple[Array, Array] | None] = {}
+
+    def remembered(x: Array) -> tuple[Array, Array] | None:
+        key = x.tobytes()
+        if key not in looked:
+            looked[key] = point(x)
+        return looked[key]
+
+    return remembered
+
+
 @dataclass(frozen=True)
 class Settled:
     """When a descent has arrived, and when it is given up.

@@ -43,6 +43,16 @@ class Curve:
         tilt_below, tilt_above = (np.arctan2(*line) for line in (below, above))
         return float(self.side * (tilt_below - tilt_above))
 
+    def ferguson_by(self, film: Film) -> Array:
+        """(2, V) rad/m: change of Ferguson's angle with right and up of every vertebra."""
+        found = np.zeros((2, len(film.right)))
+        for low, high, sign in ((self.lower, self.apex, 1), (self.apex, self.upper, -1)):
+            right, up = film.right[high] - film.right[low], film.up[high] - film.up[low]
+            turned = self.side * sign * np.array([up, -right]) / (right**2 + up**2)
+            found[:, high] += turned
+            found[:, low] -= turned
+        return found
+
 
 def curves(erect: Film) -> tuple[Curve, ...]:
     """The curves of a spine, caudal to cranial; adjacent ones share an end vertebra."""

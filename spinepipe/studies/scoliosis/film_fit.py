@@ -6,12 +6,13 @@ answer to each unknown is taken from the equations of equilibrium. What the film
 as the population has it; the spread of what is left is the curvature at the optimum (Laplace).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from spinepipe.calibrate.descent import Settled, descend
+from spinepipe.calibrate.descent import Settled, descend, once
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
@@ -73,6 +74,7 @@ class Fitted:
     Attributes
     ----------
     numbers : (3 S,), the likeliest. known : they and their covariance.
+    poses : by position, those of the films.
     decided : of how many the films, not the population, decided.
     """
 
@@ -80,6 +82,7 @@ class Fitted:
     told: Told
     known: Known
     arrived: bool
+    poses: Mapping[str, Held]
 
     @property
     def decided(self) -> float:
@@ -130,8 +133,8 @@ class FilmFit:
         self.spine = patient.held(self._model(self._beyond_films(assumed(self.segments).mean)))
         self.near: dict[str, Held] = {}
 
-    def fit(self, population: Population, start: Array | None = None) -> Fitted:
-        """The likeliest numbers, and what is known of them.
+    def fit(self, population: Population, start: Fitted | None = None) -> Fitted:
+        """The likeliest numbers, and what is known of them; from a fit near by, if there is one.
 
         Raises
         ------
@@ -139,17 +142,17 @@ class FilmFit:
         """
         root, reach = population.root, FARTHEST * population.sd
         low, high = population.mean - reach, population.mean + reach
-        begin = self._beyond_films(population.mean) if start is None else start
+        begin = self._beyond_films(population.mean) if start is None else start.numbers
+        self.near = {} if start is None else dict(start.poses)
         begin = np.clip(begin, low + 1e-9, high - 1e-9)
-        looked: dict[bytes, tuple[Array, Array] | None] = {}
 
+        @once
         def point(numbers: Array) -> tuple[Array, Array] | None:
-            key = numbers.tobytes()
-            if key not in looked:
-                found = self.missed(numbers)
-                away = root @ (numbers - population.mean)
-                looked[key] = found and (np.append(found[0], away), np.vstack([found[1], root]))
-            return looked[key]
+            found = self.missed(numbers)
+            if found is None:
+                return None
+            away = root @ (numbers - population.mean)
+            return np.append(found[0], away), np.vstack([found[1], root])
 
         if point(begin) is None:
             raise NoFit(NO_POSE)
@@ -161,7 +164,7 @@ class FilmFit:
         matrix = slopes.T @ slopes
         told = Told(matrix, matrix @ ended.x - slopes.T @ errors)
         known = replace(told.known(population), mean=ended.x)
-        return Fitted(ended.x, told, known, ended.arrived)
+        return Fitted(ended.x, told, known, ended.arrived, self.near)
 
     def personal(self, fitted: Fitted) -> Personal:
         """The model of a fit."""
@@ -204,8 +207,7 @@ class FilmFit:
             if posed.held.status is not Ended.CONVERGED:
                 return None
             self.near[position] = posed.held
-            assert posed.held.answers is not None  # a pose that converged has them
-            change, _ = posed.held.answers.to(self._held_by(posed.held.q, laws, numbers))
+            change = posed.answers_to(self._held_by(posed.held.q, laws, numbers))
             off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
             by = spine.film_by(posed.held.q)[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())

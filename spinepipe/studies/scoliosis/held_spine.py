@@ -96,6 +96,11 @@ class Posed:
     film: Film
     r: Array
 
+    def answers_to(self, held_by: Array) -> Array:
+        """(n, m) change of the pose with changes (n, m) of what the joints hold."""
+        assert self.held.answers is not None  # a pose that was found has them
+        return self.held.answers.to(held_by)[0]
+
 
 class HeldSpine:
     """A model whose uppermost vertebra is put where a film has it."""

@@ -77,9 +77,8 @@ def _fits(
     before: Mapping[str, Fitted],
 ) -> Iterator[tuple[str, Fitted]]:
     for name in names:
-        start = before[name].numbers if name in before else None
         try:
-            yield name, FilmFit(patients[name], sd).fit(population, start)
+            yield name, FilmFit(patients[name], sd).fit(population, before.get(name))
         except NoFit:
             continue
 

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from spinepipe.calibrate.descent import Settled, descend, once
 from spinepipe.cohort import Cohort
-from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import Held
+from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.curve_angles import Curve, curves, lumbar_apex
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, Read, read_films
 from spinepipe.studies.scoliosis.held_spine import (
@@ -39,10 +41,10 @@ from spinepipe.studies.scoliosis.tangent_laws import (
 FARTHEST_MULTIPLIER = np.log(10.0)
 """Petit 2004 reports multipliers of regions up to 10."""
 
-MULTIPLIER_STEP = 1e-5
+SETTLED = Settled(cost=1e-6, step=1e-4, slope=1e-10, evaluations=50)
+"""Multipliers to a ten-thousandth."""
 
-LAST_STEP = 1e-6
-"""Relative step at which multipliers have arrived."""
+Regions = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -203,49 +205,54 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     """
     regions = _regions(patient)
     count = int(regions.max()) + 1
-    start = uniform(patient, study)
-    spine = patient.held(start.model)
-
-    def stiffness(logs: Array) -> Array:
-        every = np.append(logs, 0.0)[regions]
-        found: Array = start.at_rest * np.exp(every - every.mean())
-        return found
-
-    near: dict[str, Held] = {}
-
-    def missed(logs: Array) -> Array:
-        springs = _with_bending(patient, stiffness(logs))
-        held = spine.with_model(with_springs(patient.chain, springs))
-        found = []
-        for position in (RIGHT, LEFT):
-            film = patient.read.films[position]
-            posed = held.at(film.top, near.get(position))
-            near[position] = posed.held
-            found += [one.ferguson(posed.film) - one.ferguson(film) for one in patient.curves]
-        return np.array(found)
-
     best = np.zeros(count - 1)
+    fit = _RegionFit(patient, regions)
     if count > 1:
         reach = np.full(count - 1, FARTHEST_MULTIPLIER)
-        ended = bounded_least_squares(
-            missed, best, _differences(missed), (-reach, reach), xtol=LAST_STEP
-        )
-        best = ended.x
-    return _springs(patient, stiffness(best), count - 1)
+        size = 2 * len(patient.curves)
+        best = descend(once(fit.missed), best, (-reach, reach), np.ones(count - 1), size, SETTLED).x
+    return _springs(patient, fit.stiffness(best), count - 1)
 
 
-def _differences(missed: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """Central differences; poses are solved far more sharply than these steps."""
+class _RegionFit:
+    """Ferguson angles of both bending films as a least squares problem."""
 
-    def jacobian(logs: Array) -> Array:
-        steps = MULTIPLIER_STEP * np.eye(len(logs))
-        columns = [(missed(logs + s) - missed(logs - s)) / (2.0 * MULTIPLIER_STEP) for s in steps]
-        return np.stack(columns, axis=1)
+    def __init__(self, patient: Patient, regions: Regions) -> None:
+        self.patient, self.start = patient, patient.springs[:, BENDING]
+        own = np.eye(int(regions.max()) + 1)[regions]
+        self.by_logs = (own - own.mean(axis=0))[:, :-1]  # (S, k - 1) of the segments' logarithms
+        self.spine = patient.held(with_springs(patient.chain, patient.springs))
+        self.near: dict[str, Held] = {}
 
-    return jacobian
+    def stiffness(self, logs: Array) -> Array:
+        """(S,) N m/rad; the geometric mean stays."""
+        found: Array = self.start * np.exp(self.by_logs @ logs)
+        return found
+
+    def missed(self, logs: Array) -> tuple[Array, Array] | None:
+        """Errors of the angles, rad, right and left film, and by each logarithm."""
+        patient, springs = self.patient, self.stiffness(logs)
+        model = with_springs(patient.chain, _with_bending(patient, springs))
+        spine = self.spine.with_model(model)
+        errors, slopes = [], []
+        for position in (RIGHT, LEFT):
+            film = patient.read.films[position]
+            posed = spine.at(film.top, self.near.get(position))
+            if posed.held.status is not Ended.CONVERGED:
+                return None
+            self.near[position] = posed.held
+            q = posed.held.q.reshape(-1, 6)
+            held_by = np.zeros((*q.shape, len(logs)))
+            held_by[:, BENDING] = (springs * q[:, BENDING])[:, None] * self.by_logs
+            change = posed.answers_to(held_by.reshape(q.size, -1))
+            shown = spine.film_by(posed.held.q)[:2] @ change
+            for one in patient.curves:
+                errors.append(one.ferguson(posed.film) - one.ferguson(film))
+                slopes.append(np.einsum("av,avn->n", one.ferguson_by(posed.film)[:, 1:], shown))
+        return np.array(errors), np.array(slopes)
 
 
-def _regions(patient: Patient) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+def _regions(patient: Patient) -> Regions:
     """(S,) number of the curve that each segment belongs to."""
     tops = [one.upper for one in patient.curves[:-1]]
     return np.searchsorted(np.array(tops), np.arange(patient.chain.n_joints), side="right")
