@@ -6,7 +6,7 @@ answer to each unknown is taken from the equations of equilibrium. What the film
 as the population has it; the spread of what is left is the curvature at the optimum (Laplace).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,8 +28,9 @@ from spinepipe.units import DEG_PER_RAD, MM_PER_M
 FARTHEST = 5.0
 """Numbers stay within so many SD of the population's mean."""
 
-BEYOND_THE_FILM = 1.3
-"""A fit begins with ends at least so far beyond the rotations of the films."""
+BEYOND_THE_FILM = (1.3, 2.0, 4.0)
+"""A fit begins with ends at least so many times as far as the rotations of the films: the first of
+these at which the chain has a pose."""
 
 SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
 """A ten-thousandth of a number's logarithm is far within its spread."""
@@ -41,7 +42,7 @@ READINGS_OF_A_CHANGE = 2
 """On the film and on the erect one."""
 """On the film and on the erect one."""
 
-NO_POSE = "no pose of the first guess has the uppermost vertebra where the films have it"
+NO_POSE = "in no first guess does a stable pose have the uppermost vertebra where the films have it"
 
 
 class NoFit(Exception):
@@ -130,7 +131,7 @@ class FilmFit:
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        self.spine = patient.held(self._model(self._beyond_films(assumed(self.segments).mean)))
+        self.spine = patient.held(self._model(next(self._guesses(assumed(self.segments)))))
         self.near: dict[str, Held] = {}
 
     def fit(self, population: Population, start: Fitted | None = None) -> Fitted:
@@ -142,9 +143,7 @@ class FilmFit:
         """
         root, reach = population.root, FARTHEST * population.sd
         low, high = population.mean - reach, population.mean + reach
-        begin = self._beyond_films(population.mean) if start is None else start.numbers
         self.near = {} if start is None else dict(start.poses)
-        begin = np.clip(begin, low + 1e-9, high - 1e-9)
 
         @once
         def point(numbers: Array) -> tuple[Array, Array] | None:
@@ -154,7 +153,10 @@ class FilmFit:
             away = root @ (numbers - population.mean)
             return np.append(found[0], away), np.vstack([found[1], root])
 
-        if point(begin) is None:
+        guesses = self._guesses(population) if start is None else [start.numbers]
+        within = (np.clip(one, low + 1e-9, high - 1e-9) for one in guesses)
+        begin = next((one for one in within if point(one) is not None), None)
+        if begin is None:
             raise NoFit(NO_POSE)
         size = 2 * 3 * (self.segments - 1) + len(begin)
         ended = descend(point, begin, (low, high), population.sd, size, SETTLED)
@@ -174,7 +176,8 @@ class FilmFit:
         """The model of a patient of whom no film was fitted."""
         nothing = np.zeros((len(population.mean),) * 2)
         known = Told(nothing, nothing[0]).known(population)
-        return self._personal(Known(self._beyond_films(known.mean), known.covariance), 0.0)
+        begin = self._beyond_films(known.mean, BEYOND_THE_FILM[-1])
+        return self._personal(Known(begin, known.covariance), 0.0)
 
     def _personal(self, known: Known, decided: float) -> Personal:
         s = self.segments
@@ -228,12 +231,17 @@ class FilmFit:
         found[rows, BENDING, :, rows] = each
         return found.reshape(6 * s, 3 * s)
 
-    def _beyond_films(self, numbers: Array) -> Array:
-        """The numbers (3 S,), with ends beyond the rotations of both films."""
+    def _guesses(self, population: Population) -> Iterator[Array]:
+        """First numbers: those of the population, then ever straighter laws."""
+        for beyond in BEYOND_THE_FILM:
+            yield self._beyond_films(population.mean, beyond)
+
+    def _beyond_films(self, numbers: Array, beyond: float) -> Array:
+        """The numbers (3 S,), with ends so many times as far as the rotations of both films."""
         pairs, s = self.patient.pairs, self.segments
         least = -np.minimum(pairs.right, pairs.left)
         most = np.maximum(pairs.right, pairs.left)
-        reached = BEYOND_THE_FILM * np.maximum(np.concatenate([least, most]), SMALLEST_END)
+        reached = beyond * np.maximum(np.concatenate([least, most]), SMALLEST_END)
         return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
 
 
