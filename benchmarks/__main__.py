@@ -14,6 +14,7 @@ from benchmarks import (
     cohort,
     discrepancy,
     engine,
+    films,
     identification,
     lost_fits,
     many_spines,
@@ -38,6 +39,7 @@ def main() -> None:
         "whole_study": whole_study,
         "cohort": cohort_parts,
         "discrepancy": lambda: discrepancy_parts(options.small),
+        "films": films_part,
         "many_spines": many_spines_part,
         "memory": memory_part,
         "sensitivity": sensitivity_parts,
@@ -156,6 +158,26 @@ def discrepancy_parts(small: bool) -> None:
         found.append({"recipe": case.recipe.as_dict(), "said": asdict(said), "runs": rows})
     if not small:
         _write("discrepancy", lines, {"machine": about, "cohorts": found})
+
+
+def films_part() -> None:
+    """Patients with bending films: every model by itself, and the whole study."""
+    about = _about()
+    lines = _head("Spines from bending films", about)
+    seconds = films.patients()
+    lines += [
+        "",
+        "Personalised and held in four positions, mean of all patients; tangent_fitted under "
+        "the assumed population, which a study learns first. Goal: 1 s in all models together.",
+        "",
+        "| model | CPU s per patient |",
+        "|---|---|",
+        *(f"| {model} | {one:.2f} |" for model, one in seconds.items()),
+        f"| together | {sum(seconds.values()):.2f} |",
+    ]
+    print(*lines[-len(seconds) - 3 :], sep="\n", flush=True)
+    rows = _study_rows(lines, films.runs(), films.STUDY)
+    _write("films", lines, {"machine": about, "cpu_s_per_patient": seconds, "study": rows})
 
 
 def many_spines_part() -> None:
