@@ -153,7 +153,9 @@ def _rows(
             f"{name}_simulated_deg": None if gone else 30.0 + error for name in ("cobb", "ferguson")
         }
         ends_of = {"lower_vertebra": "L4", "apex_vertebra": "L1", "upper_vertebra": "T11"}
-        found["curves"].append(where | {"curve": 0, "side": "left"} | ends_of | angles)
+        found["curves"].append(
+            where | {"curve": 0, "region": "TL/L", "side": "left"} | ends_of | angles
+        )
     return found
 
 

@@ -17,6 +17,9 @@ LEAST_CURVE = float(np.deg2rad(5.0))
 """Smaller changes of tilt are waves of the line, no curves."""
 
 
+LOWEST_PROXIMAL, THORACOLUMBAR = 5, "T12"
+
+
 @dataclass(frozen=True)
 class Curve:
     """Numbers of the lower and upper end vertebra and of the apex, counted from below.
@@ -52,6 +55,17 @@ class Curve:
             found[:, high] += turned
             found[:, low] -= turned
         return found
+
+
+def region(apex: str) -> str:
+    """Region of a curve by its apical vertebra, as Lenke 2001 names it.
+
+    PT, proximal thoracic, has its apex down to T5; MT, main thoracic, down to T11; TL/L,
+    thoracolumbar or lumbar, below.
+    """
+    if apex[0] in "LS" or apex == THORACOLUMBAR:
+        return "TL/L"
+    return "PT" if apex[0] == "C" or int(apex[1:]) <= LOWEST_PROXIMAL else "MT"
 
 
 def curves(erect: Film) -> tuple[Curve, ...]:

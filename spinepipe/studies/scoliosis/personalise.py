@@ -10,6 +10,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import read_mark
+from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import Posed
@@ -173,6 +174,7 @@ def _curves(cohort: Cohort, patient: Patient, position: str, posed: Posed) -> It
         }
         yield {
             "curve": number,
+            "region": region(cohort.vertebrae[curve.apex]),
             "side": "right" if curve.side > 0 else "left",
             "lower_vertebra": cohort.vertebrae[curve.lower],
             "apex_vertebra": cohort.vertebrae[curve.apex],

@@ -196,6 +196,12 @@ CURVES = Table(
         POSITION,
         FITTED,
         Column("curve", "integer", "number of the curve, from the lowest", low=0),
+        Column(
+            "region",
+            "text",
+            "PT: proximal thoracic, apex down to T5; MT: main thoracic, down to T11; TL/L: below",
+            allowed=("PT", "MT", "TL/L"),
+        ),
         Column("side", "text", "side of its bulge", allowed=("right", "left")),
         Column("lower_vertebra", "text", "lower end vertebra"),
         Column("apex_vertebra", "text", "apex"),
