@@ -187,11 +187,18 @@ class Answers:
     matrix: Array
     free: Flags
 
-    def to(self, held_by: Array) -> tuple[Array, Array]:
-        """Changes of q (n, m) and pushes (k, m) for changes (n, m) of what the joints hold."""
+    def to(self, held_by: Array, wanted_by: Array | None = None) -> tuple[Array, Array]:
+        """Changes of q (n, m) and pushes (k, m).
+
+        Parameters
+        ----------
+        held_by : (n, m) changes of what the joints hold. wanted_by : (k, m) of what is prescribed.
+        """
         count = int(self.free.sum())
         right = np.zeros((len(self.matrix), held_by.shape[1]))
         right[:count] = -held_by[self.free]
+        if wanted_by is not None:
+            right[count:] = wanted_by
         found: Array = np.linalg.solve(self.matrix, right).astype(float, copy=False)
         q = np.zeros_like(held_by)
         q[self.free] = found[:count]

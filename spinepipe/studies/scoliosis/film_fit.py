@@ -4,6 +4,9 @@ The unknowns of a patient are the logarithms of `population`. A pose is found wh
 uppermost vertebra, places and tilts of its vertebrae are compared with the film's, and its exact
 answer to each unknown is taken from the equations of equilibrium. What the films leave open stays
 as the population has it; the spread of what is left is the curvature at the optimum (Laplace).
+
+The uppermost vertebra, too, is read with error, and what holds it would pass the error on to the
+segment below: where it was on each film is fitted along, near where it was read.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,6 +40,9 @@ SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
 
 LEVEL = 0.95
 """Of the intervals of ratios."""
+
+TOPS = 6
+"""Place and tilt of the uppermost vertebra on two films."""
 
 READINGS_OF_A_CHANGE = 2
 """On the film and on the erect one."""
@@ -74,12 +80,14 @@ class Fitted:
 
     Attributes
     ----------
-    numbers : (3 S,), the likeliest. known : they and their covariance.
+    unknowns : (3 S + 6,), the likeliest: the numbers, then by how many SD the uppermost vertebra
+        lay off where the right and the left film have it.
+    known : the numbers and their covariance.
     poses : by position, those of the films.
     decided : of how many the films, not the population, decided.
     """
 
-    numbers: Array
+    unknowns: Array
     told: Told
     known: Known
     arrived: bool
@@ -89,6 +97,18 @@ class Fitted:
     def decided(self) -> float:
         """Sum over numbers of the films' share of what is known of them."""
         return float(np.trace(self.known.covariance @ self.told.matrix))
+
+
+def _told(errors: Array, slopes: Array, at: Array) -> Told:
+    """What errors and their slopes at a point say of the numbers, wherever the top was."""
+    matrix = slopes.T @ slopes + np.diag(np.arange(len(at)) >= len(at) - TOPS)
+    vector = matrix @ at - slopes.T @ errors
+    vector[-TOPS:] -= at[-TOPS:]
+    of_top = np.linalg.solve(
+        matrix[-TOPS:, -TOPS:], np.column_stack([matrix[-TOPS:], vector[-TOPS:]])
+    )
+    whole = np.column_stack([matrix, vector])[:-TOPS] - matrix[:-TOPS, -TOPS:] @ of_top
+    return Told(whole[:, : len(at) - TOPS], whole[:, -1])
 
 
 def ends_of(numbers: Array) -> tuple[Array, Array]:
@@ -131,7 +151,7 @@ class FilmFit:
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        self.spine = patient.held(self._model(next(self._guesses(assumed(self.segments)))))
+        self.spine = patient.held(self._model(next(self._guesses(assumed(self.segments)))[:-TOPS]))
         self.near: dict[str, Held] = {}
 
     def fit(self, population: Population, start: Fitted | None = None) -> Fitted:
@@ -141,31 +161,33 @@ class FilmFit:
         ------
         NoFit : where no pose begins the fit.
         """
-        root, reach = population.root, FARTHEST * population.sd
-        low, high = population.mean - reach, population.mean + reach
+        root, tops = population.root, np.zeros(TOPS)
+        middle = np.concatenate([population.mean, tops])
+        scale = np.concatenate([population.sd, tops + 1.0])
+        low, high = middle - FARTHEST * scale, middle + FARTHEST * scale
+        drawn = np.eye(len(middle))
+        drawn[: len(root), : len(root)] = root
         self.near = {} if start is None else dict(start.poses)
 
         @once
-        def point(numbers: Array) -> tuple[Array, Array] | None:
-            found = self.missed(numbers)
+        def point(unknowns: Array) -> tuple[Array, Array] | None:
+            found = self.missed(unknowns)
             if found is None:
                 return None
-            away = root @ (numbers - population.mean)
-            return np.append(found[0], away), np.vstack([found[1], root])
+            away = drawn @ (unknowns - middle)
+            return np.append(found[0], away), np.vstack([found[1], drawn])
 
-        guesses = self._guesses(population) if start is None else [start.numbers]
+        guesses = self._guesses(population) if start is None else [start.unknowns]
         within = (np.clip(one, low + 1e-9, high - 1e-9) for one in guesses)
         begin = next((one for one in within if point(one) is not None), None)
         if begin is None:
             raise NoFit(NO_POSE)
         size = 2 * 3 * (self.segments - 1) + len(begin)
-        ended = descend(point, begin, (low, high), population.sd, size, SETTLED)
+        ended = descend(point, begin, (low, high), scale, size, SETTLED)
         found = self.missed(ended.x)
         assert found is not None  # a descent ends where there is a pose
-        errors, slopes = found
-        matrix = slopes.T @ slopes
-        told = Told(matrix, matrix @ ended.x - slopes.T @ errors)
-        known = replace(told.known(population), mean=ended.x)
+        told = _told(*found, ended.x)
+        known = replace(told.known(population), mean=ended.x[:-TOPS])
         return Fitted(ended.x, told, known, ended.arrived, self.near)
 
     def personal(self, fitted: Fitted) -> Personal:
@@ -194,23 +216,30 @@ class FilmFit:
             np.exp(np.stack([ratio - reach, ratio + reach])),
         )
 
-    def missed(self, numbers: Array) -> tuple[Array, Array] | None:
-        """Errors of places and tilts between the ends, both films, over their SD; by each number.
+    def missed(self, unknowns: Array) -> tuple[Array, Array] | None:
+        """Errors of places and tilts between the ends, both films, over their SD; by each unknown.
 
         Returns
         -------
-        (6 (S - 1),) and (6 (S - 1), 3 S), or None where a film has no pose.
+        (6 (S - 1),) and (6 (S - 1), 3 S + 6), or None where a film has no pose.
         """
+        numbers, tops = unknowns[:-TOPS], unknowns[-TOPS:].reshape(2, 3)
         laws = laws_of(numbers, self.size)
         spine = self.spine.with_model(self._model(numbers))
         errors, slopes = [], []
-        for position in (RIGHT, LEFT):
+        for film_number, position in enumerate((RIGHT, LEFT)):
             film = self.patient.read.films[position]
-            posed = spine.at(film.top, self.near.get(position))
+            top = film.top + self.sd * tops[film_number]
+            posed = spine.at(top, self.near.get(position))
             if posed.held.status is not Ended.CONVERGED:
                 return None
             self.near[position] = posed.held
-            change = posed.answers_to(self._held_by(posed.held.q, laws, numbers))
+            held_by = np.zeros((len(posed.held.q), len(unknowns)))
+            held_by[:, :-TOPS] = self._held_by(posed.held.q, laws, numbers)
+            top_by = np.zeros((3, len(unknowns)))
+            at = len(numbers) + 3 * film_number
+            top_by[:, at : at + 3] = np.diag(self.sd)
+            change = posed.answers_to(held_by, top_by)
             off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
             by = spine.film_by(posed.held.q)[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())
@@ -232,9 +261,9 @@ class FilmFit:
         return found.reshape(6 * s, 3 * s)
 
     def _guesses(self, population: Population) -> Iterator[Array]:
-        """First numbers: those of the population, then ever straighter laws."""
+        """First unknowns: those of the population, then ever straighter laws."""
         for beyond in BEYOND_THE_FILM:
-            yield self._beyond_films(population.mean, beyond)
+            yield np.append(self._beyond_films(population.mean, beyond), np.zeros(TOPS))
 
     def _beyond_films(self, numbers: Array, beyond: float) -> Array:
         """The numbers (3 S,), with ends so many times as far as the rotations of both films."""

@@ -96,10 +96,19 @@ class Posed:
     film: Film
     r: Array
 
-    def answers_to(self, held_by: Array) -> Array:
-        """(n, m) change of the pose with changes (n, m) of what the joints hold."""
+    def answers_to(self, held_by: Array, top_by: Array | None = None) -> Array:
+        """(n, m) change of the pose.
+
+        Parameters
+        ----------
+        held_by : (n, m) changes of what the joints hold. top_by : (3, m) m, m and rad, of where
+            the uppermost vertebra is held.
+        """
         assert self.held.answers is not None  # a pose that was found has them
-        return self.held.answers.to(held_by)[0]
+        if top_by is None:
+            return self.held.answers.to(held_by)[0]
+        level = np.zeros((len(self.held.pushes) - len(top_by), top_by.shape[1]))
+        return self.held.answers.to(held_by, np.vstack([top_by, level]))[0]
 
 
 class HeldSpine:
