@@ -275,3 +275,20 @@ def test_answers_are_the_derivatives_of_the_pose() -> None:
         by_pushes = (ends[0].pushes - ends[1].pushes) / 2e-4
         np.testing.assert_allclose(dq[:, joint], by_q, rtol=1e-5, atol=1e-9)
         np.testing.assert_allclose(dpushes[:, joint], by_pushes, rtol=1e-5, atol=1e-6)
+
+
+def test_answers_to_other_places_are_the_derivatives_of_the_pose() -> None:
+    """Each prescription moved a little, against solving again."""
+    wanted, plain = bent_by(0.5), model()
+    system = System(Chain(plain), plain, case())
+    found = hold_at(system, grips(), wanted, rotations())
+    assert found.answers is not None
+    moved = np.eye(len(wanted))
+    dq, dpushes = found.answers.to(np.zeros((6 * COUNT, len(wanted))), moved)
+    for number, step in enumerate(1e-6 * moved):
+        ends = [hold_at(system, grips(), wanted + s * step, rotations()) for s in (1.0, -1.0)]
+        by_q = (ends[0].q - ends[1].q) / 2e-6
+        by_pushes = (ends[0].pushes - ends[1].pushes) / 2e-6
+        np.testing.assert_allclose(dq[:, number], by_q, rtol=1e-4, atol=1e-6)
+        largest = float(np.abs(by_pushes).max())
+        np.testing.assert_allclose(dpushes[:, number], by_pushes, rtol=1e-4, atol=1e-5 * largest)
