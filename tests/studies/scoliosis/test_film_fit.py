@@ -1,0 +1,145 @@
+"""Fits of tangents to both bending films: derivatives, films of the model itself, what they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort import Cohort
+from spinepipe.progress import Progress
+from spinepipe.studies.scoliosis.film_fit import (
+    NO_POSE,
+    TOPS,
+    FilmFit,
+    NoFit,
+    by_numbers,
+    laws_of,
+    weighed_with,
+)
+from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, Film
+from spinepipe.studies.scoliosis.learn import learn, weights
+from spinepipe.studies.scoliosis.personal import Patient, patient_of
+from spinepipe.studies.scoliosis.personalise import rows_of
+from spinepipe.studies.scoliosis.population import assumed
+from spinepipe.studies.scoliosis.population_table import population_rows
+from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import LAWS, POPULATION, POSITIONS
+from spinepipe.studies.scoliosis.tangent_laws import Pairs
+from spinepipe.tables import from_rows
+from tests.generators import ais_films
+
+STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+SHARP = weighed_with(0.0, 0.0, 0.05, 0.02)
+
+
+@pytest.fixture(scope="module")
+def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
+    folder = tmp_path_factory.mktemp("films") / "ais"
+    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=2)
+    return cohorts.read(folder, (FILMS, PATIENTS))
+
+
+@pytest.fixture(scope="module")
+def patient(cohort: Cohort) -> Patient:
+    return patient_of(STUDY, cohort, "p01")
+
+
+def some_unknowns(patient: Patient) -> np.ndarray:
+    rng, s = np.random.default_rng(3), patient.chain.n_joints
+    numbers = assumed(s).mean.copy()
+    numbers[:s] += rng.normal(0.0, 0.3, s)
+    numbers[s:] += 0.3 + rng.normal(0.0, 0.1, 2 * s)
+    return np.append(numbers, rng.normal(0.0, 0.5, TOPS))
+
+
+def with_films(patient: Patient, right: Film, left: Film) -> Patient:
+    """The patient with other bending films."""
+    films = {**patient.read.films, RIGHT: right, LEFT: left}
+    read = replace(patient.read, films=films)
+    pairs = replace(patient.pairs, right=read.turned(RIGHT), left=read.turned(LEFT))
+    assert isinstance(pairs, Pairs)
+    return replace(patient, read=read, pairs=pairs)
+
+
+def test_laws_change_with_their_numbers_as_told() -> None:
+    numbers = np.concatenate([[0.1, -0.2], np.log([0.1, 0.2]), np.log([0.15, 0.12])])
+    told = by_numbers(numbers, 70.0)
+    for column in range(3):
+        for segment in range(2):
+            step = np.zeros(6)
+            step[2 * column + segment] = 1e-6
+            change = (laws_of(numbers + step, 70.0) - laws_of(numbers - step, 70.0)) / 2e-6
+            np.testing.assert_allclose(told[segment, :, column], change[segment], rtol=1e-6)
+            assert not change[1 - segment].any()
+
+
+def test_errors_change_with_every_unknown_as_told(patient: Patient) -> None:
+    fit, at = FilmFit(patient, weights_of_a_usual_study()), some_unknowns(patient)
+    found = fit.missed(at)
+    assert found is not None
+    for number in (0, 6, 13, 14, 25, 30, 41, 42, 44, 47):
+        step = np.zeros(len(at))
+        step[number] = 1e-5
+        ends = [fit.missed(at + s * step) for s in (1.0, -1.0)]
+        change = (ends[0][0] - ends[1][0]) / 2e-5
+        np.testing.assert_allclose(found[1][:, number], change, rtol=0, atol=1e-6)
+
+
+def weights_of_a_usual_study() -> np.ndarray:
+    return weighed_with(0.5, 0.7, STUDY.model_sd_mm, STUDY.model_sd_deg)
+
+
+def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
+    hidden = some_unknowns(patient)
+    hidden[-TOPS:] = 0.0
+    fit = FilmFit(patient, SHARP)
+    spine = fit.spine.with_model(fit._model(hidden[:-TOPS]))
+    poses = [spine.at(patient.read.films[position].top) for position in (RIGHT, LEFT)]
+    assert all(pose.held.status == "converged" for pose in poses)
+    filmed = with_films(patient, *(pose.film for pose in poses))
+    fit = FilmFit(filmed, SHARP)
+    found = fit.fit(assumed(patient.chain.n_joints))
+    assert found.arrived
+    errors, _ = fit.missed(found.unknowns) or (None, None)
+    assert errors is not None
+    assert np.sqrt(np.mean(errors**2)) < 0.5  # of the 0.05 mm and 0.02 deg that it was held to
+    ratio = np.log(fit.personal(found).ratio)
+    true = hidden[: len(ratio)] - hidden[: len(ratio)].mean()
+    assert np.corrcoef(ratio, true)[0, 1] > 0.9
+
+
+def test_what_films_decide_falls_with_how_coarsely_they_are_read(patient: Patient) -> None:
+    population = assumed(patient.chain.n_joints)
+    decided = [FilmFit(patient, f * SHARP).fit(population).decided for f in (1.0, 10.0, 100.0)]
+    assert 41.0 > decided[0] > decided[1] > decided[2] > 0.0
+
+
+def test_an_interval_holds_the_ratio(patient: Patient) -> None:
+    fit = FilmFit(patient, weights_of_a_usual_study())
+    personal = fit.personal(fit.fit(assumed(patient.chain.n_joints)))
+    assert personal.ratio_range is not None
+    low, high = personal.ratio_range
+    assert (low < personal.ratio).all()
+    assert (personal.ratio < high).all()
+    assert personal.free == 3 * patient.chain.n_joints - 1
+
+
+def test_a_patient_without_a_pose_is_told_and_keeps_the_population(
+    cohort: Cohort, patient: Patient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = Progress(lambda line: None)
+    sd = weights(STUDY, cohort)
+    usual = learn(STUDY, cohort, sd, silent)
+    assert (usual.patients, usual.unfitted) == (2, ())
+    monkeypatch.setattr(FilmFit, "missed", lambda self, unknowns: None)
+    with pytest.raises(NoFit, match="uppermost vertebra"):
+        FilmFit(patient, sd).fit(usual.population)
+    rows = from_rows(POPULATION, list(population_rows(usual, cohort.joint_names, sd)))
+    found = rows_of(STUDY, cohort, "p01", "tangent_fitted", rows.to_pandas())
+    positions = from_rows(POSITIONS, found["positions"]).to_pandas()
+    assert positions["message"].str.contains(NO_POSE).all()
+    laws = from_rows(LAWS, found["laws"]).to_pandas()
+    assert (laws["decided_parameters"] == 0.0).all()
+    none = learn(STUDY, cohort, sd, silent)
+    assert (none.patients, none.unfitted) == (0, ("p01", "p02"))
