@@ -150,11 +150,11 @@ def constrained(study: Scoliosis, results: Results) -> Iterator[str]:
         if len(least)
     ]
     if not told:
-        yield "No stiffness had to be held at the least that is allowed."
+        yield "No stiffness had to be held at a bound."
         return
     yield (
-        "The films asked for less stiffness than is allowed, or for a negative one; it was held at "
-        f"the least and is no finding: {'; '.join(told)}."
+        "The films asked for less stiffness than is allowed, a negative one, or for more; it was "
+        f"held at a bound and is no finding: {'; '.join(told)}."
     )
 
 

@@ -199,9 +199,9 @@ def _doubts(positions: pd.DataFrame, held_out: Standing) -> list[str]:
     doubts = []
     lost = positions[positions["status"].isin([status.value for status in NO_POSE])]
     if len(lost):
-        patients = lost["specimen"].nunique()
+        patients, were = lost["specimen"].nunique(), "was" if len(lost) == 1 else "were"
         doubts.append(
-            f"Look at this first: {len(lost)} of {count(len(positions), 'pose')} were not found, "
+            f"Look at this first: {len(lost)} of {count(len(positions), 'pose')} {were} not found, "
             f"in {count(patients, 'patient')}; errors leave these patients out."
         )
     counts = [] if held_out.rows.empty else sorted(set(held_out.rows["n_patients"]))

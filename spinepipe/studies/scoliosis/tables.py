@@ -53,7 +53,11 @@ LAWS = Table(
         angle("lower_end_deg", "end of the tangent to the left, negative", _LINEAR),
         angle("upper_end_deg", "end of the tangent to the right", _LINEAR),
         Column("opposite", "flag", "whether it turns against a bend, or not at all"),
-        Column("constrained", "flag", "whether the films asked for less stiffness than is allowed"),
+        Column(
+            "constrained",
+            "flag",
+            "whether the films asked for less or more stiffness than is allowed",
+        ),
         FREE,
         DECIDED,
         SCALE_FROM,

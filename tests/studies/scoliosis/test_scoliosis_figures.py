@@ -155,7 +155,7 @@ def test_segments_against_a_bend_are_named_in_their_panels() -> None:
     told = {
         axis.get_title("left"): " ".join(t.get_text() for t in axis.texts) for axis in figure.axes
     }
-    assert "against a bend\nheld at the least" in told["T2T3"]
+    assert "against a bend\nheld at a bound" in told["T2T3"]
     assert told["L3L4"] == ""
 
 

@@ -120,7 +120,7 @@ def _laws(axis: Axes, rows: pd.DataFrame, reach: float) -> None:
 def _told(axis: Axes, rows: pd.DataFrame) -> None:
     """What is special about a segment."""
     words = ["against a bend"] if rows["opposite"].any() else []
-    words += ["held at the least"] if rows["constrained"].any() else []
+    words += ["held at a bound"] if rows["constrained"].any() else []
     axis.text(
         0.98,
         0.03,
