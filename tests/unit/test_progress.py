@@ -1,10 +1,10 @@
-"""What a search says while it works."""
+"""What long work says of itself."""
 
 import itertools
 
 import pytest
 
-from spinepipe.studies.discrepancy.search import progress
+from spinepipe import progress
 
 
 def test_long_rounds_say_how_far_they_are_and_what_is_left(
