@@ -119,10 +119,13 @@ def _of_fitted(fitted: Standing) -> str:
 def _answer(held_out: Standing, ps: Mapping[str, float | None]) -> str:
     best, *_ = held_out.models
     p = next(iter(ps.values()), None)
-    told = f"{capital(TOLD[best])} has the least error on positions that it has not seen"
+    told = (
+        f"{capital(TOLD[best])} has the least error of rotations on positions that it has not seen"
+    )
     if p is not None and p < SIGNIFICANT:
-        told = f"{capital(TOLD[best])} reproduces positions that it has not seen best"
-    told = f"{told}: rotations of segments are off by {held_out.sized(best)} (root mean square)"
+        told = f"{capital(TOLD[best])} reproduces rotations of segments best on positions that it "
+        told += "has not seen"
+    told = f"{told}: rotations are off by {held_out.sized(best)} (root mean square)"
     if not ps:
         return f"{told}. There is no other model to compare it with."
     which = ("the next, ", "")

@@ -67,7 +67,7 @@ class Variants(BaseModel):
         description="how far the ends are beyond the rotations of the bending films",
     )
     scale: EachOnce[Factor] = Field(
-        default=(0.1, 0.3, 3.0, 10.0),
+        default=(0.1, 0.3, 1.0, 3.0, 10.0),
         description="factor of the lateral stiffness of all segments, other rotations unchanged",
     )
 

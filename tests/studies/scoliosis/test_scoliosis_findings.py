@@ -37,7 +37,9 @@ def statistics(*rows: dict[str, Any]) -> pd.DataFrame:
 def test_the_best_model_is_that_of_the_least_error_on_held_out_films() -> None:
     found = answer(Size()).words
     # three patients: 0.3 deg times the root mean square of 1, 1.1 and 1.2
-    assert found.startswith("The fitted tangent model has the least error on positions")
+    assert found.startswith(
+        "The fitted tangent model has the least error of rotations on positions"
+    )
     assert "off by 0.331° (root mean square)" in found
     assert "25 % less than the next, the published tangent model (0.441°)" in found
     assert "50 % less than the model that is linear by region (0.662°)" in found
@@ -57,7 +59,7 @@ def test_best_is_said_only_where_the_difference_is_significant() -> None:
     size = Size()
     assert "is not known: there is no test of it" in answer(size).how_sure
     sure = answer(size, statistics=statistics(paired_test("held_out", "rotation", PAIR, 0.002)))
-    assert "reproduces positions that it has not seen best" in sure.words
+    assert "reproduces rotations of segments best on positions that it has not seen" in sure.words
     assert "The difference over 3 patients, by paired Wilcoxon tests" in sure.how_sure
     assert "from the next it is significant (p 0.0020), from the model that is" in sure.how_sure
     assert "linear by region it is not tested." in sure.how_sure
