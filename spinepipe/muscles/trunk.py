@@ -1,0 +1,133 @@
+"""A trunk: seven joints from the sacrum to the eleventh thoracic vertebra, and the muscles on them.
+
+Ground axes: x forwards, y up, z to the right; m. The origin is the centre of L5S1. Everything is
+given where it lies in the source's own pose, so bodies are not turned there and a rotation of a
+body is counted from that pose.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array
+
+BODIES = ("S1", "L5", "L4", "L3", "L2", "L1", "T12", "T11")
+"""Caudal to cranial. S1 stands for the pelvis, T11 for all from there up: T1-T11, ribs, head, arms."""
+
+LEVELS = ("L5S1", "L4L5", "L3L4", "L2L3", "L1L2", "T12L1", "T11T12")
+"""Joints, caudal to cranial: level k joins body k and body k + 1."""
+
+SLICES = (*(f"T{n}" for n in range(1, 13)), *(f"L{n}" for n in range(1, 6)))
+"""Vertebrae that carry a slice of the trunk, T1 to L5."""
+
+THORAX = len(BODIES) - 1
+"""Body of the ribs, the arms and the head."""
+
+NO_BODY = -1
+
+SIDES = ("right", "left")
+
+
+def body_of(vertebra: str) -> int:
+    """Body that a vertebra belongs to: T1 to T10 move with T11."""
+    return BODIES.index(vertebra) if vertebra in BODIES else THORAX
+
+
+@dataclass(frozen=True, eq=False)
+class Muscles:
+    """M fascicles as paths of up to P points.
+
+    Attributes
+    ----------
+    names : of fascicles, each once; `r` or `l` at the end where the source has it.
+    groups : longissimus_thoracis, rectus_abdominis, ...
+    sides : right (z positive) or left.
+    pcsa : (M,) m2, physiological cross-section.
+    fibre : (M,) m, length of the fibres at rest; nought where the source gives none.
+    body : (M, P) index into BODIES of each point, NO_BODY past the end of the path.
+    point : (M, P, 3) m, where the points lie in the source's pose.
+    wraps : (M,) whether the fascicle lies on the vertebrae that it passes and cannot cross them.
+    in_sheath : (M,) whether one end hangs in the rectus sheath instead of on a bone. Such a path has
+        two points, the first on a bone (ribs: external oblique, pelvis: internal oblique), the
+        second in the sheath, written down with the body of the ribs.
+    """
+
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    sides: tuple[str, ...]
+    pcsa: Array
+    fibre: Array
+    body: NDArray[np.int64]
+    point: Array
+    wraps: NDArray[np.bool_]
+    in_sheath: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def of(self, chosen: NDArray[np.bool_]) -> "Muscles":
+        """Those that are chosen, (M,)."""
+        at = np.flatnonzero(chosen)
+        return Muscles(
+            tuple(self.names[k] for k in at),
+            tuple(self.groups[k] for k in at),
+            tuple(self.sides[k] for k in at),
+            *(
+                getattr(self, name)[at]
+                for name in ("pcsa", "fibre", "body", "point", "wraps", "in_sheath")
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Trunk:
+    """One person's trunk.
+
+    Attributes
+    ----------
+    source : where geometry and muscles come from, with its version.
+    joints : (7, 3) m, centres of the joints, caudal to cranial.
+    disc_tilt : (7,) rad, extension of the disc's plane against the ground, about +z.
+    disc_height, disc_area : (7,) m and m2.
+    vertebrae : (17, 3) m, centres of T1 to L5 (`SLICES`), where the trunk's slices hang.
+    head : (3,) m, centre of mass of head and neck.
+    shoulders : (2, 3) m, right and left.
+    arm_length : m, from shoulder to the middle of the hand.
+    sheath : (2, 2, 3) m, lower and upper end of the rectus sheath, right then left.
+    muscles : its fascicles.
+    """
+
+    source: str
+    joints: Array
+    disc_tilt: Array
+    disc_height: Array
+    disc_area: Array
+    vertebrae: Array
+    head: Array
+    shoulders: Array
+    arm_length: float
+    sheath: Array
+    muscles: Muscles
+
+    def with_muscles(self, **changed: Array) -> "Trunk":
+        """The same with other muscles' attributes."""
+        return replace(self, muscles=replace(self.muscles, **changed))
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """A part of the body that the trunk carries.
+
+    Attributes
+    ----------
+    name : slice_T1, head, right_arm, right_hand_load, ...
+    body : index into BODIES.
+    kg : its mass.
+    at : (3,) m, centre of mass in the source's pose.
+    """
+
+    name: str
+    body: int
+    kg: float
+    at: Array
