@@ -87,8 +87,8 @@ TASKS = Table(
         Column(
             "strength_used",
             "number",
-            "share of the strength that the task takes: 1 over the factor by which loads could grow "
-            "(weight, hands and exertion alike) before no muscle forces hold them",
+            "share of the strength that the task takes: 1 over the factor by which loads could "
+            "grow (weight, hands and exertion alike) before no muscle forces hold them",
             null="strength was not asked for, or the task could not be posed",
             low=0.0,
         ),
@@ -105,7 +105,7 @@ TASKS = Table(
         Column(
             "stable",
             "flag",
-            "whether the spine stands still when pushed a little, muscles stiffening by what they pull",
+            "whether the spine stands still when pushed a little; muscles stiffen as they pull",
             null="stability was not asked for, or the task could not be posed",
         ),
         Column("iterations", "integer", "rounds of forces and geometry", null=NO_FORCES, low=0),
@@ -146,7 +146,7 @@ LEVELS_TABLE = Table(
         Column(
             "capacity_left_nm",
             "number",
-            "flexion moment that could be added at this level alone before no muscle forces hold it",
+            "flexion moment that could be added at this level alone before no forces hold it",
             "N m",
             null="strength was not asked for, or the task is beyond strength",
             low=0.0,

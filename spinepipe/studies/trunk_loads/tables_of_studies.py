@@ -21,8 +21,8 @@ SIMPLIFIED = Table(
         Column(
             "simplification",
             "text",
-            "none; no_feedback: forces do not move the spine; rigid_translations: joints only turn; "
-            "only_l5s1: moments balance at L5S1 alone; no_wrapping: fascicles run straight",
+            "none; no_feedback: forces do not move the spine; rigid_translations: joints only "
+            "turn; only_l5s1: moments balance at L5S1 alone; no_wrapping: fascicles run straight",
             allowed=SIMPLIFICATIONS,
         ),
         pressure("l4l5_pressure", "pressure in the disc L4L5"),
@@ -85,7 +85,7 @@ TUNING = Table(
 
 AGREEMENT = Table(
     "agreement",
-    "How well computed pressures agree with measured ones over the counted tasks: one row per tier.",
+    "How well computed pressures agree with measured ones over counted tasks: one row per tier.",
     ("specimen", "tier"),
     (
         SPECIMEN,
