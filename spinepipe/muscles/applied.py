@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.diaphragm import AHEAD_M
 from spinepipe.muscles.masses import arm_loads
 from spinepipe.muscles.person import Person, weight
@@ -40,7 +39,7 @@ def applied(person: Person, task: Task, poses: BodyPoses) -> Applied:
         For a load that the arms do not reach.
     """
     trunk = person.lines.trunk
-    found = Applied(*weight(person.masses, poses, STANDARD_GRAVITY))
+    found = Applied(*weight(person.masses, poses))
     shoulders = poses.of(np.full(2, THORAX), trunk.shoulders)
     for load in arm_loads(person.subject, shoulders, task.hands, trunk.arm_length):
         found = found.plus(load.body, load.force, load.at)

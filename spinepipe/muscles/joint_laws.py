@@ -102,7 +102,7 @@ _HEUER_NM = (1.0, 2.5, 5.0, 7.5)
 _JARAMILLO_NM = (2.0, 4.0, 6.0, 8.0)
 
 CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
-    "segment": (  # Schmidt 1998: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg, whole segments
+    "segment": (  # Schmidt 1998, whole segments: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg
         _both_sides((10.0,), (23.0,)),
         _both_sides((10.0,), (84.0,)),
         Curve((-10.0, 0.0, 10.0), (-18.0, 0.0, 26.0)),

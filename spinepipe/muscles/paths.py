@@ -1,8 +1,9 @@
 """Fascicles of a trunk in a posture: how long they are and what they do to the bodies.
 
 Straight lines and via points as the source has them. Fascicles that lie on the vertebrae they pass
-run over bars behind those (`spinepipe.muscles.strings`); a bar stands at a share of the fascicle's
-distance from the vertebra in the source's pose, so that it touches only when the trunk bends.
+run over bars behind those (`spinepipe.muscles.strings`). A bar stands at a share of the fascicle's
+distance from the vertebra in the source's pose, so that it touches when the trunk bends; and no
+nearer than the arches of the vertebrae let a muscle come, where the source's own line does.
 
 Fascicles that end in the rectus sheath pull along it: the part of an internal oblique's pull along
 the sheath draws the ribs down, that of an external oblique's relieves them, and the sheath cannot
@@ -20,6 +21,20 @@ from spinepipe.muscles.strings import tight
 from spinepipe.muscles.trunk import BODIES, NO_BODY, SLICES, THORAX, Muscles, Trunk
 
 _SACRUM = 0
+
+
+@dataclass(frozen=True)
+class Standoff:
+    """How far behind a vertebra's centre a fascicle is kept.
+
+    Attributes
+    ----------
+    share : of its distance in the source's pose.
+    least_m : but no less than that.
+    """
+
+    share: float = 0.9
+    least_m: float = 0.04
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +83,10 @@ class Lines:
     bars: Bars
 
     @classmethod
-    def of(cls, trunk: Trunk, depth: float, wrapping: bool = True) -> "Lines":
-        """Lines whose bars stand at so large a share of the distance from the vertebra."""
+    def of(cls, trunk: Trunk, rule: "Standoff", wrapping: bool = True) -> "Lines":
+        """Lines of a trunk; without wrapping, fascicles run straight from point to point."""
         chosen = trunk.muscles.wraps if wrapping else np.zeros(len(trunk.muscles), dtype=bool)
-        return cls(trunk, _bars(trunk, chosen, depth))
+        return cls(trunk, _bars(trunk, chosen, rule))
 
     def pulls(self, poses: BodyPoses) -> Pulls:
         """What the fascicles do in a posture."""
@@ -143,14 +158,14 @@ def _sides(muscles: Muscles) -> NDArray[np.int64]:
     return np.array([0 if side == "right" else 1 for side in muscles.sides])
 
 
-def _bars(trunk: Trunk, chosen: NDArray[np.bool_], depth: float) -> Bars:
+def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     """Bars of the chosen muscles."""
     rows: list[tuple[int, int, int, Array]] = []
     for m in np.flatnonzero(chosen):
         body, point = trunk.muscles.body[m], trunk.muscles.point[m]
         for leg in range(int(np.sum(body != NO_BODY)) - 1):
             for passed in _between(int(body[leg]), int(body[leg + 1])):
-                at = _bar(trunk, passed, point[leg], point[leg + 1], depth)
+                at = _bar(trunk, passed, point[leg], point[leg + 1], rule)
                 if at is not None:
                     rows.append((int(m), leg, passed, at))
     owners = np.array([row[0] for row in rows], dtype=np.int64)
@@ -167,10 +182,10 @@ def _between(one: int, other: int) -> range:
     return range(one + 1, other) if other > one else range(one - 1, other, -1)
 
 
-def _bar(trunk: Trunk, body: int, start: Array, end: Array, depth: float) -> Array | None:
-    """Where the bar of a vertebra stands, in the source's pose; None where nothing passes behind.
+def _bar(trunk: Trunk, body: int, start: Array, end: Array, rule: Standoff) -> Array | None:
+    """Where the bar of a vertebra stands, in the source's pose; None where nothing passes there.
 
-    At the height of the vertebra's centre, at a share of the string's distance behind it.
+    At the height of the vertebra's centre, as far to the side as the string.
     """
     centre = trunk.vertebrae[SLICES.index(BODIES[body])]
     rise = end[1] - start[1]
@@ -178,6 +193,5 @@ def _bar(trunk: Trunk, body: int, start: Array, end: Array, depth: float) -> Arr
     if not 0.0 < share < 1.0:
         return None
     passing = start + share * (end - start)
-    if passing[0] >= centre[0]:
-        return None
-    return np.array([centre[0] + depth * (passing[0] - centre[0]), *passing[1:]])
+    behind = max(rule.share * (centre[0] - passing[0]), rule.least_m)
+    return np.array([centre[0] - behind, *passing[1:]])

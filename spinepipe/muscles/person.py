@@ -1,10 +1,11 @@
-"""A person whose trunk is to hold tasks: geometry, joints, muscles and weight, ready to be posed."""
+"""A person whose trunk is to hold tasks: geometry, joints, muscles and weight."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.joint_laws import JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 from spinepipe.muscles.paths import Lines
@@ -60,11 +61,11 @@ def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:
     return summed, turning - np.cross(centres, summed)
 
 
-def weight(masses: tuple[Mass, ...], poses: BodyPoses, gravity: float) -> tuple[Array, Array]:
+def weight(masses: tuple[Mass, ...], poses: BodyPoses) -> tuple[Array, Array]:
     """Weights on the bodies: (8, 3) N and (8, 3) N m about the origin."""
     forces, moments = np.zeros((8, 3)), np.zeros((8, 3))
     for mass, at in zip(masses, poses.masses(masses), strict=True):
-        pull = np.array([0.0, -gravity * mass.kg, 0.0])
+        pull = mass.kg * np.array(STANDARD_GRAVITY)
         forces[mass.body] += pull
         moments[mass.body] += np.cross(at, pull)
     return forces, moments

@@ -20,8 +20,7 @@ from spinepipe.muscles.trunk import LEVELS
 from spinepipe.status import Balanced
 
 L4L5 = LEVELS.index("L4L5")
-_LATER = 4
-_HALF = 0.5
+_SHORTEST, _LONGEST = 0.1, 5.0
 _HEAVY_N = 3000.0
 
 
@@ -31,7 +30,7 @@ class How:
 
     Attributes
     ----------
-    change : of forces over their size; residual_nm : out of balance; both less than that at the end.
+    change, residual_nm : of forces over their size, and out of balance; less than that at the end.
     most : rounds.
     feedback : whether forces move the spine at all. translates : whether joints do more than turn.
     lowest_alone : whether L5S1 alone is balanced.
@@ -137,7 +136,7 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
     pushes[:, 1] = -start
     rounds: list[Round] = []
     trail: list[Array] = []
-    share = 1.0
+    step, last = 1.0, np.zeros_like(pushes)
     while True:
         now = _at(person, task, how, tone, rotations, pushes, trail[-1] if trail else None)
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
@@ -151,9 +150,18 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
         if settled or not how.feedback or len(rounds) >= how.most:
             status, message = _ended(now, rounds, trail, settled or not how.feedback)
             return replace(now, status=status, message=message, rounds=tuple(rounds))
-        if len(rounds) > _LATER and rounds[-1].change > 0.7 * (rounds[-2].change or 0.0):
-            share = max(_HALF * share, 0.05)
-        pushes = pushes + share * (now.pushes - pushes)
+        off = now.pushes - pushes
+        step, last = (_step(step, off, last) if len(rounds) > 1 else step), off
+        pushes = pushes + step * off
+
+
+def _step(step: float, off: Array, last: Array) -> float:
+    """How far to go towards what a round found: Aitken's rule, shorter where rounds swing, longer
+    where they creep."""
+    by = (off - last).ravel()
+    size = float(by @ by)
+    wanted = -step * float(last.ravel() @ by) / size if size > 0.0 else 1.0
+    return min(max(wanted, _SHORTEST), _LONGEST)
 
 
 def _ended(

@@ -53,7 +53,8 @@ def lacking(person: Person, angles: Array) -> Array:
     """(7,) N m that L5 to T11 lack for their own equilibrium, no muscle pulling.
 
     What acts on the vertebra itself, the joints' moments on it, and the force of the joint above,
-    about the joint below; joints are as far pressed and as stiff as the weight makes them.
+    about the joint below: what all above the joint below lacks less what all above the joint above
+    lacks. Joints are as far pressed and as stiff as the weight makes them.
     """
     rotations = rotations_of(turned(angles))
     pushes = np.zeros((len(LEVELS), 3))
@@ -65,9 +66,8 @@ def lacking(person: Person, angles: Array) -> Array:
         pushes = np.einsum("kji,kj->ki", poses.discs, forces)
     joint = person.laws.moments(poses.turned, -pushes[:, 1])
     total = (turning + np.einsum("kij,kj->ki", poses.discs, joint))[:, 2]
-    carried = np.cross(np.diff(poses.centres, axis=0), forces[1:])[:, 2]
     own = total.copy()
-    own[:-1] -= total[1:] + carried
+    own[:-1] -= total[1:]
     return -own
 
 
