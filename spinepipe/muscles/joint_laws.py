@@ -101,17 +101,21 @@ def _sagittal(
 _HEUER_NM = (1.0, 2.5, 5.0, 7.5)
 _JARAMILLO_NM = (2.0, 4.0, 6.0, 8.0)
 
+_SCHMIDT = (  # Schmidt 1998, whole segments: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg
+    _both_sides((10.0,), (23.0,)),
+    _both_sides((10.0,), (84.0,)),
+    Curve((-10.0, 0.0, 10.0), (-18.0, 0.0, 26.0)),
+)
+_HEUER = (  # Heuer 2007, disc L4L5 alone, medians
+    _both_sides((2.27, 3.6, 5.08, 6.43), _HEUER_NM),
+    _both_sides((1.32, 2.7, 4.36, 5.73), _HEUER_NM),
+    _sagittal((4.95, 6.64, 8.38, 10.11), (1.23, 5.15, 7.92, 10.28), _HEUER_NM),
+)
+
 CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
-    "segment": (  # Schmidt 1998, whole segments: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg
-        _both_sides((10.0,), (23.0,)),
-        _both_sides((10.0,), (84.0,)),
-        Curve((-10.0, 0.0, 10.0), (-18.0, 0.0, 26.0)),
-    ),
-    "disc_heuer": (  # Heuer 2007, disc L4L5 alone, medians
-        _both_sides((2.27, 3.6, 5.08, 6.43), _HEUER_NM),
-        _both_sides((1.32, 2.7, 4.36, 5.73), _HEUER_NM),
-        _sagittal((4.95, 6.64, 8.38, 10.11), (1.23, 5.15, 7.92, 10.28), _HEUER_NM),
-    ),
+    "mixed": (_HEUER[0], _SCHMIDT[1], _SCHMIDT[2]),
+    "segment": _SCHMIDT,
+    "disc_heuer": _HEUER,
     "disc_jaramillo": (  # Jaramillo, in Gruber 2024, disc L4L5 alone, means
         _both_sides((4.39, 5.77, 6.58, 7.1), _JARAMILLO_NM),
         _both_sides((3.21, 4.51, 5.43, 5.79), _JARAMILLO_NM),
@@ -123,7 +127,11 @@ CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
         _both_sides((2.0, 4.0, 6.0, 8.0, 10.0), (0.90, 1.79, 2.76, 3.90, 5.32)),
     ),
 }
-"""Right bending, left rotation, extension; sources beside each."""
+"""About x, y and z: right bending, left rotation, extension.
+
+mixed: sideways the disc alone, else whole segments. Ligaments and facets hardly resist bending
+sideways; a segment as stiff sideways as Schmidt's needs muscles to bend it where people lean.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.pose import BodyPoses
 from spinepipe.muscles.strings import tight
-from spinepipe.muscles.trunk import BODIES, NO_BODY, SLICES, THORAX, Muscles, Trunk
+from spinepipe.muscles.trunk import (
+    BODIES,
+    NO_BODY,
+    SLICES,
+    THORAX,
+    Muscles,
+    Trunk,
+    body_of,
+)
 
 _SACRUM = 0
 
@@ -63,6 +71,7 @@ class Pulls:
     contacts : (M,) vertebrae that it lies on. pushes : (M,) sum of its pushes on them.
     along_sheath : (2, M) pull on the upper end of the right and left sheath, down positive.
     trace, traced : (M, Q, 3) m and (M,): points of its path, and how many there are.
+    on : (M, Q) body that each of them lies on; those of the sheath count as the ribs'.
     """
 
     lengths: Array
@@ -73,6 +82,7 @@ class Pulls:
     along_sheath: Array
     trace: Array
     traced: NDArray[np.int64]
+    on: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +103,7 @@ class Lines:
         muscles, bars = self.trunk.muscles, self.bars
         points = self._points(poses)
         turned = poses.rotations[bars.body]
-        lengths, forces, moments, contacts, pushes, trace, traced = tight(
+        lengths, forces, moments, contacts, pushes, trace, traced, on = tight(
             points,
             muscles.body,
             bars.first,
@@ -105,7 +115,7 @@ class Lines:
             len(BODIES),
         )
         along = self._sheath(poses, points, forces, moments)
-        return Pulls(lengths, forces, moments, contacts, pushes, along, trace, traced)
+        return Pulls(lengths, forces, moments, contacts, pushes, along, trace, traced, on)
 
     def _points(self, poses: BodyPoses) -> Array:
         """(M, P, 3) m, points of the paths now; those in the sheath between pelvis and ribs."""
@@ -164,10 +174,8 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     for m in np.flatnonzero(chosen):
         body, point = trunk.muscles.body[m], trunk.muscles.point[m]
         for leg in range(int(np.sum(body != NO_BODY)) - 1):
-            for passed in _between(int(body[leg]), int(body[leg + 1])):
-                at = _bar(trunk, passed, point[leg], point[leg + 1], rule)
-                if at is not None:
-                    rows.append((int(m), leg, passed, at))
+            found = _on_the_way(trunk, body[leg : leg + 2], point[leg : leg + 2], rule)
+            rows += [(int(m), leg, *one) for one in found]
     owners = np.array([row[0] for row in rows], dtype=np.int64)
     return Bars(
         np.searchsorted(owners, np.arange(len(trunk.muscles) + 1)),
@@ -177,21 +185,33 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     )
 
 
-def _between(one: int, other: int) -> range:
-    """Bodies passed on the way from one to another."""
-    return range(one + 1, other) if other > one else range(one - 1, other, -1)
+def _on_the_way(
+    trunk: Trunk, body: NDArray[np.int64], point: Array, rule: Standoff
+) -> list[tuple[int, Array]]:
+    """Vertebrae between the ends of a leg, (2,) and (2, 3), from its first to its second: the body
+    each belongs to, and where its bar stands.
 
-
-def _bar(trunk: Trunk, body: int, start: Array, end: Array, rule: Standoff) -> Array | None:
-    """Where the bar of a vertebra stands, in the source's pose; None where nothing passes there.
-
-    At the height of the vertebra's centre, as far to the side as the string.
+    A bar stands at the height of the vertebra's centre, as far to the side as the string, and
+    behind the centre across the spine. Vertebrae that an end is fixed to are not passed, but those
+    of the thorax, of which there are several, are where they lie below its point.
     """
-    centre = trunk.vertebrae[SLICES.index(BODIES[body])]
-    rise = end[1] - start[1]
-    share = (centre[1] - start[1]) / rise if rise else -1.0
-    if not 0.0 < share < 1.0:
-        return None
-    passing = start + share * (end - start)
-    behind = max(rule.share * (centre[0] - passing[0]), rule.least_m)
-    return np.array([centre[0] - behind, *passing[1:]])
+    low, high = sorted(body)
+    found = []
+    for number, vertebra in enumerate(SLICES):
+        centre, of = trunk.vertebrae[number], body_of(vertebra)
+        share = (centre[1] - point[0, 1]) / (point[1, 1] - point[0, 1])
+        if not (low < of < high or of == high == THORAX != low) or not 0.0 < share < 1.0:
+            continue
+        string = point[0] + share * (point[1] - point[0])
+        back = -_forwards(trunk, number)
+        behind = max(rule.share * float((string - centre) @ back), rule.least_m)
+        found.append((share, of, centre + behind * back + np.array([0.0, 0.0, string[2]])))
+    return [(of, at) for _, of, at in sorted(found, key=lambda one: one[0])]
+
+
+def _forwards(trunk: Trunk, number: int) -> Array:
+    """(3,) across the spine at a vertebra, in the source's pose: from the centres about it."""
+    line = trunk.vertebrae[max(number - 1, 0)] - trunk.vertebrae[min(number + 1, len(SLICES) - 1)]
+    across = np.array([line[1], -line[0], 0.0])
+    found: Array = across / np.linalg.norm(across)
+    return found

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.joint_laws import JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 from spinepipe.muscles.paths import Lines
-from spinepipe.muscles.pose import BodyPoses, Chain, posed, rotations_of
+from spinepipe.muscles.pose import Chain, posed, rotations_of
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import LEVELS, Mass
 
@@ -59,13 +58,3 @@ def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:
     summed = np.cumsum(forces[..., :0:-1, :], axis=-2)[..., ::-1, :]
     turning = np.cumsum(moments[..., :0:-1, :], axis=-2)[..., ::-1, :]
     return summed, turning - np.cross(centres, summed)
-
-
-def weight(masses: tuple[Mass, ...], poses: BodyPoses) -> tuple[Array, Array]:
-    """Weights on the bodies: (8, 3) N and (8, 3) N m about the origin."""
-    forces, moments = np.zeros((8, 3)), np.zeros((8, 3))
-    for mass, at in zip(masses, poses.masses(masses), strict=True):
-        pull = mass.kg * np.array(STANDARD_GRAVITY)
-        forces[mass.body] += pull
-        moments[mass.body] += np.cross(at, pull)
-    return forces, moments

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 
-MOST_BARS = 7
+MOST_BARS = 17
 MOST_ROUNDS = 60
 _TOUCH_M = 1e-10
 _STEPS = 50
@@ -125,7 +125,9 @@ def tight(
     along: Array,
     behind: Array,
     bodies: int,
-) -> tuple[Array, Array, Array, NDArray[np.int64], Array, Array, NDArray[np.int64]]:
+) -> tuple[
+    Array, Array, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], NDArray[np.int64]
+]:
     """Strings pulled tight, and what a unit of tension does to the bodies.
 
     Parameters
@@ -140,7 +142,7 @@ def tight(
     -------
     lengths (M,) m; forces (M, bodies, 3) and moments about the origin (M, bodies, 3) per newton;
     contacts (M,); pushes (M,), sum of the contact forces per newton; trace (M, P + bars, 3) m, the
-    points of the strings; traced (M,), how many.
+    points of the strings; traced (M,), how many; on (M, P + bars), the body that each lies on.
     """
     many, most = body.shape
     lengths, pushes = np.zeros(many), np.zeros(many)
@@ -148,6 +150,7 @@ def tight(
     contacts, traced = np.zeros(many, dtype=np.int64), np.zeros(many, dtype=np.int64)
     trace = np.zeros((many, most + MOST_BARS, 3))
     held = np.zeros(most + MOST_BARS, dtype=np.int64)
+    lying = np.full((many, most + MOST_BARS), -1)
     ends = np.zeros((2, 3))
     for m in range(many):
         x, n, bar = trace[m], 0, first_bar[m]
@@ -171,13 +174,15 @@ def tight(
                         contacts[m] += 1
             bar = stop
         traced[m] = n
+        for k in range(n):
+            lying[m, k] = held[k] if held[k] >= 0 else -1 - held[k]
         for k in range(n - 1):
             d = x[k + 1] - x[k]
             length = np.sqrt(d @ d)
             lengths[m] += length
             u = d / length if length > 0.0 else d
             for end in range(2):
-                on = held[k + end] if held[k + end] >= 0 else -1 - held[k + end]
+                on = lying[m, k + end]
                 pull = u if end == 0 else -u
                 forces[m, on] += pull
                 moments[m, on] += np.cross(x[k + end], pull)
@@ -186,4 +191,4 @@ def tight(
                 back, on_ = x[k - 1] - x[k], x[k + 1] - x[k]
                 push = back / np.sqrt(back @ back) + on_ / np.sqrt(on_ @ on_)
                 pushes[m] += np.sqrt(push @ push)
-    return lengths, forces, moments, contacts, pushes, trace, traced
+    return lengths, forces, moments, contacts, pushes, trace, traced, lying
