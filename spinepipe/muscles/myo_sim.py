@@ -36,7 +36,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.muscles import discs
 from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
-from spinepipe.muscles.trunk import BODIES, LEVELS, SLICES, THORAX, Trunk
+from spinepipe.muscles.trunk import BODIES, LEVELS, THORAX, Trunk
 
 PACKAGE = "myo-sim"
 VERSION = "0.2.4"
@@ -279,20 +279,13 @@ def _trunk(placed: _Placed, fascicles: list[Fascicle], head: ET.Element) -> Trun
         disc_tilt=discs.disc_tilts(leaning)[: len(LEVELS)],
         disc_height=discs.disc_heights(),
         disc_area=discs.disc_areas(),
-        vertebrae=_by_slice(0.5 * (ends[1:] + ends[:-1])),
+        vertebrae=discs.vertebra_centres(ends),
         head=_head(placed, head),
         shoulders=np.array([shoulder, shoulder * [1.0, 1.0, -1.0]]),
         arm_length=float(np.linalg.norm(np.diff(arm, axis=0), axis=1).sum()),
         sheath=sheath_of(muscles),
         muscles=muscles,
     )
-
-
-def _by_slice(upwards: Array) -> Array:
-    """(17, 3) of L5 to T1, in the order of SLICES."""
-    names = (*(f"L{n}" for n in range(5, 0, -1)), *(f"T{n}" for n in range(12, 0, -1)))
-    found: Array = upwards[[names.index(name) for name in SLICES]]
-    return found
 
 
 def _head(placed: _Placed, head: ET.Element) -> Array:
