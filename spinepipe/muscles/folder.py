@@ -7,7 +7,7 @@ obliques. An oblique that ends on the body `Abdomen` hangs in the rectus sheath;
 straight from pelvis to ribs, its points on that body left out.
 
 Where the head and the shoulders are, the tables do not say. They lie above T1T2 as in the generic
-male of Allaire 2020 (public OpenSim model, MIT), as far as this spine is longer or shorter.
+male of Allaire 2020 (four lengths of a public OpenSim model), by as much as this spine is longer.
 """
 
 from collections.abc import Mapping
