@@ -1,4 +1,4 @@
-"""Height and area of the discs where a source of geometry has none, and how discs lie.
+"""Discs where a source of geometry has none: their height and area, and how they lie.
 
 Areas are ratios to L4L5 times 1455 mm2 (Ghezelbash 2016, section 3.1, its own model). L1L2 to L5S1:
 pi/4 depth times width, mean of the facing endplates of the Visible Human male (landmarks of the
@@ -11,7 +11,7 @@ height of T12L1 lies midway between its neighbours. They are no ground for accep
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.trunk import LEVELS, SLICES
 
 _L4L5_AREA_MM2 = 1455.0
 
@@ -69,3 +69,11 @@ def disc_tilts(vertebrae: Array) -> Array:
     """
     below = np.concatenate([vertebrae[:1], vertebrae[:-1]])
     return 0.5 * (below + vertebrae)
+
+
+def vertebra_centres(joints: Array) -> Array:
+    """(17, 3) m, T1 to L5, midway between their joints, (18, 3) m, from L5S1 to that above T1."""
+    names = (*(f"L{n}" for n in range(5, 0, -1)), *(f"T{n}" for n in range(12, 0, -1)))
+    middle = 0.5 * (joints[1:] + joints[:-1])
+    found: Array = middle[[names.index(name) for name in SLICES]]
+    return found
