@@ -18,6 +18,8 @@ Discs
     their joints. The tilt that shapes are drawn with is not taken: it was set by eye.
 Sheath
     Obliques that end on the body `Abdomen` hang in the rectus sheath.
+What is added
+    Multifidus of T12 and T11, which the source lacks (`spinepipe.muscles.repeated`).
 Not carried
     The cylinders and ellipsoids that muscles wrap there. Fibre lengths, which its fitted lengths
     do not give.
@@ -38,6 +40,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.muscles import discs
 from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
+from spinepipe.muscles.repeated import multifidus_above_l1
 from spinepipe.muscles.trunk import BODIES, LEVELS, THORAX, Trunk
 
 PACKAGE = "myo-sim"
@@ -147,8 +150,11 @@ def source_of_myo_sim() -> Source:
     places_on_trunk = _Placed(places, places["body", "lumbar5"].pose.origin)
     given = list(_fascicles(roots, places_on_trunk))
     fascicles, remarks = on_their_sides(given)
-    trunk = _trunk(places_on_trunk, fascicles, roots["head"])
-    return Source(trunk, (*remarks, _on_fibres(roots["muscles"], given), discs.REMARK))
+    ends = places_on_trunk.points(_CHAIN)
+    more, remark = multifidus_above_l1(fascicles, ends[: len(LEVELS)], discs.tilts(ends))
+    trunk = _trunk(places_on_trunk, [*fascicles, *more], roots["head"])
+    fibres = _on_fibres(roots["muscles"], given)
+    return Source(trunk, (*remarks, remark, fibres, discs.REMARK))
 
 
 def _texts() -> dict[str, bytes]:

@@ -40,7 +40,7 @@ class Person:
 
     def standing(self, upright: Array) -> "Person":
         """The same person with an upright posture (8, 3) rad, in which muscles are at rest."""
-        poses = posed(self.chain, rotations_of(upright), np.zeros((len(LEVELS), 3)))
+        poses = posed(self.chain, rotations_of(self.chain, upright), np.zeros((len(LEVELS), 3)))
         return replace(self, upright=upright, rest=self.lines.pulls(poses).lengths)
 
 

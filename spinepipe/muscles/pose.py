@@ -71,9 +71,20 @@ class BodyPoses:
         return self.of(body, np.array([mass.at for mass in masses]))
 
 
-def rotations_of(angles: Array) -> Array:
-    """(8, 3, 3) of Z, X', Y'' angles (8, 3): extension, right bending, left rotation."""
-    return np.array([rotation_zxy(*angle) for angle in angles])
+def rotations_of(chain: Chain, angles: Array) -> Array:
+    """(8, 3, 3) of angles (8, 3) rad: extension, right bending, left rotation of every body.
+
+    The pelvis is turned about Z, X', Y''. From body to body the difference of the angles is turned
+    about the axes of the disc between them: a spine that bends sideways bends in every disc and
+    twists in none, however the discs lean.
+    """
+    found = [rotation_zxy(*angles[0])]
+    for disc, (extension, bending, rotation) in zip(
+        chain.discs, np.diff(angles, axis=0), strict=True
+    ):
+        turn = disc @ rotation_of_vector(np.array([bending, rotation, extension])) @ disc.T
+        found.append(found[-1] @ turn)
+    return np.array(found)
 
 
 def posed(chain: Chain, rotations: Array, translations: Array) -> BodyPoses:

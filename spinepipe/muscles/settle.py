@@ -131,7 +131,7 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
 
 def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> Held:
     """Rounds from a spine pressed by `start` (7,) N."""
-    rotations = rotations_of(angles_of(person, task))
+    rotations = rotations_of(person.chain, angles_of(person, task))
     pushes = np.zeros((len(LEVELS), 3))
     pushes[:, 1] = -start
     rounds: list[Round] = []

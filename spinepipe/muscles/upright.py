@@ -56,7 +56,7 @@ def lacking(person: Person, angles: Array) -> Array:
     about the joint below: what all above the joint below lacks less what all above the joint above
     lacks. Joints are as far pressed and as stiff as the weight makes them.
     """
-    rotations = rotations_of(turned(angles))
+    rotations = rotations_of(person.chain, turned(angles))
     pushes = np.zeros((len(LEVELS), 3))
     nothing = Task("upright", None, turned(angles), from_upright=False)
     for _ in range(3):
