@@ -29,3 +29,19 @@ class Ended(StrEnum):
     UNSTABLE = "unstable"
     UNREACHABLE = "unreachable"
     NOT_CONVERGED = "not_converged"
+
+
+class Balanced(StrEnum):
+    """Outcome of finding the muscle forces of a trunk (`spinepipe.muscles.settle`)."""
+
+    CONVERGED = "converged"
+    BEYOND_STRENGTH = "beyond_strength"
+    NOT_CONVERGED = "not_converged"
+    CYCLING = "cycling"
+    TWO_ANSWERS = "two_answers"
+    OUT_OF_REACH = "out_of_reach"
+
+    @property
+    def has_forces(self) -> bool:
+        """Whether forces stand beside it, sound or not."""
+        return self != Balanced.OUT_OF_REACH

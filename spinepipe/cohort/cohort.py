@@ -169,7 +169,10 @@ class _PartDigests:
 
 
 def _by_specimen(table: pd.DataFrame) -> dict[str, bytes]:
+    """A table that names no specimen is everyone's."""
     columns = json.dumps(list(map(str, table.columns))).encode()
+    if "specimen" not in table:
+        return {EVERYONE: hashlib.sha256(columns + table.to_csv(index=False).encode()).digest()}
     return {
         str(specimen): hashlib.sha256(columns + rows.to_csv(index=False).encode()).digest()
         for specimen, rows in table.groupby("specimen", sort=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 
 BODIES = ("S1", "L5", "L4", "L3", "L2", "L1", "T12", "T11")
-"""Caudal to cranial. S1 stands for the pelvis, T11 for all from there up: T1-T11, ribs, head, arms."""
+"""Caudal to cranial; S1 stands for the pelvis, T11 for all above: T1-T11, ribs, head, arms."""
 
 LEVELS = ("L5S1", "L4L5", "L3L4", "L2L3", "L1L2", "T12L1", "T11T12")
 """Joints, caudal to cranial: level k joins body k and body k + 1."""
@@ -48,7 +48,7 @@ class Muscles:
     body : (M, P) index into BODIES of each point, NO_BODY past the end of the path.
     point : (M, P, 3) m, where the points lie in the source's pose.
     wraps : (M,) whether the fascicle lies on the vertebrae that it passes and cannot cross them.
-    in_sheath : (M,) whether one end hangs in the rectus sheath instead of on a bone. Such a path has
+    in_sheath : (M,) whether one end hangs in the rectus sheath and not on a bone. Such a path has
         two points, the first on a bone (ribs: external oblique, pelvis: internal oblique), the
         second in the sheath, written down with the body of the ribs.
     """

@@ -14,14 +14,18 @@ Cells = Sequence[object]
 
 
 def describe(cohort: Cohort, view: SpecimenView) -> str:
-    """All that the cohort says of the specimen, as a report for the terminal."""
+    """All that the cohort says of the specimen alone, as a report for the terminal."""
     parts = [
         _heading(cohort, view),
         _section("joint frames in ground, neutral pose", _frames(cohort, view)),
         _section("bodies", _bodies(view)),
         _section("loads in ground axes, point at the neutral pose", _loads(cohort, view)),
         _section("measured motion", _motion(cohort, view)),
-        *(_section(name, _further(rows, view)) for name, rows in cohort.further.items()),
+        *(
+            _section(name, _further(rows, view))
+            for name, rows in cohort.further.items()
+            if "specimen" in rows
+        ),
     ]
     return "\n\n".join(parts)
 

@@ -8,7 +8,7 @@ import pytest
 from cohort_cases import NAME, Change, add, cell, joints, line, motion, swap, text, without, write
 
 from spinepipe import cohort
-from spinepipe.cohort.columns import TABLES
+from spinepipe.cohort.columns import TABLES, Column, TableForm
 
 LOADS_BY_CYCLE = """\
 specimen,test,cycle,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -151,3 +151,23 @@ def test_digest_follows_the_bytes_that_count(tmp_path: Path) -> None:
     other = cohort.read(write(tmp_path / "3" / NAME, cell("motion.csv", 6, "superior_mm", "0.1")))
     assert plain.digest == noted.digest
     assert plain.digest != other.digest
+
+
+FOR_ALL = TableForm("tasks", "task", (Column("task", "task", "text", required=True),), ("task",))
+OF_EACH = TableForm(
+    "films",
+    "specimen",
+    (Column("specimen", "specimen", "text", required=True), Column("film", "film", "text")),
+    ("specimen",),
+)
+
+
+def test_a_table_without_specimens_is_part_of_what_each_hangs_on(tmp_path: Path) -> None:
+    def digest(name: str, tasks: str, film_of_b: str) -> str:
+        files = text("tasks.csv", tasks), text("films.csv", f"specimen,film\na,1\nb,{film_of_b}\n")
+        folder = write(tmp_path / name / NAME, *files)
+        return cohort.read(folder, (FOR_ALL, OF_EACH)).digest_of(["a"])
+
+    first = digest("one", "task\nlift\n", "1")
+    assert digest("two", "task\nlift\n", "2") == first
+    assert digest("three", "task\nbend\n", "1") != first

@@ -1,0 +1,79 @@
+"""Discs where a source of geometry has none: their height and area, and how they lie.
+
+Areas are ratios to L4L5 times 1455 mm2 (Ghezelbash 2016, section 3.1, its own model). L1L2 to L5S1:
+pi/4 depth times width, mean of the facing endplates of the Visible Human male (landmarks of the
+public lumbar model, BSD-3-Clause). Heights of L1L2 to L5S1: centre of the disc in magnetic
+resonance images of 14 healthy adults (abstract of the study). For T12L1 and T11T12 nobody has read
+a source here: area ratios 0.83 and 0.72 and a height of 6 to 7 mm at T11T12 are from memory, the
+height of T12L1 lies midway between its neighbours. They are no ground for accepting anything.
+"""
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.muscles.trunk import LEVELS, SLICES
+
+_L4L5_AREA_MM2 = 1455.0
+
+_AREA_RATIO = {
+    "L5S1": 1406.0 / 1550.0,
+    "L4L5": 1.0,
+    "L3L4": 1478.0 / 1550.0,
+    "L2L3": 1438.0 / 1550.0,
+    "L1L2": 1457.0 / 1550.0,
+    "T12L1": 0.83,
+    "T11T12": 0.72,
+}
+
+_HEIGHT_MM = {
+    "L5S1": 12.99,
+    "L4L5": 13.82,
+    "L3L4": 12.45,
+    "L2L3": 11.59,
+    "L1L2": 10.0,
+    "T12L1": 8.25,
+    "T11T12": 6.5,
+}
+
+REMARK = (
+    "heights and areas of the discs are not the source's: MRI of 14 adults and one man's endplates "
+    "at L1L2 to L5S1, from memory at T11T12 and T12L1"
+)
+
+
+def disc_heights() -> Array:
+    """(7,) m at the centre, caudal to cranial."""
+    return np.array([_HEIGHT_MM[level] for level in LEVELS]) * 1e-3
+
+
+def disc_areas() -> Array:
+    """(7,) m2, caudal to cranial."""
+    return np.array([_AREA_RATIO[level] for level in LEVELS]) * _L4L5_AREA_MM2 * 1e-6
+
+
+def tilts(joints: Array) -> Array:
+    """(N - 1,) rad, extension of vertebrae whose lower and upper joints are (N, 3) m, upwards.
+
+    A vertebra stands along the line from the joint below it to the joint above it.
+    """
+    x, y, _ = np.diff(joints, axis=0).T
+    found: Array = np.arctan2(-x, y)
+    return found
+
+
+def disc_tilts(vertebrae: Array) -> Array:
+    """(N,) rad, extension of the disc below each of N vertebrae, whose own is given, upwards.
+
+    A disc lies midway between the two vertebrae that it joins. The lowest lies as the vertebra
+    above it, because the sacrum's endplate is not known.
+    """
+    below = np.concatenate([vertebrae[:1], vertebrae[:-1]])
+    return 0.5 * (below + vertebrae)
+
+
+def vertebra_centres(joints: Array) -> Array:
+    """(17, 3) m, T1 to L5, midway between their joints, (18, 3) m, from L5S1 to that above T1."""
+    names = (*(f"L{n}" for n in range(5, 0, -1)), *(f"T{n}" for n in range(12, 0, -1)))
+    middle = 0.5 * (joints[1:] + joints[:-1])
+    found: Array = middle[[names.index(name) for name in SLICES]]
+    return found

@@ -1,0 +1,132 @@
+"""Which muscle forces hold a posture: the least sum of squared stress that balances every joint.
+
+All joints and all axes are balanced at once (Ghezelbash 2016 Eq 1, as cuts through the trunk: what
+is above a joint is in balance about it). The quadratic programme is solved by DAQP, a dual
+active-set method. Where no forces within the muscles' strength balance the joints, a linear
+programme finds the least moment that must be left over, and the forces are the best of those that
+leave no more: nothing is infeasible in silence.
+"""
+
+from dataclasses import dataclass
+
+import daqp
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import csr_matrix, hstack, identity
+
+from spinepipe.effects.contract import Array
+
+STRESS_PA = 1e6
+"""Unit of the unknowns: their size is then near 1."""
+
+SMALL_NM = 1e-6
+"""What a linear programme leaves over by rounding."""
+
+_EQUAL, _SOLVED = 5, (1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """What M fascicles have to do at L rows.
+
+    Attributes
+    ----------
+    arms : (L, M) m, moment at each row of 1 N of each fascicle.
+    required : (L,) N m that muscles have to make.
+    least, most : (M,) N, passive force with whatever tone is asked for; strength.
+    pcsa : (M,) m2.
+    sheath : (2, M) pull of each on the sheath of either side; none of them can be pushed.
+    """
+
+    arms: Array
+    required: Array
+    least: Array
+    most: Array
+    pcsa: Array
+    sheath: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces (M,) N that meet a demand but for a slack (L,) N m; `enough` where none is needed."""
+
+    forces: Array
+    slack: Array
+    enough: bool
+
+
+def least_stress(demand: Demand, start: Array | None = None) -> Forces:
+    """Forces with the least sum of squared stress; `start` (M,) N are near them, if known."""
+    found = _quadratic(demand, demand.required, start)
+    if found is not None:
+        return Forces(found, demand.required - demand.arms @ found, True)
+    lacking = least_slack(demand)
+    met = demand.required - lacking
+    found = _quadratic(demand, met, start, tolerance=1e-5)
+    if found is None:
+        found = _least_slack_forces(demand)
+    return Forces(found, demand.required - demand.arms @ found, False)
+
+
+def _quadratic(
+    demand: Demand, required: Array, start: Array | None, tolerance: float = 0.0
+) -> Array | None:
+    """Forces (M,) N of the quadratic programme, None where there are none."""
+    unit = demand.pcsa * STRESS_PA
+    rows = np.ascontiguousarray(np.vstack([demand.arms * unit, demand.sheath * unit / 1e2]))
+    upper = np.concatenate([demand.most / unit, required + tolerance, np.full(2, 1e30)])
+    lower = np.concatenate([demand.least / unit, required - tolerance, np.zeros(2)])
+    equal = _EQUAL if tolerance == 0.0 else 0
+    sense = np.concatenate(
+        [np.zeros(len(unit)), np.full(len(required), equal), np.zeros(2)]
+    ).astype(np.int32)
+    if start is not None:
+        at = start / unit
+        near = (at >= upper[: len(unit)] - 1e-9) | (at <= lower[: len(unit)] + 1e-9)
+        sense[: len(unit)][near] = 1
+    x, _, flag, _ = daqp.solve(
+        np.eye(len(unit)), np.zeros(len(unit)), rows, upper, lower, sense, iter_limit=4000
+    )
+    return np.clip(x * unit, demand.least, demand.most) if flag in _SOLVED else None
+
+
+def least_slack(demand: Demand) -> Array:
+    """(L,) N m, left over by the forces that leave least over in sum."""
+    return demand.required - demand.arms @ _least_slack_forces(demand)
+
+
+def _least_slack_forces(demand: Demand) -> Array:
+    many = len(demand.required)
+    short = identity(many, format="csr")
+    solved = linprog(
+        np.concatenate([np.zeros(len(demand.pcsa)), np.ones(2 * many)]),
+        A_eq=hstack([csr_matrix(demand.arms), short, -short]),
+        b_eq=demand.required,
+        A_ub=hstack([csr_matrix(-demand.sheath), csr_matrix((2, 2 * many))]),
+        b_ub=np.zeros(2),
+        bounds=[*zip(demand.least, demand.most, strict=True), *[(0.0, None)] * (2 * many)],
+        method="highs",
+    )
+    if solved.x is None:
+        raise ValueError(f"the linear programme of the least slack failed: {solved.message}")
+    found: Array = np.asarray(solved.x[: len(demand.pcsa)])
+    return found
+
+
+def most_along(demand: Demand, direction: Array, start: Array) -> float | None:
+    """Largest t with which forces can make `start` + t `direction`, (L,) N m; None: not even none.
+
+    With the demand itself as the direction and nought as the start it is the factor by which the
+    demand may grow; with a single row it is the moment left there.
+    """
+    many = len(demand.pcsa)
+    solved = linprog(
+        np.concatenate([np.zeros(many), [-1.0]]),
+        A_eq=np.column_stack([demand.arms, -direction]),
+        b_eq=start,
+        A_ub=np.column_stack([-demand.sheath, np.zeros(2)]),
+        b_ub=np.zeros(2),
+        bounds=[*zip(demand.least, demand.most, strict=True), (0.0, 1e4)],
+        method="highs",
+    )
+    return float(solved.x[-1]) if solved.status == 0 else None

@@ -1,0 +1,299 @@
+"""The trunk of the package `myo-sim`: spine, ribs and 210 fascicles of the back and the abdomen.
+
+The package (Apache-2.0) carries MyoTorso as MuJoCo files; its muscles are those of Christophy 2012
+(doi 10.1007/s10237-011-0290-6). Its files are read when they are asked for and nothing of it is
+copied here; MuJoCo itself is not needed.
+
+What is read as what
+    The sacrum's axes are ours (x forwards, y up, z right); how it is turned in MuJoCo's world does
+    not count. The origin of a lumbar body is the joint below it. The thorax is one body there;
+    T12 to T1 are shapes on it, and the place of a shape is the joint below that vertebra. Places of
+    insertions on T9 to T12, beside those of the generic male of Allaire 2020, say that heights are
+    right within 2 mm and that shapes stand 4 to 7 mm too far back; they are taken as they are.
+What goes to T12, what to the thorax
+    Points on the thorax belong to T12 if the fascicle is named for T12 or the twelfth rib, else to
+    T11 and all above. Via points on the thorax lie above the joint T11T12 and so move with T11.
+Discs
+    A disc lies midway between the two vertebrae it joins, which stand along the lines between
+    their joints. The tilt that shapes are drawn with is not taken: it was set by eye.
+Sheath
+    Obliques that end on the body `Abdomen` hang in the rectus sheath.
+Not carried
+    The cylinders and ellipsoids that muscles wrap there. Fibre lengths, which its fitted lengths
+    do not give.
+"""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.muscles import discs
+from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
+from spinepipe.muscles.trunk import BODIES, LEVELS, THORAX, Trunk
+
+PACKAGE = "myo-sim"
+VERSION = "0.2.4"
+"""The version that all this was checked with; another one may have moved points."""
+
+_FOLDER = "myo_sim/models"
+_FILES = {
+    "chain": "torso/assets/myotorso_chain.xml",
+    "tendons": "torso/assets/myotorso_tendon.xml",
+    "muscles": "torso/assets/myotorso_muscle.xml",
+    "head": "head/assets/myohead_rigid_chain.xml",
+    "arm": "arm/assets/myoarm_r_chain.xml",
+}
+
+STRESS_PA = 0.46e6
+"""Maximum force over cross-section in the source: 46 N/cm2, Christophy 2012."""
+
+_GROUPS = {
+    "Ps": "psoas",
+    "rect_abd": "rectus_abdominis",
+    "IL_L": "iliocostalis_lumborum",
+    "IL_R": "iliocostalis_thoracis",
+    "LTpT": "longissimus_thoracis",
+    "LTpL": "longissimus_lumborum",
+    "QL": "quadratus_lumborum",
+    "MF": "multifidus",
+    "EO": "external_oblique",
+    "IO": "internal_oblique",
+}
+
+_BODY = {"sacrum": 0, **{f"lumbar{n}": BODIES.index(f"L{n}") for n in range(1, 6)}}
+_SHEATH = "Abdomen"
+_NAMED_FOR_T12 = re.compile(r"(T12|R12|-12\.\d)_[rl]$")
+
+_CHAIN = (
+    *(("body", f"lumbar{n}") for n in range(5, 0, -1)),
+    *(("geom", f"torso_geom_{n}") for n in range(1, 13)),
+    ("body", "cervical_spine"),
+)
+"""What lies at the joint below L5, L4, ... T1, and at the joint above T1."""
+
+_ARM = ("humerus_r", "ulna_r", "lunate_r", "thirdmc_r")
+"""What lies at shoulder, elbow, wrist and in the palm."""
+
+_CENTRE_OF_HEAD = 0.5
+"""From the vertex down to C7: centre of mass of head and neck, 50.02 % (de Leva 1996, men)."""
+
+Key = tuple[str, str]
+
+
+class NoSource(Exception):
+    """The geometry that a study asks for is not installed, or not as it was checked."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Which files a trunk came from.
+
+    Attributes
+    ----------
+    name, version : of the package. sha256 : over all files that are read.
+    """
+
+    name: str
+    version: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where something of the source lies: on which body, and its pose in the sacrum."""
+
+    body: str
+    pose: Pose
+
+
+def origin_of_myo_sim() -> Origin:
+    """Name, version and digest of the installed files.
+
+    Raises
+    ------
+    NoSource
+        If the package is absent or of another version.
+    """
+    digest = sha256()
+    for name, text in _texts().items():
+        digest.update(name.encode() + b"\0" + sha256(text).digest())
+    return Origin(PACKAGE, VERSION, digest.hexdigest())
+
+
+def trunk_of_myo_sim() -> Trunk:
+    """The trunk alone; see `source_of_myo_sim`."""
+    return source_of_myo_sim().trunk
+
+
+def source_of_myo_sim() -> Source:
+    """The trunk and the remarks on it.
+
+    Raises
+    ------
+    NoSource
+        If the package is absent or of another version.
+    """
+    roots = {name: ET.fromstring(text) for name, text in _texts().items()}
+    places = _places_of(roots)
+    places_on_trunk = _Placed(places, places["body", "lumbar5"].pose.origin)
+    given = list(_fascicles(roots, places_on_trunk))
+    fascicles, remarks = on_their_sides(given)
+    trunk = _trunk(places_on_trunk, fascicles, roots["head"])
+    return Source(trunk, (*remarks, _on_fibres(roots["muscles"], given), discs.REMARK))
+
+
+def _texts() -> dict[str, bytes]:
+    wanted = (
+        f"the trunk is read from the package {PACKAGE}, version {VERSION}; "
+        f"install it with: pip install --no-deps {PACKAGE}=={VERSION}"
+    )
+    try:
+        package = distribution(PACKAGE)
+    except PackageNotFoundError:
+        raise NoSource(f"the package {PACKAGE} is not installed; {wanted}") from None
+    if package.version != VERSION:
+        raise NoSource(f"{PACKAGE} is installed in version {package.version}; {wanted}")
+    paths = {
+        name: Path(str(package.locate_file(f"{_FOLDER}/{file}"))) for name, file in _FILES.items()
+    }
+    if absent := [str(path) for path in paths.values() if not path.is_file()]:
+        raise NoSource(f"files of {PACKAGE} are missing: {', '.join(absent)}; {wanted}")
+    return {name: path.read_bytes() for name, path in paths.items()}
+
+
+def _places_of(roots: Mapping[str, ET.Element]) -> dict[Key, _Place]:
+    """Everything named in the spine, the head and the right arm, seen from the sacrum."""
+    found: dict[Key, _Place] = {}
+    sacrum = roots["chain"].find("body")
+    if sacrum is None:
+        raise NoSource(f"{_FILES['chain']} of {PACKAGE} holds no body")
+    _collect(sacrum, "sacrum", Pose(np.eye(3), np.zeros(3)), found)
+    for root, where in (("head", ("body", "head_attach")), ("arm", ("site", "arm_attach_r"))):
+        _collect(roots[root], where[1], found[where].pose, found)
+    return found
+
+
+def _collect(element: ET.Element, body: str, at: Pose, found: dict[Key, _Place]) -> None:
+    for child in element:
+        if child.tag not in ("body", "site", "geom"):
+            continue
+        name, pose = child.get("name", ""), at @ _pose(child)
+        found[child.tag, name] = _Place(name if child.tag == "body" else body, pose)
+        if child.tag == "body":
+            _collect(child, name, pose, found)
+
+
+def _pose(element: ET.Element) -> Pose:
+    """Where it lies in its parent: MuJoCo's quaternions are w first, its Euler angles intrinsic."""
+    turned = Rotation.identity()
+    if element.get("quat"):
+        turned = Rotation.from_quat(np.roll(_numbers(element, "quat"), -1))
+    elif element.get("euler"):
+        turned = Rotation.from_euler("XYZ", _numbers(element, "euler"))
+    origin = _numbers(element, "pos") if element.get("pos") else np.zeros(3)
+    return Pose(turned.as_matrix(), origin)
+
+
+def _numbers(element: ET.Element, name: str) -> Array:
+    return np.array(element.get(name, "").split(), dtype=float)
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Places in ground, whose origin is the centre of L5S1."""
+
+    places: Mapping[Key, _Place]
+    l5s1: Array
+
+    def point(self, tag: str, name: str) -> Array:
+        """(3,) m."""
+        found: Array = self.places[tag, name].pose.origin - self.l5s1
+        return found
+
+    def points(self, keys: tuple[Key, ...]) -> Array:
+        """(N, 3) m."""
+        return np.array([self.point(*key) for key in keys])
+
+    def body(self, site: str) -> str:
+        """Body that a site lies on."""
+        return self.places["site", site].body
+
+
+def _fascicles(roots: Mapping[str, ET.Element], placed: _Placed) -> Iterator[Fascicle]:
+    actuators = roots["muscles"].iter("general")
+    forces = {one.get("tendon", ""): float(_numbers(one, "gainprm")[2]) for one in actuators}
+    for tendon in roots["tendons"].iter("spatial"):
+        called = tendon.get("name", "")
+        name = called.removesuffix("_tendon")
+        sites = [one.get("site", "") for one in tendon.findall("site")]
+        in_sheath = any(placed.body(site) == _SHEATH for site in sites)
+        if in_sheath:
+            sites.sort(key=lambda site: placed.body(site) == _SHEATH)
+        yield Fascicle(
+            name=name,
+            group=next(group for start, group in _GROUPS.items() if name.startswith(start)),
+            side="right" if name.endswith("_r") else "left",
+            pcsa=forces[called] / STRESS_PA,
+            fibre=0.0,
+            body=tuple(_index(name, placed.body(site)) for site in sites),
+            point=placed.points(tuple(("site", site) for site in sites)),
+            in_sheath=in_sheath,
+        )
+
+
+def _index(fascicle: str, body: str) -> int:
+    if body in _BODY:
+        return _BODY[body]
+    return BODIES.index("T12") if _NAMED_FOR_T12.search(fascicle) else THORAX
+
+
+def _on_fibres(muscles: ET.Element, fascicles: list[Fascicle]) -> str:
+    """How many implied fibre lengths cannot be: MuJoCo scales lengths by two fitted numbers."""
+    lengths = {one.name: one.length for one in fascicles}
+    longer = 0
+    for one in muscles.iter("general"):
+        fitted, scaled = _numbers(one, "lengthrange"), _numbers(one, "gainprm")[:2]
+        longer += float(np.ptp(fitted) / np.ptp(scaled)) > lengths[one.get("name", "")]
+    return (
+        f"the source has no usable fibre lengths: those its fitted lengths imply are longer than "
+        f"the whole muscle in {longer} of {len(fascicles)} fascicles"
+    )
+
+
+def _trunk(placed: _Placed, fascicles: list[Fascicle], head: ET.Element) -> Trunk:
+    ends = placed.points(_CHAIN)
+    leaning = discs.tilts(ends)
+    muscles = muscles_of(fascicles)
+    shoulder = placed.point("body", _ARM[0])
+    arm = placed.points(tuple(("body", name) for name in _ARM))
+    return Trunk(
+        source=f"{PACKAGE} {VERSION}",
+        joints=ends[: len(LEVELS)],
+        disc_tilt=discs.disc_tilts(leaning)[: len(LEVELS)],
+        disc_height=discs.disc_heights(),
+        disc_area=discs.disc_areas(),
+        vertebrae=discs.vertebra_centres(ends),
+        head=_head(placed, head),
+        shoulders=np.array([shoulder, shoulder * [1.0, 1.0, -1.0]]),
+        arm_length=float(np.linalg.norm(np.diff(arm, axis=0), axis=1).sum()),
+        sheath=sheath_of(muscles),
+        muscles=muscles,
+    )
+
+
+def _head(placed: _Placed, head: ET.Element) -> Array:
+    """(3,) m, midway from the joint above T1 to the top of the ellipsoid round the skull."""
+    skull = next(one for one in head.iter("geom") if one.get("name") == "hat_skull_coll")
+    vertex = placed.point("geom", "hat_skull_coll")
+    vertex[1] += _numbers(skull, "size")[1]
+    base = placed.point("body", "cervical_spine")
+    return vertex + _CENTRE_OF_HEAD * (base - vertex)

@@ -1,0 +1,217 @@
+"""Fascicles of a trunk in a posture: how long they are and what they do to the bodies.
+
+Straight lines and via points as the source has them. Fascicles that lie on the vertebrae they pass
+run over bars behind those (`spinepipe.muscles.strings`). A bar stands at a share of the fascicle's
+distance from the vertebra in the source's pose, so that it touches when the trunk bends; and no
+nearer than the arches of the vertebrae let a muscle come, where the source's own line does.
+
+Fascicles that end in the rectus sheath pull along it: the part of an internal oblique's pull along
+the sheath draws the ribs down, that of an external oblique's relieves them, and the sheath cannot
+push (Ghezelbash 2016 2.3). The part across the sheath is left to transversus and pressure.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array
+from spinepipe.muscles.pose import BodyPoses
+from spinepipe.muscles.strings import tight
+from spinepipe.muscles.trunk import (
+    BODIES,
+    NO_BODY,
+    SLICES,
+    THORAX,
+    Muscles,
+    Trunk,
+    body_of,
+)
+
+_SACRUM = 0
+
+
+@dataclass(frozen=True)
+class Standoff:
+    """How far behind a vertebra's centre a fascicle is kept.
+
+    Attributes
+    ----------
+    share : of its distance in the source's pose.
+    least_m : but no less than that.
+    """
+
+    share: float = 0.9
+    least_m: float = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """What keeps strings off the vertebrae, in the source's pose, sorted by muscle and along it.
+
+    Attributes
+    ----------
+    first : (M + 1,) where each muscle's bars begin. leg, body : (B,). at : (B, 3) m.
+    """
+
+    first: NDArray[np.int64]
+    leg: NDArray[np.int64]
+    body: NDArray[np.int64]
+    at: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Pulls:
+    """What each of M fascicles does with 1 N of tension, in a posture.
+
+    Attributes
+    ----------
+    lengths : (M,) m.
+    forces, moments : (M, 8, 3) on every body, N and N m about the origin of ground.
+    contacts : (M,) vertebrae that it lies on. pushes : (M,) sum of its pushes on them.
+    along_sheath : (2, M) pull on the upper end of the right and left sheath, down positive.
+    trace, traced : (M, Q, 3) m and (M,): points of its path, and how many there are.
+    on : (M, Q) body that each of them lies on; those of the sheath count as the ribs'.
+    """
+
+    lengths: Array
+    forces: Array
+    moments: Array
+    contacts: NDArray[np.int64]
+    pushes: Array
+    along_sheath: Array
+    trace: Array
+    traced: NDArray[np.int64]
+    on: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The fascicles of a trunk with all that does not depend on the posture."""
+
+    trunk: Trunk
+    bars: Bars
+
+    @classmethod
+    def of(cls, trunk: Trunk, rule: "Standoff", wrapping: bool = True) -> "Lines":
+        """Lines of a trunk; without wrapping, fascicles run straight from point to point."""
+        chosen = trunk.muscles.wraps if wrapping else np.zeros(len(trunk.muscles), dtype=bool)
+        return cls(trunk, _bars(trunk, chosen, rule))
+
+    def pulls(self, poses: BodyPoses) -> Pulls:
+        """What the fascicles do in a posture."""
+        muscles, bars = self.trunk.muscles, self.bars
+        points = self._points(poses)
+        turned = poses.rotations[bars.body]
+        lengths, forces, moments, contacts, pushes, trace, traced, on = tight(
+            points,
+            muscles.body,
+            bars.first,
+            bars.leg,
+            bars.body,
+            poses.of(bars.body, bars.at),
+            np.ascontiguousarray(turned[:, :, 2]),
+            np.ascontiguousarray(-turned[:, :, 0]),
+            len(BODIES),
+        )
+        along = self._sheath(poses, points, forces, moments)
+        return Pulls(lengths, forces, moments, contacts, pushes, along, trace, traced, on)
+
+    def _points(self, poses: BodyPoses) -> Array:
+        """(M, P, 3) m, points of the paths now; those in the sheath between pelvis and ribs."""
+        muscles = self.trunk.muscles
+        found = poses.of(np.maximum(muscles.body, 0), muscles.point)
+        hung = np.flatnonzero(muscles.in_sheath)
+        if len(hung):
+            point = muscles.point[hung, 1]
+            share = self._share(hung, point)[:, None]
+            low = poses.of(np.full(len(hung), _SACRUM), point)
+            high = poses.of(np.full(len(hung), THORAX), point)
+            found[hung, 1] = (1.0 - share) * low + share * high
+        return found
+
+    def _share(self, hung: NDArray[np.int64], point: Array) -> Array:
+        """How far up the sheath of its side a point lies."""
+        low, high = self.trunk.sheath[_sides(self.trunk.muscles)[hung]].swapaxes(0, 1)
+        line = high - low
+        found: Array = np.einsum("ki,ki->k", point - low, line) / np.einsum("ki,ki->k", line, line)
+        return found
+
+    def _sheath(self, poses: BodyPoses, points: Array, forces: Array, moments: Array) -> Array:
+        """Pull on the sheaths, (2, M); forces and moments of what hangs in them are set."""
+        muscles = self.trunk.muscles
+        along = np.zeros((2, len(muscles)))
+        low, high = (
+            poses.of(np.full(2, body), self.trunk.sheath[:, end])
+            for end, body in ((0, _SACRUM), (1, THORAX))
+        )
+        up = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
+        sides = _sides(muscles)
+        for m in np.flatnonzero(muscles.in_sheath):
+            side, bone = sides[m], muscles.body[m, 0]
+            reach = points[m, 1] - points[m, 0]
+            line = reach / np.linalg.norm(reach)
+            pull = float(line @ up[side])
+            along[side, m] = pull
+            on_ribs = line if bone == THORAX else np.zeros(3)
+            forces[m], moments[m] = 0.0, 0.0
+            forces[m, THORAX] = on_ribs - pull * up[side]
+            moments[m, THORAX] = np.cross(points[m, 0], on_ribs) - np.cross(
+                high[side], pull * up[side]
+            )
+            forces[m, _SACRUM] = -forces[m, THORAX]
+            moments[m, _SACRUM] = -moments[m, THORAX]
+        return along
+
+
+def _sides(muscles: Muscles) -> NDArray[np.int64]:
+    return np.array([0 if side == "right" else 1 for side in muscles.sides])
+
+
+def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
+    """Bars of the chosen muscles."""
+    rows: list[tuple[int, int, int, Array]] = []
+    for m in np.flatnonzero(chosen):
+        body, point = trunk.muscles.body[m], trunk.muscles.point[m]
+        for leg in range(int(np.sum(body != NO_BODY)) - 1):
+            found = _on_the_way(trunk, body[leg : leg + 2], point[leg : leg + 2], rule)
+            rows += [(int(m), leg, *one) for one in found]
+    owners = np.array([row[0] for row in rows], dtype=np.int64)
+    return Bars(
+        np.searchsorted(owners, np.arange(len(trunk.muscles) + 1)),
+        np.array([row[1] for row in rows], dtype=np.int64),
+        np.array([row[2] for row in rows], dtype=np.int64),
+        np.array([row[3] for row in rows]).reshape(-1, 3),
+    )
+
+
+def _on_the_way(
+    trunk: Trunk, body: NDArray[np.int64], point: Array, rule: Standoff
+) -> list[tuple[int, Array]]:
+    """Vertebrae between the ends of a leg, (2,) and (2, 3), from its first to its second: the body
+    each belongs to, and where its bar stands.
+
+    A bar stands at the height of the vertebra's centre, as far to the side as the string, and
+    behind the centre across the spine. Vertebrae that an end is fixed to are not passed, but those
+    of the thorax, of which there are several, are where they lie below its point.
+    """
+    low, high = sorted(body)
+    found = []
+    for number, vertebra in enumerate(SLICES):
+        centre, of = trunk.vertebrae[number], body_of(vertebra)
+        share = (centre[1] - point[0, 1]) / (point[1, 1] - point[0, 1])
+        if not (low < of < high or of == high == THORAX != low) or not 0.0 < share < 1.0:
+            continue
+        string = point[0] + share * (point[1] - point[0])
+        back = -_forwards(trunk, number)
+        behind = max(rule.share * float((string - centre) @ back), rule.least_m)
+        found.append((share, of, centre + behind * back + np.array([0.0, 0.0, string[2]])))
+    return [(of, at) for _, of, at in sorted(found, key=lambda one: one[0])]
+
+
+def _forwards(trunk: Trunk, number: int) -> Array:
+    """(3,) across the spine at a vertebra, in the source's pose: from the centres about it."""
+    line = trunk.vertebrae[max(number - 1, 0)] - trunk.vertebrae[min(number + 1, len(SLICES) - 1)]
+    across = np.array([line[1], -line[0], 0.0])
+    found: Array = across / np.linalg.norm(across)
+    return found

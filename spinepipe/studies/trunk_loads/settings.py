@@ -1,0 +1,178 @@
+"""What a study of trunk loads asks."""
+
+from typing import Annotated, Literal, get_args
+
+from pydantic import BaseModel, Field
+
+from spinepipe.studies.parts import FORM, EachOnce
+from spinepipe.studies.study import Study
+
+Geometry = Literal["myo_sim", "cohort"]
+Curves = Literal["segment", "disc_heuer", "disc_jaramillo", "disc_han"]
+TrunkAngle = Literal["measured_at_thorax", "rotation_of_t11"]
+Factor = Literal[
+    "height_cm",
+    "bmi",
+    "age_years",
+    "hand_anterior_mm",
+    "pelvis_extension_deg",
+    "disc_area",
+    "pcsa",
+    "passive_rotation",
+    "passive_muscle",
+    "pressure_kpa",
+    "largest_stress_mpa",
+]
+
+_Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Passive(BaseModel):
+    """Joints and stretched muscles, before anyone pulls."""
+
+    model_config = FORM
+
+    curves: Curves = Field(
+        default="segment",
+        description="moment-rotation curves: segment (Schmidt 1998) or discs alone (Heuer 2007, "
+        "Jaramillo, Han 2010)",
+    )
+    rotation_factor: float = Field(
+        default=1.0, gt=0, le=10, description="factor of all moments of joints"
+    )
+    t11t12_bending_factor: float = Field(
+        default=1.2, gt=0, le=10, description="of T11T12, for the rib cage (Ghezelbash 2016 2.1)"
+    )
+    joints_behind_mm: float = Field(
+        default=4.0,
+        ge=0,
+        le=20,
+        description="how far joints lie behind their centres (Ghezelbash 2016 2.1)",
+    )
+    muscle_factor: float = Field(
+        default=1.0, ge=0, le=10, description="factor of the force of stretched muscles"
+    )
+    strain_at_full_force: float = Field(
+        default=0.6, gt=0.05, le=2, description="stretch at which it is the largest active force"
+    )
+    shape: float = Field(default=5.0, gt=0.1, le=20, description="shape of the curve (Thelen 2003)")
+    stiffens_under_compression: bool = Field(
+        default=True, description="whether compression stiffens joints (Gardner-Morse 2004)"
+    )
+
+
+class Wrapping(BaseModel):
+    """How muscles that lie on vertebrae run round them."""
+
+    model_config = FORM
+
+    depth: float = Field(
+        default=0.9,
+        gt=0.3,
+        le=1,
+        description="share of a fascicle's distance from the vertebra, in the source's pose, below "
+        "which it cannot come",
+    )
+
+
+class Solving(BaseModel):
+    """When forces and geometry have settled."""
+
+    model_config = FORM
+
+    change: float = Field(
+        default=0.01, gt=0, le=0.2, description="change of forces over their size, less than"
+    )
+    residual_nm: float = Field(
+        default=0.1, gt=0, le=10, description="moment out of balance, less than"
+    )
+    most_iterations: int = Field(default=60, ge=2, le=1000, description="rounds at most")
+    stiffness_gain: float = Field(
+        default=5.0,
+        ge=0,
+        le=200,
+        description="q of a muscle's stiffness q force / length, in the question of stability",
+    )
+    strength: bool = Field(
+        default=True, description="whether to find the strength left at every level"
+    )
+
+
+class Spread(BaseModel):
+    """How far one input may be off: mean and SD of a normal distribution."""
+
+    model_config = FORM
+
+    sd: float = Field(gt=0, le=1e4, description="SD, in the unit of the factor; of factors, of 1")
+
+
+class Uncertain(BaseModel):
+    """Samples of persons and models."""
+
+    model_config = FORM
+
+    factors: dict[Factor, Spread] = Field(
+        default={
+            "height_cm": Spread(sd=1.0),
+            "bmi": Spread(sd=0.5),
+            "hand_anterior_mm": Spread(sd=50.0),
+            "pelvis_extension_deg": Spread(sd=4.0),
+            "disc_area": Spread(sd=0.1),
+            "pcsa": Spread(sd=0.15),
+            "passive_rotation": Spread(sd=0.25),
+            "passive_muscle": Spread(sd=0.3),
+            "largest_stress_mpa": Spread(sd=0.1),
+        },
+        description="inputs that are drawn, with their spread",
+    )
+    tasks: EachOnce[str] = Field(default=(), description="tasks that are sampled")
+    specimens: EachOnce[str] = Field(
+        default=(), description="persons that are sampled; none named: the first"
+    )
+    samples: int = Field(
+        default=32, ge=4, le=100_000, description="base samples; runs are (factors + 2) times that"
+    )
+    samples_per_target: int = Field(default=64, ge=1, le=10_000, description="runs in one batch")
+    seed: int = Field(default=1, ge=0, description="seed of the design")
+
+
+class Volunteer(BaseModel):
+    """The person whose pressures were measured, and what may be fitted to them."""
+
+    model_config = FORM
+
+    specimen: str = Field(description="person of the cohort that stands for the volunteer")
+    tuned: EachOnce[Literal["passive_rotation", "disc_area", "trunk_mass_ahead"]] = Field(
+        default=("passive_rotation", "disc_area"),
+        description="numbers that are fitted, two at most",
+        max_length=2,
+    )
+
+
+class TrunkLoads(Study):
+    """What tasks ask of persons' trunks."""
+
+    kind: Literal["trunk_loads"]
+    geometry: Geometry = Field(
+        default="myo_sim", description="where geometry and muscles are from: package or cohort"
+    )
+    trunk_angle: TrunkAngle = Field(
+        default="rotation_of_t11", description="what a task's rotation of the trunk means"
+    )
+    passive: Passive = Field(default=Passive(), description="joints and stretched muscles")
+    wrapping: Wrapping = Field(default=Wrapping(), description="muscles on vertebrae")
+    solving: Solving = Field(default=Solving(), description="when forces have settled")
+    disc_area_factor: float = Field(default=1.0, gt=0, le=5, description="factor of all disc areas")
+    drawn_tasks: EachOnce[str] = Field(
+        default=(), description="tasks whose muscles are drawn in 3-D; none named: the first"
+    )
+    uncertain: Uncertain = Field(default=Uncertain(), description="samples of persons and models")
+    volunteer: Volunteer | None = Field(
+        default=None, description="the person whose pressures were measured"
+    )
+    simplified_tasks: EachOnce[str] = Field(
+        default=(), description="tasks on which wrong simplifications are tried; none named: all"
+    )
+
+
+FACTORS: tuple[Factor, ...] = get_args(Factor)

@@ -1,0 +1,279 @@
+"""Whatever is wrong with subjects, tasks and muscles is told with file, row, found and remedy."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from cohort_cases import Change, Files, add, both, cell, line, swap, text, without
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.cohort.text import Document
+from spinepipe.problems import InputError, Problem
+from spinepipe.studies.trunk_loads.checks import check_trunk
+from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+
+YAML, SUBJECT, TASK = "cohort.yaml", "subjects.csv", "tasks.csv"
+POINTS, MUSCLES, SCALING = "muscles.csv", "muscle_parameters.csv", "muscle_regressions.csv"
+NAME = "small"
+
+TASK_HEADER = (
+    "task,number,counted_from,trunk_extension_deg,trunk_right_bending_deg,pelvis_extension_deg,"
+    "pelvis_right_bending_deg,T11_extension_deg,T12_extension_deg,L1_extension_deg,"
+    "L2_extension_deg,L3_extension_deg,L4_extension_deg,L5_extension_deg,S1_extension_deg,"
+    "hand_load_kg,hands_anterior_mm,hands_superior_mm,hands_right_mm,holding,push_anterior_n,"
+    "push_extension_nm,applied_at,applied_as,intra_abdominal_pressure_kpa,largest_stress_mpa,tone,"
+    "tone_percent"
+)
+
+VALID: Files = {
+    YAML: "cohort: small\ntitle: two persons\nsource: written for the tests\n"
+    "vertebrae: [S1, L5, L4, L3, L2, L1, T12, T11]\ngravity: false\n",
+    "specimens.csv": "specimen\na\nb\n",
+    SUBJECT: "specimen,sex,age_years,height_cm,mass_kg\na,male,45,173.9,72\nb,female,45,163,60\n",
+    TASK: f"{TASK_HEADER}\n"
+    "standing,1,,0,,,,,,,,,,,,,,,,,,,,,,,,\n"
+    "bend,4,,-50,,,,,,,,,,,,,,,,,,,,,,,,\n"
+    "lift,3,source,-2,,4.9,,-2,4,10.9,15.8,14.5,9.9,4.9,4.9,19.8,580,300,0,both,,,,,,1.0,stated,2\n"
+    "pull,10,source,9,,16,,,,,,,,,,,,,,,,-242,T8,force,10,1.0,,\n",
+    POINTS: "muscle,point,body,x_mm,y_mm,z_mm\n"
+    "LD_r,1,S1,-60,0,40\nLD_r,2,T7,-50,300,10\n"
+    "LD_l,1,S1,-60,0,-40\nLD_l,2,T7,-50,300,-10\n"
+    "LTpT_T12_l,1,S1,-50,0,-20\nLTpT_T12_l,2,T12,-50,200,-30\n",
+    MUSCLES: "muscle,group,side,pcsa_mm2,max_isometric_force_n\n"
+    "LD_r,latissimus,right,100,\nLD_l,latissimus,left,100,\nLTpT_T12_l,longissimus,left,,60\n",
+    SCALING: "muscle,level,factor\nlatissimus,L3L4,1.0\nlongissimus,T12,1.1\n",
+}
+"""Two persons, four tasks, three muscles; tasks begin in line 2."""
+
+
+def _key(name: str) -> Column:
+    return Column(name, name, "text", required=True)
+
+
+FORMS = (
+    SUBJECTS,
+    TASKS,
+    TableForm(
+        "muscles",
+        "muscle x point",
+        (
+            *map(_key, ("muscle", "point", "body")),
+            *(Column(name, name) for name in ("x_mm", "y_mm", "z_mm")),
+        ),
+        ("muscle", "point"),
+    ),
+    TableForm(
+        "muscle_parameters",
+        "muscle",
+        (
+            *map(_key, ("muscle", "group", "side")),
+            *(Column(name, name) for name in ("pcsa_mm2", "max_isometric_force_n")),
+        ),
+        ("muscle",),
+    ),
+    TableForm(
+        "muscle_regressions",
+        "muscle x level",
+        (_key("muscle"), _key("level"), Column("factor", "factor")),
+        ("muscle", "level"),
+    ),
+)
+"""Those of muscles stand for what a cohort may bring along, whatever else their columns be."""
+
+
+def told(folder: Path, *changes: Change, **asked: object) -> list[Problem]:
+    """What is said of the cohort, changed, by the reader or else by the checks of the kind."""
+    files = dict(VALID)
+    for change in changes:
+        change(files)
+    folder = folder / NAME
+    folder.mkdir()
+    for name, content in files.items():
+        assert isinstance(content, str)
+        (folder / name).write_text(content)
+    try:
+        cohort = cohorts.read(folder, FORMS)
+    except InputError as error:
+        return list(error.problems)
+    study = TrunkLoads.model_validate(
+        {"study": "s", "kind": "trunk_loads", "cohort": NAME, **asked}
+    )
+    return list(check_trunk(Document("s.yaml", {}, {}), study, cohort))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One fault, where it is told, what of it, and a piece of the remedy."""
+
+    about: str
+    change: Change
+    file: str
+    row: int | None
+    column: str | None
+    found: str
+    remedy: str
+
+
+def task(column: str, new: str, row: int = 2) -> Change:
+    """One cell of tasks."""
+    return cell(TASK, row, column, new)
+
+
+def person(column: str, new: str) -> Change:
+    """One cell of the first subject."""
+    return cell(SUBJECT, 2, column, new)
+
+
+def hands(*mm: str) -> Change:
+    """Where the hands of the task bend are."""
+    names = ("hands_anterior_mm", "hands_superior_mm", "hands_right_mm")
+    return both(*(task(name, new, 3) for name, new in zip(names, mm, strict=True)))
+
+
+STRESS, PRESSURE = "largest_stress_mpa", "intra_abdominal_pressure_kpa"
+TRUNK, PELVIS = "trunk_extension_deg", "pelvis_extension_deg"
+BENT, PELVIS_BENT = "trunk_right_bending_deg", "pelvis_right_bending_deg"
+STANDING_AGAIN = "upright,1,,0,,,,,,,,,,,,,,,,,,,,,,,,"
+MIRRORED = swap(
+    POINTS, "-50,0,-20\nLTpT_T12_l,2,T12,-50,200,-30", "-50,0,20\nLTpT_T12_l,2,T12,-50,200,30"
+)
+ALL_MIRRORED = text(
+    POINTS,
+    "muscle,point,body,x_mm,y_mm,z_mm\nLD_r,1,S1,0,0,-4\nLD_r,2,T7,0,0,-1\nLD_l,1,S1,0,0,4\nLD_l,2,T7,0,0,1\nLTpT_T12_l,1,S1,0,0,2\nLTpT_T12_l,2,T12,0,0,3\n",
+)
+
+# One fault a line, however long: this is a table to look things up in.
+# fmt: off
+SUBJECT_CASES = [
+    Case("height in m", person("height_cm", "1.74"), SUBJECT, 2, "height_cm", "a is 1.74 cm tall", "in m? write 174"),
+    Case("height in mm", person("height_cm", "1739"), SUBJECT, 2, "height_cm", "1739 cm", "in mm? write 173.9"),
+    Case("weight in N", person("mass_kg", "706"), SUBJECT, 2, "mass_kg", "a weighs 706 kg", "weight in N? write 72.0"),
+    Case("BMI 12", person("mass_kg", "36.3"), SUBJECT, 2, "mass_kg", "BMI of 12.0", "correct height or mass"),
+    Case("BMI 60", person("mass_kg", "181.4"), SUBJECT, 2, "mass_kg", "BMI of 60.0", "correct height or mass"),
+    Case("unknown sex", person("sex", "Femal"), SUBJECT, 2, "sex", "'Femal'", "did you mean 'female'"),
+    Case("sex by letter", person("sex", "m"), SUBJECT, 2, "sex", "'m'", "did you mean 'male'"),
+    Case("subject missing", line(SUBJECT, 3, None), SUBJECT, None, "specimen", "no row of 'b'", "add sex, age"),
+    Case("subject twice", add(SUBJECT, "a,male,45,174,72"), SUBJECT, 4, None, "again a", "the other is line 2"),
+    Case("unknown subject", add(SUBJECT, "c,male,45,174,72"), SUBJECT, 4, "specimen", "'c'", "specimens.csv"),
+    Case("no tasks", without(TASK), "s.yaml", None, "cohort", "without tasks.csv", "add tasks.csv"),
+]
+
+POSTURE_CASES = [
+    Case("no posture", task(TRUNK, ""), TASK, 2, None, "task standing: no posture", "0 for upright"),
+    Case("flexion positive", task(TRUNK, "50", 3), TASK, 3, TRUNK, "50 backwards", "write -50: extension is positive"),
+    Case("backwards, pelvis unknown", task(TRUNK, "20", 3), TASK, 3, PELVIS, "20 deg backwards", "write the pelvis' rotation"),
+    Case("farther than measured", task(TRUNK, "-125", 3), TASK, 3, PELVIS, "125 deg forwards", "write the pelvis' rotation"),
+    Case("pelvis alone", task(PELVIS_BENT, "2", 3), TASK, 3, BENT, "nothing is said of the trunk", "0 where it stays"),
+    Case("a body left out", task("L3_extension_deg", "", 4), TASK, 4, "L3_extension_deg", "no rotation of L3", "fill or empty"),
+    Case("rotations do not sum", task(TRUNK, "-20", 4), TASK, 4, TRUNK, "-20, while the bodies come to -2 at T11", "leave trunk_extension_deg empty"),
+    Case("another pelvis", task(PELVIS, "9", 4), TASK, 4, PELVIS, "9, while the bodies come to 4.9 at S1", "correct the rotations"),
+    Case("another origin", task("counted_from", "uprigth"), TASK, 2, "counted_from", "'uprigth'", "did you mean 'upright'"),
+    Case("number 13", task("number", "13"), TASK, 2, "number", "'13'", "correct it"),
+    Case("task twice", add(TASK, VALID[TASK].splitlines()[1]), TASK, 6, None, "again standing", "the other is line 2"),
+    Case("same under another name", add(TASK, STANDING_AGAIN), TASK, 6, None, "task upright: the same as task standing", "delete or correct one"),
+    Case("name of no file", task("task", "stand/ing"), TASK, 2, "task", "stand/ing", "rename"),
+]
+
+HANDS_CASES = [
+    Case("load in N", task("hand_load_kg", "194", 4), TASK, 4, "hand_load_kg", "194 kg", "in N? write 19.8"),
+    Case("hands in m", hands("0.37", "0.3", "0"), TASK, 3, "hands_anterior_mm", "0.37 mm from L5S1", "in m? multiply by 1000"),
+    Case("half a place", hands("370", "", "0"), TASK, 3, "hands_superior_mm", "no hands_superior_mm", "hands hang"),
+    Case("out of reach", task("hands_anterior_mm", "1200", 4), TASK, 4, "hands_anterior_mm", "of the tallest, 1.739 m", "centre of L5S1"),
+    Case("third hand", task("holding", "rigth", 4), TASK, 4, "holding", "'rigth'", "did you mean 'right'"),
+]
+
+EXERTION_CASES = [
+    Case("unknown vertebra", task("applied_at", "T13", 5), TASK, 5, "applied_at", "unknown vertebra 'T13'", "did you mean"),
+    Case("pushed in the loins", task("applied_at", "L3", 5), TASK, 5, "applied_at", "unknown vertebra 'L3'", "thorax"),
+    Case("pushed nowhere", task("applied_at", "", 5), TASK, 5, "applied_at", "push_extension_nm and no vertebra", "write the vertebra"),
+    Case("force without moment", both(task("push_extension_nm", "", 5), task("push_anterior_n", "50", 5)), TASK, 5, "applied_as", "no moment", "write the moment"),
+    Case("negative pressure", task(PRESSURE, "-10", 5), TASK, 5, PRESSURE, "'-10'", "check its unit and its sign"),
+    Case("pressure in Pa", task(PRESSURE, "10000", 5), TASK, 5, PRESSURE, "'10000'", "check its unit"),
+    Case("stress in N/cm2", task(STRESS, "60", 5), TASK, 5, STRESS, "60 MPa", "in N/cm2? write 0.6"),
+    Case("no stress", task(STRESS, "0", 5), TASK, 5, STRESS, "0 MPa", "leave it empty for 0.6"),
+    Case("percentage without tone", task("tone_percent", "5"), TASK, 2, "tone_percent", "5 % and tone none", "write stated"),
+    Case("tone without percentage", task("tone_percent", "", 4), TASK, 4, "tone_percent", "no percentage", "write the least"),
+    Case("unknown tone", task("tone", "stabel"), TASK, 2, "tone", "'stabel'", "did you mean 'stable'"),
+]
+
+MUSCLE_CASES = [
+    Case("one point", line(POINTS, 7, None), POINTS, 6, "muscle", "LTpT_T12_l has one point", "add its other end"),
+    Case("unknown body", cell(POINTS, 3, "body", "humerus"), POINTS, 3, "body", "unknown body 'humerus'", "belong to T11"),
+    Case("mirrored twice", MIRRORED, POINTS, 6, "z_mm", "LTpT_T12_l is left and lies at z 20 to 30 mm", "mirrored twice?"),
+    Case("all mirrored", ALL_MIRRORED, POINTS, None, "z_mm", "every muscle on the other side", "change the sign of z"),
+    Case("PCSA 0", cell(MUSCLES, 2, "pcsa_mm2", "0"), MUSCLES, 2, "pcsa_mm2", "LD_r has 0", "delete the muscle"),
+    Case("force 0", cell(MUSCLES, 4, "max_isometric_force_n", "0"), MUSCLES, 4, "max_isometric_force_n", "LTpT_T12_l has 0", "delete the muscle"),
+    Case("no size", cell(MUSCLES, 2, "pcsa_mm2", ""), MUSCLES, 2, "pcsa_mm2", "neither of LD_r", "fill one"),
+    Case("no side", cell(MUSCLES, 2, "side", "R"), MUSCLES, 2, "side", "'R'", "write right or left"),
+    Case("points alone", line(MUSCLES, 4, None), POINTS, 6, "muscle", "LTpT_T12_l is not in muscle_parameters.csv", "add it to muscle_parameters.csv"),
+    Case("parameters alone", add(MUSCLES, "psoas_r,psoas,right,100,"), MUSCLES, 5, "muscle", "psoas_r is not in muscles.csv", "add it to muscles.csv"),
+    Case("unknown level", cell(SCALING, 2, "level", "L4L3"), SCALING, 2, "level", "unknown level 'L4L3'", "did you mean"),
+]
+# fmt: on
+
+CASES = [*SUBJECT_CASES, *POSTURE_CASES, *HANDS_CASES, *EXERTION_CASES, *MUSCLE_CASES]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.about.replace(" ", "-"))
+def test_one_fault_is_told_once_with_place_and_remedy(case: Case, tmp_path: Path) -> None:
+    (problem,) = told(tmp_path, case.change)
+    file = case.file if case.file == "s.yaml" else f"{NAME}/{case.file}"
+    assert (problem.file, problem.row, problem.column) == (file, case.row, case.column)
+    assert case.found in problem.found
+    assert case.remedy in problem.remedy
+    assert problem.allowed
+
+
+def test_a_sound_cohort_is_not_blamed(tmp_path: Path) -> None:
+    assert told(tmp_path) == []
+
+
+def test_muscles_need_not_come_along(tmp_path: Path) -> None:
+    assert told(tmp_path, without(POINTS), without(MUSCLES), without(SCALING)) == []
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    found = told(
+        tmp_path,
+        person("height_cm", "1.74"),
+        task("hand_load_kg", "194", 4),
+        cell(MUSCLES, 2, "pcsa_mm2", "0"),
+    )
+    assert [problem.file.partition("/")[2] for problem in found] == [SUBJECT, TASK, MUSCLES]
+
+
+def test_an_impossible_height_leaves_no_judgement_of_reach(tmp_path: Path) -> None:
+    far = task("hands_anterior_mm", "1200", 4)
+    found = told(tmp_path, far, person("height_cm", "1.74"), cell(SUBJECT, 3, "height_cm", "1.6"))
+    assert {problem.column for problem in found} == {"height_cm"}
+
+
+def test_reach_moves_with_the_trunk(tmp_path: Path) -> None:
+    """Hands 900 mm ahead and 200 mm below L5S1 are too far from upright shoulders; bent, not."""
+    place = hands("900", "-200", "0")
+    assert told(tmp_path, place) == []
+    (tmp_path / "upright").mkdir()
+    (problem,) = told(tmp_path / "upright", place, task(TRUNK, "0", 3))
+    assert problem.column == "hands_anterior_mm"
+
+
+def test_the_last_measured_bend_depends_on_what_the_angle_means(tmp_path: Path) -> None:
+    """T11 turns by 113.2 of the 121 deg that the thorax does (Tafazzol 2014)."""
+    bend = task(TRUNK, "-120", 3)
+    assert told(tmp_path, bend, trunk_angle="rotation_of_t11")
+    (tmp_path / "thorax").mkdir()
+    assert told(tmp_path / "thorax", bend, trunk_angle="measured_at_thorax") == []
+
+
+def test_names_in_the_study_are_looked_up(tmp_path: Path) -> None:
+    found = told(
+        tmp_path,
+        drawn_tasks=["bent"],
+        uncertain={"specimens": ["c"], "tasks": ["standing"]},
+        volunteer={"specimen": "aa"},
+    )
+    keys = ["drawn_tasks.0", "uncertain.specimens.0", "volunteer.specimen"]
+    assert [problem.column for problem in found] == keys
+    assert "did you mean 'bend'" in found[0].remedy
