@@ -3,6 +3,7 @@
 from dataclasses import fields, replace
 from math import exp
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -297,3 +298,19 @@ def test_a_person_beyond_a_linear_regression_is_told(tmp_path: Path) -> None:
     light = replace(REFERENCE, mass_kg=45.0)
     with pytest.raises(ValueError, match=r"pcsa for multifidus is -30\.5 .* 45\.0 kg"):
         scaled(made_up_trunk(), light, REFERENCE, known)
+
+
+@pytest.mark.parametrize(
+    ("sex", "age", "height_cm", "mass_kg", "area_cm2"),
+    [("female", 28.769, 164.872, 60.600, 364.225), ("male", 31.668, 177.745, 78.145, 491.031)],
+)
+def test_the_rib_cage_of_mean_persons_is_the_mean_rib_cage(
+    sex: Literal["male", "female"], age: float, height_cm: float, mass_kg: float, area_cm2: float
+) -> None:
+    """Least squares with sex as predictor runs through both groups' means (Heinz 2003).
+
+    Means are rounded to 0.001 and coefficients to six figures: 0.02 cm2 at most.
+    """
+    mean = Subject(sex, age, height_cm / 100.0, mass_kg)
+    found = packaged("ct_trends").row("rib_cage_area").value(mean)
+    assert found == pytest.approx(area_cm2, abs=0.02)
