@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import STANDARD_GRAVITY
-from spinepipe.muscles.diaphragm import AHEAD_M
+from spinepipe.muscles.diaphragm import diaphragm_load
 from spinepipe.muscles.masses import arm_loads
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import BodyPoses
@@ -103,8 +103,7 @@ def _exert(found: _Sum, trunk: Trunk, exertion: Exertion, poses: BodyPoses) -> N
 
 def _press(found: _Sum, person: Person, pressure: float, poses: BodyPoses) -> None:
     """Pressure on the diaphragm lifts the ribs ahead of T11 and presses the pelvis down."""
-    t11 = person.lines.trunk.vertebrae[SLICES.index("T11")]
-    at = poses.of(np.array(THORAX), t11 + np.array([AHEAD_M, 0.0, 0.0]))
-    lift = pressure * person.diaphragm_m2 * poses.rotations[THORAX][:, 1]
-    found.push(THORAX, lift, at)
-    found.push(_SACRUM, -lift, at)
+    t11 = poses.of(np.array(THORAX), person.lines.trunk.vertebrae[SLICES.index("T11")])
+    lift = diaphragm_load(pressure, person.diaphragm_m2, t11, poses.rotations[THORAX])
+    found.push(THORAX, lift.force, lift.at)
+    found.push(_SACRUM, -lift.force, lift.at)

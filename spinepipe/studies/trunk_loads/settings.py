@@ -8,7 +8,7 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 Geometry = Literal["myo_sim", "cohort"]
-Curves = Literal["segment", "disc_heuer", "disc_jaramillo", "disc_han"]
+Curves = Literal["mixed", "segment", "disc_heuer", "disc_jaramillo", "disc_han"]
 TrunkAngle = Literal["measured_at_thorax", "rotation_of_t11"]
 Factor = Literal[
     "height_cm",
@@ -20,6 +20,7 @@ Factor = Literal[
     "pcsa",
     "passive_rotation",
     "passive_muscle",
+    "trunk_mass_ahead",
     "pressure_kpa",
     "largest_stress_mpa",
 ]
@@ -33,9 +34,9 @@ class Passive(BaseModel):
     model_config = FORM
 
     curves: Curves = Field(
-        default="segment",
-        description="moment-rotation curves: segment (Schmidt 1998) or discs alone (Heuer 2007, "
-        "Jaramillo, Han 2010)",
+        default="mixed",
+        description="moment-rotation curves: segment (Schmidt 1998), discs alone (Heuer 2007, "
+        "Jaramillo, Han 2010), or mixed: sideways the disc of Heuer, else the segment",
     )
     rotation_factor: float = Field(
         default=1.0, gt=0, le=10, description="factor of all moments of joints"
@@ -72,6 +73,13 @@ class Wrapping(BaseModel):
         le=1,
         description="share of a fascicle's distance from the vertebra, in the source's pose, below "
         "which it cannot come",
+    )
+    least_mm: float = Field(
+        default=50.0,
+        ge=0,
+        le=90,
+        description="but no nearer than this: the lever arm commonly taken for the erector spinae "
+        "(Gungor 2013, abstract)",
     )
 
 
@@ -142,7 +150,7 @@ class Volunteer(BaseModel):
     model_config = FORM
 
     specimen: str = Field(description="person of the cohort that stands for the volunteer")
-    tuned: EachOnce[Literal["passive_rotation", "disc_area", "trunk_mass_ahead"]] = Field(
+    tuned: EachOnce[Factor] = Field(
         default=("passive_rotation", "disc_area"),
         description="numbers that are fitted, two at most",
         max_length=2,
@@ -156,8 +164,21 @@ class TrunkLoads(Study):
     geometry: Geometry = Field(
         default="myo_sim", description="where geometry and muscles are from: package or cohort"
     )
+    source_stress_mpa: float | None = Field(
+        default=None,
+        gt=0,
+        le=5,
+        description="largest force over cross-section in a cohort's muscles, MPa, where only "
+        "forces are given",
+    )
+    regressions: str = Field(
+        default="ct_trends",
+        min_length=1,
+        description="how size follows from sex, age, height and mass: ct_trends, constant_density, "
+        "or a CSV file in the cohort's folder",
+    )
     trunk_angle: TrunkAngle = Field(
-        default="rotation_of_t11", description="what a task's rotation of the trunk means"
+        default="measured_at_thorax", description="what a task's rotation of the trunk means"
     )
     passive: Passive = Field(default=Passive(), description="joints and stretched muscles")
     wrapping: Wrapping = Field(default=Wrapping(), description="muscles on vertebrae")

@@ -1,0 +1,203 @@
+"""From a study and its cohort to persons that can hold tasks, and to the tasks as they are varied."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from spinepipe.anatomy import published
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.muscles.beam import Stiffening, stiffening, t11t12_beside_t12l1
+from spinepipe.muscles.diaphragm import diaphragm_area
+from spinepipe.muscles.fascicles import Source
+from spinepipe.muscles.folder import Tables, source_of_folder
+from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
+from spinepipe.muscles.masses import masses_of
+from spinepipe.muscles.myo_sim import origin_of_myo_sim, source_of_myo_sim
+from spinepipe.muscles.passive_muscle import PassiveMuscle
+from spinepipe.muscles.paths import Lines, Standoff
+from spinepipe.muscles.person import Person
+from spinepipe.muscles.pose import Chain
+from spinepipe.muscles.regressions import Regressions, packaged, read_regressions
+from spinepipe.muscles.scaling import Choices, scaled
+from spinepipe.muscles.subject import CM_PER_M, REFERENCE, Subject
+from spinepipe.muscles.task import Task
+from spinepipe.muscles.trunk import BODIES, LEVELS, Trunk
+from spinepipe.muscles.upright import Upright, upright
+from spinepipe.studies.trunk_loads.postures import between
+from spinepipe.studies.trunk_loads.settings import Factor, TrunkLoads
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+REACH_RAD = 5.0 / DEG_PER_RAD
+"""How far bodies may turn from the source's pose to stand upright (Ghezelbash 2016 2.6)."""
+
+NOMINAL: Mapping[Factor, float] = {
+    "disc_area": 1.0,
+    "pcsa": 1.0,
+    "passive_rotation": 1.0,
+    "passive_muscle": 1.0,
+    "trunk_mass_ahead": 1.0,
+    "hand_anterior_mm": 0.0,
+    "pelvis_extension_deg": 0.0,
+    "largest_stress_mpa": 0.0,
+    "pressure_kpa": 0.0,
+    "height_cm": 0.0,
+    "bmi": 0.0,
+    "age_years": 0.0,
+}
+"""Factors multiply, the others are added; this is what changes nothing."""
+
+Values = Mapping[str, float]
+"""Value of each factor that is not nominal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A person, and how upright was found."""
+
+    person: Person
+    upright: Upright
+
+
+def source_of(settings: TrunkLoads, cohort: Cohort) -> Source:
+    """Geometry and muscles that the study asks for."""
+    if settings.geometry == "myo_sim":
+        return _of_package(origin_of_myo_sim().sha256)
+    tables = cohort.further
+    assert cohort.joints is not None
+    frames = tables.get("body_frames")
+    owner = cohort.joints["specimen"].iloc[0]
+    return source_of_folder(
+        cohort.name,
+        Tables(
+            tables["muscles"],
+            tables["muscle_parameters"],
+            cohort.joints[cohort.joints["specimen"] == owner],
+            None if frames is None else frames[frames["specimen"] == owner],
+        ),
+        settings.source_stress_mpa and 1e6 * settings.source_stress_mpa,
+    )
+
+
+@lru_cache(maxsize=1)
+def _of_package(_sha256: str) -> Source:
+    return source_of_myo_sim()
+
+
+def marks_of_source(settings: TrunkLoads) -> list[str]:
+    """What decides besides the cohort: digests of files that the study reads."""
+    found = [origin_of_myo_sim().sha256] if settings.geometry == "myo_sim" else []
+    return found
+
+
+def regressions_of(settings: TrunkLoads, folder: Path) -> Regressions:
+    """How size follows from sex, age, height and mass."""
+    if settings.regressions in ("ct_trends", "constant_density"):
+        return packaged(settings.regressions)
+    return read_regressions(folder / settings.regressions)
+
+
+def subject_of(cohort: Cohort, specimen: str) -> Subject:
+    """A person of `subjects.csv`."""
+    rows = cohort.further["subjects"]
+    row = rows[rows["specimen"] == specimen].iloc[0]
+    height = float(row["height_cm"]) / CM_PER_M
+    return Subject(row["sex"], float(row["age_years"]), height, float(row["mass_kg"]))
+
+
+def changed_subject(subject: Subject, values: Values) -> Subject:
+    """The person with another height, age and body mass index."""
+    height = subject.height_m + values.get("height_cm", 0.0) / CM_PER_M
+    bmi = subject.bmi + values.get("bmi", 0.0)
+    age = max(subject.age_years + values.get("age_years", 0.0), 18.0)
+    if (height, bmi, age) == (subject.height_m, subject.bmi, subject.age_years):
+        return subject
+    return Subject(subject.sex, age, height, bmi * height**2)
+
+
+def changed_task(task: Task, values: Values) -> Task:
+    """The task with hands elsewhere, another turn of the pelvis, other strength and pressure."""
+    hands = task.hands
+    ahead = values.get("hand_anterior_mm", 0.0)
+    if ahead and hands.kg > 0.0 and hands.at is not None:
+        hands = replace(hands, at=hands.at + np.array([ahead / MM_PER_M, 0.0, 0.0]))
+    turned = task.turned
+    pelvis = values.get("pelvis_extension_deg", 0.0)
+    if pelvis and bends(task):
+        turned = turned.copy()
+        turned[:, 0] += between(pelvis, 0.0, "extension") / DEG_PER_RAD
+    return replace(
+        task,
+        hands=hands,
+        turned=turned,
+        stress_pa=task.stress_pa + 1e6 * values.get("largest_stress_mpa", 0.0),
+        pressure_pa=task.pressure_pa + 1e3 * values.get("pressure_kpa", 0.0),
+    )
+
+
+def bends(task: Task) -> bool:
+    """Whether the posture differs from upright: else the pelvis is where it is found upright."""
+    return bool(np.any(task.turned != 0.0))
+
+
+def standing(
+    settings: TrunkLoads,
+    source: Trunk,
+    subject: Subject,
+    regressions: Regressions,
+    values: Values = NOMINAL,
+    wrapping: bool = True,
+) -> Standing:
+    """A person at their size, standing upright.
+
+    Parameters
+    ----------
+    source : trunk of the reference person. values : what is varied.
+    """
+    who = changed_subject(subject, values)
+    choices = Choices(
+        pcsa_times=values.get("pcsa", 1.0),
+        disc_area_times=settings.disc_area_factor * values.get("disc_area", 1.0),
+    )
+    trunk = scaled(source, who, REFERENCE, regressions, choices)
+    wrap, passive = settings.wrapping, settings.passive
+    person = Person(
+        who,
+        Chain.of(trunk, passive.joints_behind_mm / MM_PER_M),
+        Lines.of(trunk, Standoff(wrap.depth, wrap.least_mm / MM_PER_M), wrapping),
+        laws_of(settings, source, stiffening(who, REFERENCE, regressions), values),
+        PassiveMuscle(
+            passive.strain_at_full_force,
+            passive.shape,
+            passive.muscle_factor * values.get("passive_muscle", 1.0),
+        ),
+        masses_of(trunk, who, values.get("trunk_mass_ahead", 1.0)),
+        diaphragm_area(who, REFERENCE, regressions),
+        np.zeros((len(BODIES), 3)),
+        np.zeros(len(trunk.muscles)),
+    )
+    found = upright(person, np.zeros(len(BODIES)), REACH_RAD)
+    return Standing(person.standing(found.turned), found)
+
+
+def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Values) -> JointLaws:
+    """Joints of a person of a size; T11T12 from T12L1 by its disc, stiffer in bending."""
+    passive = settings.passive
+    upper = t11t12_beside_t12l1(source, passive.t11t12_bending_factor)
+    angular = np.full((len(LEVELS), 3), size.angular * passive.rotation_factor)
+    angular[-1] *= [upper.angular, upper.torsion, upper.angular]
+    angular *= values.get("passive_rotation", 1.0)
+    shear = published("gould_2024b")["uniform_stiffness"]
+    across = np.array([[shear["anterior_n_per_m"], shear["right_n_per_m"]]], dtype=float)
+    axial: Array = size.axial * np.array([AXIAL_N_PER_M[level] for level in LEVELS])
+    axial[-1] = axial[-2] * upper.axial
+    return JointLaws(
+        CURVES[passive.curves],
+        angular,
+        axial,
+        size.axial * np.repeat(across, len(LEVELS), axis=0),
+        passive.stiffens_under_compression,
+    )
