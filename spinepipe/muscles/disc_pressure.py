@@ -1,0 +1,91 @@
+"""Pressure in the disc L4L5 from compression and flexion (Ghezelbash 2016, Eq 6).
+
+A polynomial fitted to a finite-element model of one disc: P = compression / area of the disc up to
+1.86 MPa, flexion 0 to 10 deg counted from the unloaded geometry. Flexion is positive here, as in
+the paper, so it is minus our rotation about +z. Without load and flexion it gives -0.016 MPa, and
+for each P there is an angle of least pressure: it does not rise with flexion everywhere.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.units import DEG_PER_RAD
+
+PA_PER_MPA = 1e6
+
+_ONE, _P, _T, _PP, _PT, _TT = -1.556e-2, 1.255, 1.243e-2, 3.988e-2, -1.212e-2, 1.669e-3
+"""MPa and degrees: 1, P, theta, P^2, P theta, theta^2."""
+
+LARGEST_PA = 1.86 * PA_PER_MPA
+LARGEST_FLEXION = 10.0 / DEG_PER_RAD
+"""Compression over area, Pa, and flexion, rad, up to which the polynomial was fitted (from 0)."""
+
+DREISCHARF = 0.77
+"""P over pressure in the disc, of Dreischarf 2013 as Ghezelbash 2016 Fig 4 has it."""
+
+
+@dataclass(frozen=True)
+class DiscPressure:
+    """Pressure in a disc.
+
+    Attributes
+    ----------
+    pa : by Eq 6, Pa.
+    dreischarf_pa : nominal pressure / 0.77, whatever the flexion, Pa.
+    nominal_pa : compression over area, Pa.
+    flexion : rad, flexion positive.
+    """
+
+    pa: float
+    dreischarf_pa: float
+    nominal_pa: float
+    flexion: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether compression and flexion are in the range to which Eq 6 was fitted."""
+        return 0.0 <= self.nominal_pa <= LARGEST_PA and 0.0 <= self.flexion <= LARGEST_FLEXION
+
+    @property
+    def outside(self) -> str:
+        """What is out of range, in words; empty if nothing."""
+        found = []
+        if not 0.0 <= self.nominal_pa <= LARGEST_PA:
+            found.append(
+                f"compression / area {self.nominal_pa / PA_PER_MPA:.2f} MPa, fitted for 0 to "
+                f"{LARGEST_PA / PA_PER_MPA:.2f}"
+            )
+        if not 0.0 <= self.flexion <= LARGEST_FLEXION:
+            found.append(
+                f"flexion {self.flexion * DEG_PER_RAD:.1f} deg, fitted for 0 to "
+                f"{LARGEST_FLEXION * DEG_PER_RAD:.0f}"
+            )
+        return "; ".join(found)
+
+
+def eq6(nominal_pa: Array | float, flexion: Array | float) -> Array:
+    """Pressure in the disc, Pa, of compression over area, Pa, and flexion, rad; broadcasts."""
+    p = np.asarray(nominal_pa, dtype=float) / PA_PER_MPA
+    theta = np.asarray(flexion, dtype=float) * DEG_PER_RAD
+    found: Array = _ONE + _P * p + _T * theta + _PP * p**2 + _PT * p * theta + _TT * theta**2
+    return PA_PER_MPA * found
+
+
+def disc_pressure(compression: float, area: float, flexion: float) -> DiscPressure:
+    """Pressure in a disc.
+
+    Parameters
+    ----------
+    compression : N, compression positive. area : m2, of the person's disc.
+    flexion : rad of the joint from the unloaded geometry, flexion positive.
+    """
+    nominal = compression / area
+    return DiscPressure(float(eq6(nominal, flexion)), nominal / DREISCHARF, nominal, flexion)
+
+
+def flexion_of_least_pressure(nominal_pa: float) -> float:
+    """Flexion at which Eq 6 is least for a compression over area in Pa, rad; below 0: extension."""
+    theta_deg = -(_T + _PT * nominal_pa / PA_PER_MPA) / (2.0 * _TT)
+    return theta_deg / DEG_PER_RAD

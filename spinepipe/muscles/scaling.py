@@ -1,0 +1,238 @@
+"""A trunk made to a person's size (Ghezelbash 2016, section 2.7).
+
+Bones, discs, head, shoulders and arms grow with body height about the centre of L5S1; so do the
+heights of muscle points and the fibres. How far a muscle point lies ahead of the line of vertebrae
+and beside it, and the cross-section of a fascicle, follow regressions of that muscle at that
+level. Disc areas follow the area of the rib cage.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array
+from spinepipe.muscles.beam import stiffening
+from spinepipe.muscles.regressions import (
+    REGRESSION_LEVELS,
+    Quantity,
+    Regression,
+    Regressions,
+)
+from spinepipe.muscles.subject import Subject
+from spinepipe.muscles.trunk import NO_BODY, Trunk
+
+SHEATH_MUSCLE = "rectus_abdominis"
+"""The rectus sheath, and what ends in it, moves as this muscle does."""
+
+_L5S1 = 0
+_X, _Y, _Z = range(3)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What is multiplied beside the rules of scaling.
+
+    Attributes
+    ----------
+    pcsa_times : factor of all cross-sections of muscles.
+    disc_area_times : factor of all disc areas, for what is not known of the source's discs. It
+        moves disc pressure; stiffness was measured, so it does not follow.
+    """
+
+    pcsa_times: float = 1.0
+    disc_area_times: float = 1.0
+
+
+AS_SCALED = Choices()
+
+
+def scaled(
+    trunk: Trunk,
+    subject: Subject,
+    reference: Subject,
+    regressions: Regressions,
+    choices: Choices = AS_SCALED,
+) -> Trunk:
+    """The trunk of a person, from that of the reference person.
+
+    Parameters
+    ----------
+    trunk : of the reference person, in the source's pose.
+    subject, reference : the person, and whom the trunk is of.
+    regressions : of muscles and the rib cage.
+    choices : what is multiplied beside them.
+
+    Raises
+    ------
+    ValueError
+        If a regression is not positive for the person.
+    """
+    size = _Size(trunk, subject, reference, regressions)
+    tall = size.height
+    muscles = trunk.muscles
+    return replace(
+        trunk,
+        joints=tall * trunk.joints,
+        disc_height=tall * trunk.disc_height,
+        disc_area=choices.disc_area_times * size.rib_cage_area * trunk.disc_area,
+        vertebrae=tall * trunk.vertebrae,
+        head=tall * trunk.head,
+        shoulders=tall * trunk.shoulders,
+        arm_length=tall * trunk.arm_length,
+        sheath=size.moved(trunk.sheath, np.full(trunk.sheath.shape[:-1], SHEATH_MUSCLE)),
+        muscles=replace(
+            muscles,
+            pcsa=choices.pcsa_times * size.pcsa() * muscles.pcsa,
+            fibre=tall * muscles.fibre,
+            point=np.where(
+                (muscles.body != NO_BODY)[..., None],
+                size.moved(muscles.point, point_muscles(trunk)),
+                muscles.point,
+            ),
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """One ratio that scaling uses; `of` is all, a muscle, or a muscle at a level."""
+
+    quantity: str
+    of: str
+    ratio: float
+    source: str
+
+
+PAPER = "Ghezelbash 2016, section 2.7"
+DISCS_AS_RIBS = f"{PAPER}: as the rib cage. "
+
+
+def applied_ratios(
+    trunk: Trunk,
+    subject: Subject,
+    reference: Subject,
+    regressions: Regressions,
+) -> tuple[Ratio, ...]:
+    """Every ratio that makes the person differ from the reference person, each once."""
+    size = _Size(trunk, subject, reference, regressions)
+    found = [Ratio("lengths and disc heights", "all", size.height, f"{PAPER}: body height")]
+    found += [Ratio(row.quantity, row.of, size.of_row(row), row.source) for row in size.rows()]
+    joints = stiffening(subject, reference, regressions)
+    area = regressions.row("rib_cage_area")
+    found += [
+        Ratio("disc_area", "all", joints.area, DISCS_AS_RIBS + area.source),
+        Ratio("axial_stiffness", "all", joints.axial, f"{PAPER}: beam, area / height"),
+        Ratio("angular_stiffness", "all", joints.angular, f"{PAPER}: beam, area^2 / height"),
+    ]
+    return tuple(found)
+
+
+def nearest_vertebra(trunk: Trunk, height: Array) -> NDArray[np.int64]:
+    """Index into REGRESSION_LEVELS of the vertebra whose centre is nearest in height, m.
+
+    The centre of L5S1 stands for S1.
+    """
+    nodes = np.append(trunk.vertebrae[:, _Y], trunk.joints[_L5S1, _Y])
+    found: NDArray[np.int64] = np.abs(np.asarray(height)[..., None] - nodes).argmin(axis=-1)
+    return found
+
+
+def line_of_vertebrae(trunk: Trunk, height: Array) -> Array:
+    """(..., 3) m, point of the line through L5S1 and the vertebrae's centres at each height.
+
+    Straight down from L5S1 and straight up from T1.
+    """
+    nodes = np.vstack([trunk.joints[_L5S1], trunk.vertebrae[::-1]])
+    ahead, aside = (np.interp(height, nodes[:, _Y], nodes[:, axis]) for axis in (_X, _Z))
+    return np.stack([ahead, np.asarray(height, dtype=float), aside], axis=-1)
+
+
+def point_muscles(trunk: Trunk) -> NDArray[np.str_]:
+    """(M, P) the muscle whose regressions move each point."""
+    muscles = trunk.muscles
+    names = np.array(muscles.groups, dtype=object)[:, None].repeat(muscles.body.shape[1], axis=1)
+    names[muscles.in_sheath, 1] = SHEATH_MUSCLE
+    return names.astype(str)
+
+
+class _Size:
+    """A person's size beside the reference person's, each ratio worked out once."""
+
+    def __init__(
+        self, trunk: Trunk, subject: Subject, reference: Subject, regressions: Regressions
+    ) -> None:
+        self._trunk, self._regressions = trunk, regressions
+        self._subject, self._reference = subject, reference
+        self._of_row: dict[Regression, float] = {}
+        self.height = subject.height_m / reference.height_m
+
+    @property
+    def rib_cage_area(self) -> float:
+        return self.of_row(self._regressions.row("rib_cage_area"))
+
+    def of_row(self, row: Regression) -> float:
+        if row not in self._of_row:
+            self._of_row[row] = row.ratio(self._subject, self._reference)
+        return self._of_row[row]
+
+    def moved(self, points: Array, muscles: NDArray[np.str_]) -> Array:
+        """Points (..., 3) m of muscles (...), at the person's size."""
+        line = line_of_vertebrae(self._trunk, points[..., _Y])
+        level = nearest_vertebra(self._trunk, points[..., _Y])
+        stretch = np.stack(
+            [
+                self._ratios("ap_distance", muscles, level),
+                np.full(level.shape, self.height),
+                self._ratios("ml_distance", muscles, level),
+            ],
+            axis=-1,
+        )
+        # Height moves all of it, the rest what lies off the line: nothing moves at ratios of 1.
+        found: Array = self.height * points + (stretch - self.height) * (points - line)
+        return found
+
+    def pcsa(self) -> Array:
+        """(M,) ratios of cross-sections."""
+        return self._ratios("pcsa", self._groups, self._fascicle_levels())
+
+    def rows(self) -> Iterator[Regression]:
+        """The rows of muscles that apply to this trunk, each once."""
+        muscles = self._trunk.muscles
+        real = muscles.body != NO_BODY
+        points = point_muscles(self._trunk)[real]
+        levels = nearest_vertebra(self._trunk, muscles.point[..., _Y][real])
+        places: tuple[tuple[Quantity, NDArray[np.str_], NDArray[np.int64]], ...] = (
+            ("ap_distance", points, levels),
+            ("ml_distance", points, levels),
+            ("pcsa", self._groups, self._fascicle_levels()),
+        )
+        for quantity, names, at in places:
+            pairs = sorted(set(zip(names.tolist(), at.tolist(), strict=True)))
+            yield from dict.fromkeys(
+                self._regressions.row(quantity, m, REGRESSION_LEVELS[k]) for m, k in pairs
+            )
+
+    @property
+    def _groups(self) -> NDArray[np.str_]:
+        return np.array(self._trunk.muscles.groups, dtype=str)
+
+    def _fascicle_levels(self) -> NDArray[np.int64]:
+        """(M,) vertebra nearest to the middle of each fascicle's height."""
+        muscles = self._trunk.muscles
+        height, real = muscles.point[..., _Y], muscles.body != NO_BODY
+        low = np.where(real, height, np.inf).min(axis=1)
+        high = np.where(real, height, -np.inf).max(axis=1)
+        return nearest_vertebra(self._trunk, 0.5 * (low + high))
+
+    def _ratios(
+        self, quantity: Quantity, muscles: NDArray[np.str_], level: NDArray[np.int64]
+    ) -> Array:
+        """Ratios of muscles (...) at vertebrae (...)."""
+        pairs = list(zip(muscles.ravel().tolist(), level.ravel().tolist(), strict=True))
+        at = {
+            (m, k): self.of_row(self._regressions.row(quantity, m, REGRESSION_LEVELS[k]))
+            for m, k in set(pairs)
+        }
+        return np.array([at[pair] for pair in pairs]).reshape(level.shape)

@@ -1,0 +1,299 @@
+"""Scaling: the reference person changes nothing, ratios are exact, points move off the spine."""
+
+from dataclasses import fields, replace
+from math import exp
+from pathlib import Path
+
+import numpy as np
+import pytest
+from trunk_to_scale import made_up_trunk
+
+from spinepipe.muscles.beam import (
+    Stiffening,
+    implied_areas,
+    stiffening,
+    stiffness_change,
+    t11t12_beside_t12l1,
+)
+from spinepipe.muscles.regressions import PACKAGED, Regressions, packaged, read_regressions
+from spinepipe.muscles.scaling import (
+    Choices,
+    applied_ratios,
+    line_of_vertebrae,
+    nearest_vertebra,
+    scaled,
+)
+from spinepipe.muscles.subject import REFERENCE, Subject
+from spinepipe.muscles.trunk import NO_BODY, SLICES, Trunk
+from spinepipe.problems import InputError
+
+EXACT = 1e-15
+"""Lengths are below 1 m, so this is a few units in the last place."""
+
+TALL = replace(REFERENCE, height_m=1.25 * REFERENCE.height_m)
+"""A ratio of heights without rounding."""
+
+HEADER = "muscle,level,quantity,form,intercept,sex,age,height,weight,source\n"
+STILL = "".join(
+    f"*,*,{quantity},linear,7,0,0,0,0,made up\n"
+    for quantity in ("ap_distance", "ml_distance", "pcsa", "rib_cage_area")
+)
+"""Regressions that give everybody the same."""
+
+
+def table(tmp_path: Path, *rows: str, base: str = STILL) -> Regressions:
+    path = tmp_path / "regressions.csv"
+    path.write_text(HEADER + base + "".join(f"{row},made up\n" for row in rows))
+    return read_regressions(path)
+
+
+def arrays(trunk: Trunk) -> dict[str, np.ndarray]:
+    of_trunk = {f.name: getattr(trunk, f.name) for f in fields(trunk)}
+    of_muscles = {f.name: getattr(trunk.muscles, f.name) for f in fields(trunk.muscles)}
+    return {k: np.asarray(v) for k, v in (of_trunk | of_muscles).items() if k != "muscles"}
+
+
+@pytest.mark.parametrize("name", PACKAGED)
+def test_the_reference_person_has_the_reference_trunk_to_the_last_bit(name: str) -> None:
+    trunk = made_up_trunk()
+    found = arrays(scaled(trunk, REFERENCE, REFERENCE, packaged(name)))
+    assert all(np.array_equal(found[k], value) for k, value in arrays(trunk).items())
+
+
+def test_bones_discs_head_arms_and_fibres_grow_with_height(tmp_path: Path) -> None:
+    trunk = made_up_trunk()
+    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
+    for name in ("joints", "disc_height", "vertebrae", "head", "shoulders", "arm_length"):
+        np.testing.assert_allclose(
+            getattr(found, name), 1.25 * np.asarray(getattr(trunk, name)), rtol=EXACT, atol=0
+        )
+    np.testing.assert_array_equal(found.muscles.fibre, 1.25 * trunk.muscles.fibre)
+    np.testing.assert_array_equal(found.disc_tilt, trunk.disc_tilt)
+    np.testing.assert_array_equal(found.disc_area, trunk.disc_area)
+    np.testing.assert_array_equal(found.muscles.pcsa, trunk.muscles.pcsa)
+
+
+def test_muscle_points_rise_with_height_and_keep_their_distance_from_the_vertebrae(
+    tmp_path: Path,
+) -> None:
+    trunk = made_up_trunk()
+    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
+    real = trunk.muscles.body != NO_BODY
+    before, after = trunk.muscles.point[real], found.muscles.point[real]
+    np.testing.assert_allclose(after[:, 1], 1.25 * before[:, 1], rtol=0, atol=EXACT)
+    np.testing.assert_allclose(
+        (after - line_of_vertebrae(found, after[:, 1]))[:, [0, 2]],
+        (before - line_of_vertebrae(trunk, before[:, 1]))[:, [0, 2]],
+        rtol=0,
+        atol=EXACT,
+    )
+
+
+def test_points_past_the_end_of_a_path_stay_nought(tmp_path: Path) -> None:
+    trunk = made_up_trunk()
+    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
+    assert not found.muscles.point[trunk.muscles.body == NO_BODY].any()
+
+
+def test_each_direction_follows_its_own_regression_of_that_muscle_at_that_level(
+    tmp_path: Path,
+) -> None:
+    trunk = made_up_trunk()
+    known = table(
+        tmp_path,
+        "longissimus,T12,ap_distance,linear,0,0,0,0,2",
+        "longissimus,*,ml_distance,power,0,0,0,0,2",
+        "*,T12,ap_distance,linear,0,0,1,0,0",
+    )
+    heavy = replace(REFERENCE, mass_kg=1.5 * REFERENCE.mass_kg)
+    found = scaled(trunk, heavy, REFERENCE, known)
+    at = trunk.muscles.names.index("longissimus_r")
+    before, after = trunk.muscles.point[at], found.muscles.point[at]
+    line = line_of_vertebrae(trunk, before[:, 1])
+    level = [[*SLICES, "S1"][k] for k in nearest_vertebra(trunk, before[:, 1])]
+    assert level.count("T12") == 1
+    ahead = [1.5 if name == "T12" else 1.0 for name in level]
+    np.testing.assert_allclose(after[:, 0] - line[:, 0], ahead * (before - line)[:, 0], atol=EXACT)
+    np.testing.assert_allclose(after[:, 2] - line[:, 2], 2.25 * (before - line)[:, 2], atol=EXACT)
+    others = np.arange(5) != at
+    np.testing.assert_array_equal(found.muscles.point[others], trunk.muscles.point[others])
+
+
+def test_cross_sections_follow_their_muscle_and_stated_factors_come_on_top(
+    tmp_path: Path,
+) -> None:
+    trunk = made_up_trunk()
+    known = table(tmp_path, "rectus_abdominis,*,pcsa,exponential,3,0,-0.01,0,0")
+    old = replace(REFERENCE, age_years=REFERENCE.age_years + 10.0)
+    choices = Choices(pcsa_times=2.0, disc_area_times=1.5)
+    found = scaled(trunk, old, REFERENCE, known, choices)
+    expected = 2.0 * np.array([1, 1, exp(-0.1), 1, 1]) * trunk.muscles.pcsa
+    np.testing.assert_allclose(found.muscles.pcsa, expected, rtol=1e-14)
+    np.testing.assert_array_equal(found.disc_area, 1.5 * trunk.disc_area)
+
+
+def test_what_ends_in_the_rectus_sheath_moves_with_the_sheath(tmp_path: Path) -> None:
+    trunk = made_up_trunk()
+    sheath = trunk.sheath.copy()
+    sheath[0, 1] = trunk.muscles.point[3, 1]
+    known = table(
+        tmp_path,
+        "rectus_abdominis,*,ap_distance,power,0,0,0,0,1",
+        "external_oblique,*,ap_distance,power,0,0,0,0,3",
+    )
+    heavy = replace(REFERENCE, mass_kg=1.2 * REFERENCE.mass_kg)
+    found = scaled(replace(trunk, sheath=sheath), heavy, REFERENCE, known)
+    np.testing.assert_array_equal(found.muscles.point[3, 1], found.sheath[0, 1])
+    assert found.muscles.point[3, 0, 0] != trunk.muscles.point[3, 0, 0]
+
+
+def test_a_mirrored_trunk_scales_to_the_mirrored_trunk() -> None:
+    mirror = np.array([1.0, 1.0, -1.0])
+    trunk = made_up_trunk()
+    trunk = replace(trunk, vertebrae=trunk.vertebrae * [1, 1, 0], joints=trunk.joints * [1, 1, 0])
+    other = trunk.with_muscles(point=mirror * trunk.muscles.point)
+    woman = Subject("female", 60.0, 1.62, 80.0)
+    found, mirrored = (
+        scaled(t, woman, REFERENCE, packaged()).muscles.point for t in (trunk, other)
+    )
+    np.testing.assert_array_equal(mirrored, mirror * found)
+
+
+def test_every_ratio_that_is_used_is_told(tmp_path: Path) -> None:
+    trunk = made_up_trunk()
+    known = table(
+        tmp_path,
+        "multifidus,*,pcsa,linear,0,0,0,0,1",
+        "psoas,*,pcsa,linear,0,0,0,0,3",
+        "*,*,rib_cage_area,linear,0,0,0,0,1",
+        base=STILL.replace("*,*,rib_cage_area,linear,7,0,0,0,0,made up\n", ""),
+    )
+    heavy = Subject("male", 41.8, 1.25 * 1.730, 1.5 * 75.1)
+    found = {(r.quantity, r.of): r.ratio for r in applied_ratios(trunk, heavy, REFERENCE, known)}
+    assert found == {
+        ("lengths and disc heights", "all"): pytest.approx(1.25),
+        ("ap_distance", "all"): 1.0,
+        ("ml_distance", "all"): 1.0,
+        ("pcsa", "all"): 1.0,
+        ("pcsa", "multifidus"): pytest.approx(1.5),
+        ("disc_area", "all"): pytest.approx(1.5),
+        ("axial_stiffness", "all"): pytest.approx(1.2),
+        ("angular_stiffness", "all"): pytest.approx(1.8),
+    }
+    assert known.unknown_muscles(trunk.muscles.groups) == ("psoas",)
+
+
+def test_joints_are_beams(tmp_path: Path) -> None:
+    known = table(
+        tmp_path,
+        "*,*,rib_cage_area,power,0,0,0,0,1",
+        base=STILL.replace("*,*,rib_cage_area,linear,7,0,0,0,0,made up\n", ""),
+    )
+    other = Subject("male", 41.8, 2 * 1.730, 3 * 75.1)
+    found = stiffening(other, REFERENCE, known)
+    assert (found.area, found.height) == (pytest.approx(3.0), pytest.approx(2.0))
+    assert (found.axial, found.angular) == (pytest.approx(1.5), pytest.approx(4.5))
+
+
+def test_t11t12_is_t12l1_by_area_and_height_and_stiffer_in_bending_alone() -> None:
+    trunk = made_up_trunk()
+    trunk = replace(
+        trunk,
+        disc_area=np.array([9, 9, 9, 9, 9, 4, 3]) * 1e-4,
+        disc_height=np.array([9, 9, 9, 9, 9, 8, 5]) * 1e-3,
+    )
+    found = t11t12_beside_t12l1(trunk)
+    assert found.axial == pytest.approx(0.75 / 0.625)
+    assert found.torsion == pytest.approx(0.5625 / 0.625)
+    assert found.angular == pytest.approx(1.2 * 0.5625 / 0.625)
+    assert t11t12_beside_t12l1(trunk, 1.0).angular == found.torsion
+
+
+@pytest.mark.parametrize(
+    ("height_m", "axial", "angular", "areas"),
+    [(1.60, -6.0, -5.0, (0.869, 0.937, 1.011)), (1.90, 9.0, 8.0, (1.197, 1.089, 0.991))],
+)
+def test_no_area_gives_both_stiffness_changes_that_the_paper_prints(
+    height_m: float, axial: float, angular: float, areas: tuple[float, float, float]
+) -> None:
+    """Ghezelbash 2016 section 4.2; half a per cent of rounding moves an area by 0.6 % at most."""
+    found = implied_areas(axial, angular, height_m / 1.730)
+    assert (found.from_axial, found.from_angular, found.from_both) == pytest.approx(areas, abs=6e-4)
+    assert not found.agree(within=2 * 0.006 * max(areas))
+
+
+def test_changes_of_a_beam_do_need_one_area() -> None:
+    beam = Stiffening(area=1.1, height=1.9 / 1.73)
+    found = implied_areas(100 * (beam.axial - 1), 100 * (beam.angular - 1), beam.height)
+    assert found.agree(within=1e-12)
+    assert found.from_axial == pytest.approx(1.1)
+
+
+def test_stiffness_changes_of_a_body_of_constant_density() -> None:
+    """A is mass / height, so axial stiffness is mass / height^2: BMI over BMI at any height."""
+    bmi = 25.0 / (75.1 / 1.730**2)
+    for height_m in (1.60, 1.90):
+        found = stiffness_change(height_m, packaged("constant_density"))
+        tall = height_m / 1.730
+        assert found.axial_percent == pytest.approx(100 * (bmi - 1), abs=1e-9)
+        assert found.angular_percent == pytest.approx(100 * (bmi**2 * tall - 1), abs=1e-9)
+
+
+def test_packaged_trends_are_the_published_ones() -> None:
+    """Entered again: per cent per kg, cm, year; men 26 % more at the same size; rib cage, cm2."""
+    known = packaged("ct_trends")
+    per_kg = replace(REFERENCE, mass_kg=REFERENCE.mass_kg + 1.0)
+    per_cm = replace(REFERENCE, height_m=REFERENCE.height_m + 0.01)
+    per_year = replace(REFERENCE, age_years=REFERENCE.age_years + 1.0)
+    woman = replace(REFERENCE, sex="female")
+    rounded = pytest.approx
+    for quantity, changes in {
+        "ap_distance": (0.3, 0.1, 0.0),
+        "ml_distance": (0.3, 0.1, 0.0),
+        "pcsa": (0.8, -0.05, -0.8),
+    }.items():
+        row = known.row(quantity)
+        found = [100 * (row.ratio(s, REFERENCE) - 1) for s in (per_kg, per_cm, per_year)]
+        assert found == rounded(changes, abs=0.004)
+    men_over_women = np.sqrt(39.4 / 31.8 * 45.6 / 35.6)
+    assert 1 / known.row("pcsa").ratio(woman, REFERENCE) == rounded(men_over_women, abs=1e-4)
+    area = known.row("rib_cage_area").value(REFERENCE)
+    assert area == rounded(172.698 + 44.2022 + 36.814 - 158.503 + 393.152, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("*,T13,pcsa,linear,1,0,0,0,0", "T13"),
+        ("*,L3,psca,linear,1,0,0,0,0", "did you mean 'pcsa'?"),
+        ("*,L3,pcsa,cubic,1,0,0,0,0", "cubic"),
+        ("*,L3,pcsa,linear,one,0,0,0,0", "'one'"),
+        ("*,L3,pcsa,linear,nan,0,0,0,0", "finite"),
+        ("*,L3,rib_cage_area,linear,1,0,0,0,0", "rib_cage_area"),
+        ("*,*,pcsa,linear,1,0,0,0,0", "each once"),
+        (",*,pcsa,linear,1,0,0,0,0", "muscle"),
+    ],
+)
+def test_a_faulty_row_is_told(tmp_path: Path, row: str, told: str) -> None:
+    with pytest.raises(InputError, match=r"regressions\.csv") as caught:
+        table(tmp_path, row)
+    assert told in str(caught.value)
+
+
+def test_a_table_without_a_quantity_or_a_column_is_told(tmp_path: Path) -> None:
+    without = STILL.replace("*,*,pcsa,linear,7,0,0,0,0,made up\n", "")
+    with pytest.raises(InputError, match="no row for pcsa"):
+        table(tmp_path, base=without)
+    path = tmp_path / "short.csv"
+    path.write_text("muscle,level,quantity\n*,*,pcsa\n")
+    with pytest.raises(InputError, match="intercept"):
+        read_regressions(path)
+    with pytest.raises(InputError, match=r"absent\.csv"):
+        read_regressions(tmp_path / "absent.csv")
+
+
+def test_a_person_beyond_a_linear_regression_is_told(tmp_path: Path) -> None:
+    known = table(tmp_path, "multifidus,*,pcsa,linear,-80,0,0,0,1.1")
+    light = replace(REFERENCE, mass_kg=45.0)
+    with pytest.raises(ValueError, match=r"pcsa for multifidus is -30\.5 .* 45\.0 kg"):
+        scaled(made_up_trunk(), light, REFERENCE, known)
