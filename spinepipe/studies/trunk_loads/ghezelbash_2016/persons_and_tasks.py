@@ -269,12 +269,17 @@ def _cases() -> Iterator[Claim]:
 
 
 def _pressure_asked(number: int, kpa: float) -> Value:
-    """Whichever pressure of the tasks of a number is nearest."""
+    """Whichever pressure is nearest, of the tasks that push as the one of a number does.
+
+    Only case I of Table 3 has the number itself: what the others ask of antagonists, no task can.
+    """
 
     def ours(run: Run) -> Ours:
-        rows = numbered(run, number, ASKED)
+        push = asked_for("push_extension_nm", number)(run).value
+        rows = run.rows(ASKED, push_extension_nm=push)
         asked = pd.to_numeric(rows["intra_abdominal_pressure_kpa"], errors="coerce").fillna(0.0)
-        return Ours(float(asked.iloc[(asked - kpa).abs().argmin()]))
+        at = int((asked - kpa).abs().to_numpy().argmin())
+        return Ours(float(asked.iloc[at]), note=f"ours: task {rows.iloc[at]['task']}")
 
     return ours
 
