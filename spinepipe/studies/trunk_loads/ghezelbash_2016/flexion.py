@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Range, Run, exactly
 from spinepipe.muscles.fascicles import GLOBAL_EXTENSORS
-from spinepipe.studies.trunk_loads.ghezelbash_2016.found import filled, forward
+from spinepipe.studies.trunk_loads.ghezelbash_2016.found import filled, forward, numbered, settled
 from spinepipe.studies.trunk_loads.ghezelbash_2016.own_numbers import base_n
 from spinepipe.studies.trunk_loads.ghezelbash_2016.paper import (
     NO_EMG,
@@ -25,7 +25,6 @@ FIG_9 = PAPER["fig_9"]
 BENDER = PERSONS["D"]
 """Whose flexion Fig 6 is about: the mean of the men of Arjmand 2009 and 2010."""
 
-FULL_DEG = 107.3
 RELAXED_PERCENT = 10.0
 """What is left of the active force of muscles that are said to be relaxed, at most, of its peak."""
 
@@ -52,20 +51,15 @@ class Course(NamedTuple):
     passive: "pd.Series[float]"
     contact: "pd.Series[float]"
 
-    def full(self) -> float:
-        """The angle of full flexion."""
-        last = float(self.active.index[-1])
-        if abs(last - FULL_DEG) > 0.5:
-            raise NotComputed(f"{BENDER} bends by {last:g} deg at most, not {FULL_DEG:g}")
-        return last
-
 
 def _course(run: Run, group: str) -> Course:
+    """From upright to full flexion, task 5, in settled tasks."""
+    settled(numbered(run, 5, specimen=BENDER))
     tasks = forward(run, BENDER).set_index("task")["flexion_deg"]
     rows = run.rows("muscles", specimen=BENDER, group=group)
     rows = rows[rows["task"].isin(tasks.index)]
-    if rows.empty:
-        raise NotComputed(f"this run's table muscles has no {group} bending forwards")
+    if rows["task"].nunique() < max(len(tasks), 3):
+        raise NotComputed(f"this run's table muscles has no {group} in some task of flexion")
     forces = pd.DataFrame(
         {
             "flexion_deg": rows["task"].map(tasks),
@@ -74,8 +68,6 @@ def _course(run: Run, group: str) -> Course:
             "contact": filled(rows, "contact_n"),
         }
     )
-    if forces["flexion_deg"].nunique() < 3:
-        raise NotComputed("a course needs three angles")
     summed = forces.groupby("flexion_deg").sum().sort_index()
     return Course(summed["active"], summed["passive"], summed["contact"])
 
@@ -91,7 +83,7 @@ def _muscle(group: str) -> Iterator[Claim]:
     yield Claim(
         f"fig_6.{group}.active.left_at_full_flexion",
         "Fig 6, 3.3",
-        f"active force of {name} at {FULL_DEG:g} deg over its largest (flexion relaxation)",
+        f"active force of {name} at full flexion over its largest (flexion relaxation)",
         "%",
         None,
         Range(
@@ -118,7 +110,6 @@ def _muscle(group: str) -> Iterator[Claim]:
 
 
 def _peaks_between(course: Course) -> bool:
-    course.full()
     inner = course.active.iloc[1:-1].max()
     return bool(inner > course.active.iloc[0] and inner > course.active.iloc[-1])
 
@@ -127,12 +118,12 @@ def _left(course: Course) -> Ours:
     largest = float(course.active.max())
     if largest <= 0.0:
         raise NotComputed("the muscle pulls at no angle")
-    return Ours(100.0 * float(course.active[course.full()]) / largest)
+    return Ours(100.0 * float(course.active.iloc[-1]) / largest)
 
 
 def _largest_at_full(course: Course, name: str) -> bool:
     force = getattr(course, name)
-    return bool(force[course.full()] > 0.0 and force[course.full()] >= force.max())
+    return bool(force.iloc[-1] > 0.0 and force.iloc[-1] >= force.max())
 
 
 class Apart(NamedTuple):
@@ -141,6 +132,7 @@ class Apart(NamedTuple):
     flexion_deg: float
     one_n: float
     other_n: float
+    n_angles: int
 
     @property
     def newton(self) -> float:
@@ -157,7 +149,7 @@ class Apart(NamedTuple):
         """Angle and loads."""
         return (
             f"ours: {self.one_n:.4g} and {self.other_n:.4g} N at {self.flexion_deg:g} deg of "
-            "flexion, where they differ most"
+            f"flexion, where they differ most of {self.n_angles} angles that settled"
         )
 
 
@@ -173,7 +165,9 @@ def _apart(run: Run, column: str, one: str, other: str) -> Apart:
         raise NotComputed(f"{one} and {other} share fewer than two angles of flexion")
     loads = both.to_numpy(float)
     at = int((loads[:, 0] - loads[:, 1]).argmax())
-    return Apart(float(both.index.to_numpy(float)[at]), float(loads[at, 0]), float(loads[at, 1]))
+    return Apart(
+        float(both.index.to_numpy(float)[at]), float(loads[at, 0]), float(loads[at, 1]), len(both)
+    )
 
 
 def _farthest(run: Run, column: str) -> Apart:

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.comparison.claim import NotComputed, Ours, Run
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.ghezelbash_2016.paper import VOLUNTEER
 
 ASKED, SUBJECTS = "asked", "subjects"
@@ -69,8 +70,16 @@ def bent_sideways(run: Run, degrees: float, person: str = VOLUNTEER) -> "pd.Seri
     return chosen.iloc[0]
 
 
+def settled(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows whose forces are sound, at least one."""
+    sound = rows[rows["status"] == Balanced.CONVERGED.value]
+    if sound.empty:
+        raise NotComputed(f"task {rows.iloc[0]['task']} ended with {rows.iloc[0]['status']}")
+    return sound
+
+
 def forward(run: Run, person: str) -> pd.DataFrame:
-    """A person's tasks of forward flexion with empty hands, by growing angle `flexion_deg`.
+    """A person's sound tasks of forward flexion with empty hands, by growing `flexion_deg`.
 
     Task 7, and the upright and the full posture that it starts and ends with (tasks 1 and 5).
     """
@@ -78,7 +87,7 @@ def forward(run: Run, person: str) -> pd.DataFrame:
     rows = run.rows("tasks", specimen=person)
     number = pd.to_numeric(rows["number"], errors="coerce").astype(float)
     parts.append(rows[number.isin([1.0, 5.0])])
-    together = pd.concat(parts)
+    together = settled(pd.concat(parts))
     together = together.assign(flexion_deg=-filled(together, "trunk_extension_deg"))
     return together.drop_duplicates("flexion_deg").sort_values("flexion_deg")
 

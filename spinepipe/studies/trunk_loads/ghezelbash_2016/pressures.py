@@ -7,6 +7,7 @@ cannot be read off the figure. So the error is what is held, to the paper's own.
 from collections.abc import Callable, Iterator
 
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Range, Run, Verdict
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.ghezelbash_2016.found import volunteers_task
 from spinepipe.studies.trunk_loads.ghezelbash_2016.paper import OTHER_MODEL, PAPER
 from spinepipe.studies.trunk_loads.tables_of_studies import TIERS
@@ -63,6 +64,8 @@ def _error(task: Callable[[Run], str], tier: str) -> Callable[[Run], Ours]:
     def ours(run: Run) -> Ours:
         row = run.row("pressures", tier=tier, task=task(run))
         computed = run.number("pressures", "computed_mpa", tier=tier, task=row["task"])
+        if row["status"] != Balanced.CONVERGED.value:
+            raise NotComputed(f"task {row['task']} ended with {row['status']}")
         measured = float(row["measured_mpa"])
         told = f"ours: {computed:.3g} MPa computed, {measured:.3g} MPa measured"
         status = str(row["measured_status"])
