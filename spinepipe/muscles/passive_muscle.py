@@ -10,6 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.muscles.trunk import Muscles
+
+
+def fibres_of(muscles: Muscles, rest: Array, share: float) -> Array:
+    """(M,) m, the source's fibres, and where it has none a share of the path (M,) m at rest."""
+    found: Array = np.where(muscles.fibre > 0.0, muscles.fibre, share * rest)
+    return found
 
 
 @dataclass(frozen=True)
@@ -21,14 +28,16 @@ class PassiveMuscle:
     strain : of the fibres at which the force is the largest active one.
     shape : how sharply it rises.
     factor : of the force.
+    fibre_share : of the path upright that stretches, where the source has no length of the fibres.
     """
 
     strain: float = 0.6
     shape: float = 5.0
     factor: float = 1.0
+    fibre_share: float = 1.0
 
     def forces(self, lengths: Array, rest: Array, fibres: Array, largest: Array) -> Array:
-        """(M,) N of paths of so many m, upright `rest` m, fibres of so many m (nought: the path).
+        """(M,) N of paths of so many m, upright `rest` m, fibres of so many m.
 
         Parameters
         ----------
@@ -42,7 +51,7 @@ class PassiveMuscle:
     def slopes(self, lengths: Array, rest: Array, fibres: Array, largest: Array) -> Array:
         """(M,) N/m, how fast it rises with the length."""
         strain = self._strain(lengths, rest, fibres)
-        rate = self.shape / self.strain / np.where(fibres > 0.0, fibres, rest)
+        rate = self.shape / self.strain / fibres
         rising = rate * np.exp(self.shape * strain / self.strain) / np.expm1(self.shape)
         found: Array = np.where(strain > 0.0, self.factor * largest * rising, 0.0)
         return found
@@ -50,5 +59,5 @@ class PassiveMuscle:
     @staticmethod
     def _strain(lengths: Array, rest: Array, fibres: Array) -> Array:
         """(M,) of the fibres, never below nought."""
-        found: Array = np.maximum((lengths - rest) / np.where(fibres > 0.0, fibres, rest), 0.0)
+        found: Array = np.maximum((lengths - rest) / fibres, 0.0)
         return found

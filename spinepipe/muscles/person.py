@@ -6,7 +6,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.joint_laws import JointLaws
-from spinepipe.muscles.passive_muscle import PassiveMuscle
+from spinepipe.muscles.passive_muscle import PassiveMuscle, fibres_of
 from spinepipe.muscles.paths import Lines
 from spinepipe.muscles.pose import Chain, posed, rotations_of
 from spinepipe.muscles.subject import Subject
@@ -25,7 +25,7 @@ class Person:
     masses : what bodies carry, arms and hands left out.
     diaphragm_m2 : area on which pressure in the abdomen pushes.
     upright : (8, 3) rad, Z, X', Y'' angles of the bodies when standing.
-    rest : (M,) m, lengths of the fascicles when standing.
+    rest, fibres : (M,) m, lengths of the fascicles when standing, and of their fibres.
     """
 
     subject: Subject
@@ -37,11 +37,14 @@ class Person:
     diaphragm_m2: float
     upright: Array
     rest: Array
+    fibres: Array
 
     def standing(self, upright: Array) -> "Person":
         """The same person with an upright posture (8, 3) rad, in which muscles are at rest."""
         poses = posed(self.chain, rotations_of(self.chain, upright), np.zeros((len(LEVELS), 3)))
-        return replace(self, upright=upright, rest=self.lines.pulls(poses).lengths)
+        rest = self.lines.pulls(poses).lengths
+        fibres = fibres_of(self.lines.trunk.muscles, rest, self.passive.fibre_share)
+        return replace(self, upright=upright, rest=rest, fibres=fibres)
 
 
 def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:

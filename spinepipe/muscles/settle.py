@@ -209,7 +209,7 @@ def _at(
     drawn, arms = above(pulls.forces, pulls.moments, poses.centres)
     muscles = person.lines.trunk.muscles
     strength = task.stress_pa * muscles.pcsa
-    stretched = person.passive.forces(pulls.lengths, person.rest, muscles.fibre, strength)
+    stretched = person.passive.forces(pulls.lengths, person.rest, person.fibres, strength)
     demand = Demand(
         np.ascontiguousarray(arms.reshape(len(muscles), -1).T),
         required.ravel(),

@@ -44,7 +44,7 @@ def stiffness(person: Person, held: Held, gain: float) -> Array:
     drawn = np.cumsum(pulls.forces[:, :0:-1], axis=1)[:, ::-1]
     slopes = np.concatenate([arms, drawn], axis=2).reshape(len(muscles), _N)
     strength = held.demand.most - held.stretched
-    rising = person.passive.slopes(pulls.lengths, person.rest, muscles.fibre, strength)
+    rising = person.passive.slopes(pulls.lengths, person.rest, person.fibres, strength)
     found: Array = slopes.T @ ((gain * forces / pulls.lengths + rising)[:, None] * slopes)
     found += _joints(person, held)
     tensors, weights = _tensors(held)

@@ -173,11 +173,13 @@ def standing(
             passive.strain_at_full_force,
             passive.shape,
             passive.muscle_factor * values.get("passive_muscle", 1.0),
+            passive.fibre_share,
         ),
         masses_of(trunk, who, values.get("trunk_mass_ahead", 1.0)),
         diaphragm_area(who, REFERENCE, regressions),
         np.zeros((len(BODIES), 3)),
-        np.zeros(len(trunk.muscles)),
+        np.ones(len(trunk.muscles)),
+        np.ones(len(trunk.muscles)),
     )
     found = upright(person, np.zeros(len(BODIES)), REACH_RAD)
     return Standing(person.standing(found.turned), found)

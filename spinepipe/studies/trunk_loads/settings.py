@@ -34,7 +34,7 @@ class Passive(BaseModel):
     model_config = FORM
 
     curves: Curves = Field(
-        default="mixed",
+        default="disc_han",
         description="moment-rotation curves: segment (Schmidt 1998), discs alone (Heuer 2007, "
         "Jaramillo, Han 2010), or mixed: sideways the disc of Heuer, else the segment",
     )
@@ -57,6 +57,13 @@ class Passive(BaseModel):
         default=0.6, gt=0.05, le=2, description="stretch at which it is the largest active force"
     )
     shape: float = Field(default=5.0, gt=0.1, le=20, description="shape of the curve (Thelen 2003)")
+    fibre_share: float = Field(
+        default=1.0,
+        gt=0.1,
+        le=1,
+        description="share of a muscle's upright length that stretches, where its source has no "
+        "length of the fibres; 1: all of it",
+    )
     stiffens_under_compression: bool = Field(
         default=True, description="whether compression stiffens joints (Gardner-Morse 2004)"
     )
