@@ -129,6 +129,16 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
     return first
 
 
+def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Held:
+    """The task with given muscle forces (M,) N, where the spine has moved to under them."""
+    rotations = rotations_of(person.chain, angles_of(person, task))
+    pushes, how = np.zeros((len(LEVELS), 3)), How()
+    for _ in range(rounds):
+        now = _at(person, task, how, 0.0, rotations, pushes, None, given=forces)
+        pushes = now.pushes
+    return now
+
+
 def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> Held:
     """Rounds from a spine pressed by `start` (7,) N."""
     rotations = rotations_of(person.chain, angles_of(person, task))
@@ -195,8 +205,9 @@ def _at(
     rotations: Array,
     pushes: Array,
     near: Array | None,
+    given: Array | None = None,
 ) -> Held:
-    """Forces where the joints' forces were `pushes` (7, 3) N."""
+    """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
     moves = how.feedback and how.translates
     translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
     poses = posed(person.chain, rotations, translations)
@@ -218,7 +229,10 @@ def _at(
         muscles.pcsa,
         pulls.along_sheath,
     )
-    found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+    if given is None:
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+    else:
+        found = Forces(given, demand.required - demand.arms @ given, True)
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
     told = np.einsum("kji,kj->ki", poses.discs, on_joints)
     return Held(

@@ -8,6 +8,7 @@ range of the start.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from spinepipe.effects.contract import Array
@@ -34,7 +35,7 @@ class Upright:
     """
 
     angles: Array
-    at_bound: Array
+    at_bound: NDArray[np.bool_]
     before: Array
     after: Array
 
