@@ -119,8 +119,10 @@ _HEUER = (  # Heuer 2007, disc L4L5 alone, medians
 )
 
 CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
-    "segment_gould": tuple(  # Gould 2024b Table 2, uniform: linear, whole segments
-        _linear(_GOULD[f"{axis}_nm_per_rad"]) for axis in AXES
+    "segment_gould": (  # Gould 2024b Table 2, uniform: linear, whole segments
+        _linear(_GOULD["right_bending_nm_per_rad"]),
+        _linear(_GOULD["left_rotation_nm_per_rad"]),
+        _linear(_GOULD["extension_nm_per_rad"]),
     ),
     "mixed": (_HEUER[0], _SCHMIDT[1], _SCHMIDT[2]),
     "segment": _SCHMIDT,

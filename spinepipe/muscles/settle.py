@@ -32,6 +32,7 @@ class How:
     Attributes
     ----------
     change, residual_nm : of forces over their size, and out of balance; less than that at the end.
+    slack_nm : moment that may be left over before a task counts as beyond strength.
     most : rounds.
     feedback : whether forces move the spine at all. translates : whether joints do more than turn.
     lowest_alone : whether L5S1 alone is balanced.
@@ -40,6 +41,7 @@ class How:
 
     change: float = 0.01
     residual_nm: float = 0.1
+    slack_nm: float = 0.5
     most: int = 60
     feedback: bool = True
     translates: bool = True
@@ -157,7 +159,8 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
         rounds.append(Round(change, residual if change is not None else 0.0, now.compression[L4L5]))
         settled = change is not None and change < how.change and residual < how.residual_nm
         if settled or not how.feedback or len(rounds) >= how.most:
-            status, message = _ended(now, rounds, trail, settled or not how.feedback)
+            done = settled or not how.feedback
+            status, message = _ended(now, how, rounds, trail, done)
             return replace(now, status=status, message=message, rounds=tuple(rounds))
         off = now.pushes - pushes
         step, last = (_step(step, off, last) if len(rounds) > 1 else step), off
@@ -185,7 +188,7 @@ def _residual(now: Held, before: Array, how: How) -> float:
 
 
 def _ended(
-    now: Held, rounds: list[Round], trail: list[Array], settled: bool
+    now: Held, how: How, rounds: list[Round], trail: list[Array], settled: bool
 ) -> tuple[Balanced, str]:
     if not settled:
         last = rounds[-1]
@@ -199,11 +202,10 @@ def _ended(
     if not now.found.enough:
         slack = now.found.slack.reshape(-1, 3)
         worst = int(np.argmax(np.abs(slack).max(axis=1)))
-        short = float(np.abs(slack).max())
-        return (
-            Balanced.BEYOND_STRENGTH,
-            f"{short:.1f} N m too much for the muscles at {LEVELS[worst]}",
-        )
+        short, level = float(np.abs(slack).max()), LEVELS[worst]
+        if short > how.slack_nm:
+            return Balanced.BEYOND_STRENGTH, f"{short:.1f} N m too much for the muscles at {level}"
+        return Balanced.CONVERGED, f"{short:.2f} N m left over at {level}"
     return Balanced.CONVERGED, ""
 
 

@@ -203,4 +203,10 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Value
 def how_of(settings: TrunkLoads, twice: bool = False) -> How:
     """When rounds have settled; `twice`: whether to look for a second answer."""
     solving = settings.solving
-    return How(solving.change, solving.residual_nm, solving.most_iterations, twice=twice)
+    return How(
+        solving.change,
+        solving.residual_nm,
+        solving.slack_nm,
+        solving.most_iterations,
+        twice=twice,
+    )

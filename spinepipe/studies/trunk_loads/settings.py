@@ -101,6 +101,12 @@ class Solving(BaseModel):
     residual_nm: float = Field(
         default=0.1, gt=0, le=10, description="moment out of balance, less than"
     )
+    slack_nm: float = Field(
+        default=0.5,
+        ge=0,
+        le=10,
+        description="moment that may be left over before a task counts as beyond strength",
+    )
     most_iterations: int = Field(default=60, ge=2, le=1000, description="rounds at most")
     stiffness_gain: float = Field(
         default=5.0,

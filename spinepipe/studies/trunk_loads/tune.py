@@ -14,6 +14,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.task import Task
+from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
@@ -62,7 +63,7 @@ def run(root: str, study: str, pressures: str, tuning: str, agreement: str) -> N
     """Write the three tables."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
-    rows = rows_of(settings, cohort, progress)
+    rows = rows_of(volunteer_of(settings, cohort, source_of(settings, cohort).trunk), progress)
     made_by = provenance("tune", settings, cohort, None, marks_of(settings))
     for table, path in ((PRESSURES, pressures), (TUNING, tuning), (AGREEMENT, agreement)):
         write(from_rows(table, rows[table.name]), path, made_by)
@@ -74,17 +75,23 @@ class Volunteer:
 
     Attributes
     ----------
-    beside : measured pressures. tasks : all tasks, by name.
+    source : trunk of the reference person. tasks : all tasks, by name. beside : measured pressures.
     """
 
     settings: TrunkLoads
     cohort: Cohort
-    specimen: str
+    source: Trunk
     tasks: Mapping[str, Task]
     beside: tuple[Beside, ...]
     _known: dict[tuple[float, ...], dict[str, tuple[float | None, str]]] = field(
         default_factory=dict
     )
+
+    @property
+    def specimen(self) -> str:
+        """The person who stands for the volunteer."""
+        assert self.settings.volunteer is not None
+        return self.settings.volunteer.specimen
 
     def computed(self, values: Mapping[str, float]) -> dict[str, tuple[float | None, str]]:
         """MPa, and how it ended, of every task beside which a pressure was measured."""
@@ -97,9 +104,9 @@ class Volunteer:
         self, values: Mapping[str, float]
     ) -> Iterator[tuple[str, tuple[float | None, str]]]:
         settings, how = self.settings, how_of(self.settings)
-        source, who = source_of(settings, self.cohort).trunk, subject_of(self.cohort, self.specimen)
+        who = subject_of(self.cohort, self.specimen)
         regressions = regressions_of(settings, self.cohort.folder)
-        person = standing(settings, source, who, regressions, values).person
+        person = standing(settings, self.source, who, regressions, values).person
         for one in self.beside:
             task = changed_task(self.tasks[one.task], values)
             try:
@@ -111,12 +118,16 @@ class Volunteer:
             yield one.task, (told, outcome.status.value)
 
 
-def rows_of(settings: TrunkLoads, cohort: Cohort, progress: Progress) -> dict[str, list[Row]]:
-    """Rows of each table, by its name."""
-    assert settings.volunteer is not None
+def volunteer_of(settings: TrunkLoads, cohort: Cohort, source: Trunk) -> Volunteer:
+    """The volunteer of a study, before anything is computed."""
     tasks = read_tasks(cohort, settings.trunk_angle)
-    who = Volunteer(settings, cohort, settings.volunteer.specimen, tasks, beside_tasks(tasks))
-    tuned = settings.volunteer.tuned
+    return Volunteer(settings, cohort, source, tasks, beside_tasks(tasks))
+
+
+def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
+    """Rows of each table, by its name."""
+    assert who.settings.volunteer is not None
+    tuned = who.settings.volunteer.tuned
     counted = [one for one in who.beside if one.counted]
     progress.round("fitting all counted tasks")
     best, bound = fitted(who, tuned, counted, np.array([NOMINAL[name] for name in tuned]))
