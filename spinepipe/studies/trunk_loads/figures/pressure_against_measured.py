@@ -28,8 +28,8 @@ _BESIDE = {"untuned": 0.24, "tuned": 0.0, "left_out": -0.24}
 """Where a tier stands in the row of a task."""
 
 _NEAR_PT = 5.5
-_AROUND = tuple((np.cos(a), np.sin(a)) for a in np.arange(0.75, 2.75, 0.25) * np.pi)
-"""Directions in which a number may stand from its point, up and left first."""
+_AROUND = tuple((np.cos(a * np.pi), np.sin(a * np.pi)) for a in (0.75, 1.0, 1.25, 1.75, 2.0, 2.25))
+"""Directions in which a number may stand from its point, up and left first, intervals spared."""
 
 
 @dataclass(frozen=True, eq=False)
