@@ -27,12 +27,14 @@ class Figure:
     title : above it on the report's page.
     at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
     reads : the tables it is drawn from; a name with a dot is another result file.
+    also : tables that it shows besides, where the study has them.
     """
 
     name: str
     title: str
     at: str
     reads: tuple[str, ...]
+    also: tuple[str, ...] = ()
 
     @property
     def tables(self) -> tuple[str, ...]:

@@ -111,8 +111,9 @@ def outputs_of(place, kind, job):
 
 def inputs_of_figure(wildcards):
     files = layout(wildcards.study)
-    names = files.figure(wildcards.figure).reads
-    return {"tables": files.table_files(names), **files.other_files(names)}
+    figure = files.figure(wildcards.figure)
+    tables = files.table_files((*figure.reads, *figure.also))
+    return {"tables": tables, **files.other_files(figure.reads)}
 
 
 def inputs_of_report(wildcards):

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any
 
@@ -14,9 +14,8 @@ from plotly.offline import get_plotlyjs
 
 from spinepipe.cohort import Cohort
 from spinepipe.marks import KEY
-from spinepipe.report.page.scene import MOST_POSES, as_script, groups_of, scenes
-from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
-from spinepipe.report.style import picture, style
+from spinepipe.report.page.scene import as_script
+from spinepipe.report.page.space import Space, segment
 from spinepipe.report.words import count, listed, number
 from spinepipe.studies.study import Study
 from spinepipe.tables import Tables
@@ -40,7 +39,7 @@ _UNITS: Mapping[str, str] = {
     "mm2, deg2": "",
 }
 
-_MOST_NAMES, _MOST_SHOWN = 12, 6
+_MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
@@ -135,6 +134,7 @@ class Document:
     with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
     tests, load_shift_mm : what the view shows of a study that chooses tests or moves their loads.
     headline : the answer, where the study asks for one; figures then come before the 3-D view.
+    space : the 3-D view, where it is not that of the specimens.
     """
 
     question: str
@@ -148,6 +148,7 @@ class Document:
     tests: Sequence[str] | None = None
     load_shift_mm: Sequence[float] = (0.0, 0.0, 0.0)
     headline: Headline | None = None
+    space: Space | None = None
 
     def html(self, study: Study, cohort: Cohort) -> str:
         """The document, which fetches nothing; the same results, the same bytes."""
@@ -155,8 +156,10 @@ class Document:
             autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
         template = environment.from_string(_part("page.html"))
-        views = self._views(cohort) if cohort.has_frames else []
-        drawn = scenes(views, cohort, self.poses)
+        space = self.space
+        if space is None:
+            shown = (self.poses, self.with_loads, self.tests, self.load_shift_mm)
+            space = segment(cohort, *shown)
         return template.render(
             study=study,
             cohort=cohort,
@@ -168,21 +171,13 @@ class Document:
             tables=self.tables,
             origin=origin(study, self.metadata),
             left_out=self.left_out,
-            drawn=list(drawn),
-            still=_address(_still(views[0], cohort)) if views else "",
-            groups=groups_of(drawn),
-            most_poses=MOST_POSES,
-            scenes=Markup(as_script(drawn)),  # as_script leaves nothing that could end the element
+            space=space,
+            still=_address(space.still),
+            scenes=Markup(as_script(space.scenes)),  # nothing in it could end the element
             style=Markup(_part("page.css")),
             script=Markup(_part("page.js.html")),
-            plotly=Markup(get_plotlyjs()) if views else "",
+            plotly=Markup(get_plotlyjs()) if space.scenes else "",
         )
-
-    def _views(self, cohort: Cohort) -> list[SpecimenView]:
-        """What is shown of each of the first specimens."""
-        shown = cohort.specimen_names[:_MOST_SHOWN]
-        views = [view_of(cohort, name, self.tests, self.load_shift_mm) for name in shown]
-        return views if self.with_loads else [replace(v, tested=()) for v in views]
 
 
 def _part(name: str) -> str:
@@ -192,12 +187,6 @@ def _part(name: str) -> str:
 def _specimens(cohort: Cohort) -> str:
     names = cohort.specimen_names
     return f"{count(len(names), 'specimen')}: {listed(names, _MOST_NAMES, last=None)}"
-
-
-def _still(view: SpecimenView, cohort: Cohort) -> bytes:
-    """A specimen as a drawing, for paper and for readers without scripts."""
-    with style():
-        return picture(draw_specimen(cohort, view), "svg")
 
 
 def _address(svg: bytes) -> str:

@@ -37,7 +37,7 @@ GROUPS = {
 _BONE = "#c8b89a"
 _BOX = 1.45
 _OWN_MM, _SAMPLED_MM, _ARROW_SHARE = 11.0, 16.0, 0.18
-_TITLES = ("anterior (mm)", "superior (mm)", "right (mm)")
+TITLES = ("anterior (mm)", "superior (mm)", "right (mm)")
 
 
 def scenes(views: Sequence[SpecimenView], cohort: Cohort, poses: pd.DataFrame) -> dict[str, Any]:
@@ -69,13 +69,14 @@ def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:
         *_once(_loads(view)),
     ]
     axes = {
-        f"{letter}axis": _axis(letter, title) for letter, title in zip("xyz", _TITLES, strict=True)
+        f"{letter}axis": light_axis(letter, title)
+        for letter, title in zip("xyz", TITLES, strict=True)
     }
     camera = {"up": {"x": 0, "y": 1, "z": 0}, "eye": {"x": 1.1, "y": 0.35, "z": 1.7}}
     camera["center"] = {"x": 0, "y": -0.07, "z": 0}
     layout = {
         "template": "none",
-        "scene": {**axes, "aspectmode": "manual", "aspectratio": _aspect(parts), "camera": camera},
+        "scene": {**axes, "aspectmode": "manual", "aspectratio": aspect(parts), "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"orientation": "h", "y": 0.0, "yanchor": "top"},
         "showlegend": True,
@@ -83,13 +84,13 @@ def _scene(view: SpecimenView, cohort: Cohort, poses: pd.DataFrame) -> Any:
     return json.loads(go.Figure(data=parts, layout=layout).to_json(engine="json"))
 
 
-def _axis(letter: str, title: str) -> dict[str, Any]:
+def light_axis(letter: str, title: str) -> dict[str, Any]:
     """A light grid; few ticks across the spine, more along it."""
     light = {"backgroundcolor": "white", "gridcolor": "#dddddd", "zerolinecolor": "#bbbbbb"}
     return {"title": {"text": title}, "nticks": 10 if letter == "y" else 4, **light}
 
 
-def _aspect(parts: list[Any]) -> dict[str, float]:
+def aspect(parts: list[Any]) -> dict[str, float]:
     """Lengths of the box, equal millimetres along all its sides, so that the view holds it."""
     sizes = {}
     for letter in "xyz":

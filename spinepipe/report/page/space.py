@@ -1,0 +1,100 @@
+"""The 3-D view of a page: scenes of which one is shown at a time, by default of the specimens."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.page.scene import MOST_POSES, groups_of, scenes
+from spinepipe.report.specimen import SpecimenView, draw_specimen, view_of
+from spinepipe.report.style import picture, style
+
+_MOST_SHOWN = 6
+
+
+@dataclass(frozen=True)
+class Space:
+    """What is shown in space, and on paper instead; without scenes nothing is.
+
+    Attributes
+    ----------
+    title : above it. chooser : what the menu chooses. shows : what a reader who cannot see it is
+        told.
+    scenes : a plotly figure, as plain data, of each choice; `meta` of a trace is its group.
+    groups : what can be switched on and off, in words.
+    still : a drawing (SVG) for paper and for readers without scripts; `still_shows` what it has.
+    caption : below it.
+    """
+
+    title: str = ""
+    chooser: str = ""
+    shows: str = ""
+    scenes: Mapping[str, Any] = field(default_factory=dict)
+    groups: Mapping[str, str] = field(default_factory=dict)
+    still: bytes = b""
+    still_shows: str = ""
+    caption: str = ""
+
+
+def segment(
+    cohort: Cohort,
+    poses: pd.DataFrame,
+    with_loads: bool,
+    tests: Sequence[str] | None,
+    load_shift_mm: Sequence[float],
+) -> Space:
+    """The first specimens of a cohort; nothing where it does not tell where joints are."""
+    if not cohort.has_frames:
+        return Space()
+    shown = cohort.specimen_names[:_MOST_SHOWN]
+    views = [view_of(cohort, name, tests, load_shift_mm) for name in shown]
+    views = views if with_loads else [replace(view, tested=()) for view in views]
+    drawn = scenes(views, cohort, poses)
+    groups = groups_of(drawn)
+    return Space(
+        "The segment in 3-D",
+        "Specimen",
+        f"A specimen in space: {', '.join(groups.values())}",
+        drawn,
+        groups,
+        _still(views[0], cohort),
+        _still_shows(cohort, groups),
+        _caption(cohort, groups, len(drawn)),
+    )
+
+
+def _still(view: SpecimenView, cohort: Cohort) -> bytes:
+    """A specimen as a drawing."""
+    with style():
+        return picture(draw_specimen(cohort, view), "svg")
+
+
+def _still_shows(cohort: Cohort, groups: Mapping[str, str]) -> str:
+    marks = "landmarks, " if "vertebrae" in groups else ""
+    loads = " and loads" if "loads" in groups else ""
+    name = cohort.specimen_names[0]
+    return f"Specimen {name} from its right side and from behind, with {marks}joint frames{loads}"
+
+
+def _caption(cohort: Cohort, groups: Mapping[str, str], drawn: int) -> str:
+    bodies = (
+        "Landmarks at the neutral pose; drums join the endplate centres of a vertebra and are as "
+        "wide as its pedicle bases are apart (shape not measured; a lone endplate has a drum of "
+        "6 mm)."
+    )
+    sampled = (
+        "Thick axes: the cohort's own joint frames; thin axes: at most "
+        f"{MOST_POSES} sampled joint frames."
+    )
+    parts = [
+        bodies if "vertebrae" in groups else "The neutral pose.",
+        sampled if "sampled" in groups else "Axes: the cohort's own joint frames.",
+    ]
+    if "loads" in groups:
+        parts.append("Arrows end where the largest load of each test acts.")
+    n = len(cohort.specimen_names)
+    if n > drawn:
+        parts.append(f"The first {drawn} of {n} specimens.")
+    return " ".join(parts)

@@ -1,0 +1,73 @@
+"""How tasks and persons are told apart in all figures of this kind, in colour and without."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE
+from spinepipe.report.words import plain, short
+
+PURPLE, SKY = "#CC79A7", "#56B4E9"
+"""Okabe and Ito's reddish purple and sky blue."""
+
+Dashes = str | tuple[int, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour, line and mark of one of several."""
+
+    color: str
+    marker: str
+    dashes: Dashes
+
+    def line(self, hollow: bool = False, **how: Any) -> dict[str, Any]:
+        """Settings of a line with marks; hollow where the forces are not to be trusted."""
+        face = WHITE if hollow else self.color
+        look = {"color": self.color, "ls": self.dashes, "marker": self.marker, "lw": 1.0}
+        return {**look, "ms": 3.4, "mec": self.color, "mfc": face, "mew": 0.8, **how}
+
+
+LOOKS = (
+    Look(BLACK, "o", "-"),
+    Look(BLUE, "s", (0, (6.0, 1.5))),
+    Look(VERMILLION, "^", (0, (4.0, 2.0))),
+    Look(GREEN, "D", (0, (2.0, 1.5))),
+    Look(PURPLE, "v", (0, (5.0, 1.5, 1.0, 1.5))),
+    Look(SKY, "P", (0, (1.0, 1.0))),
+)
+
+HOLLOW_WORDS = "Hollow: forces did not settle, or do not hold the task."
+
+
+def look_of(number: int) -> Look:
+    """The look of one of several; they come again after the last."""
+    return LOOKS[number % len(LOOKS)]
+
+
+def key_of(labels: dict[str, Look]) -> list[Line2D]:
+    """Marks of a legend."""
+    return [Line2D([], [], **look.line(), label=name) for name, look in labels.items()]
+
+
+def hollow_mark() -> Line2D:
+    """Mark of what is not to be trusted."""
+    return Line2D([], [], marker="o", ls="", ms=3.4, mec=GREY, mfc=WHITE, label="not settled")
+
+
+def task_label(name: str) -> str:
+    """A task beside an axis."""
+    return short(plain(name), 24)
+
+
+def scale(axis: Axes) -> None:
+    """Ticks of an upright axis that is a scale, not a list."""
+    axis.tick_params(axis="y", size=2.5, width=0.6)
+
+
+def values(rows: pd.DataFrame, column: str) -> "pd.Series[float]":
+    """A column as numbers, empty cells as NaN."""
+    return rows[column].astype(float)
