@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.study_files import StudyFiles, files_of_block, numbered_blocks
+from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.trunk_loads.checks import check_trunk
 from spinepipe.studies.trunk_loads.forms import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
@@ -62,7 +62,51 @@ class TrunkFiles(StudyFiles):
     """
 
     joined = (*HELD, "simplified", "responses")
-    drawings = ()
+    drawings = (
+        Figure(
+            "pressure_against_measured",
+            "Computed against measured pressure of the disc",
+            "figures.pressure_against_measured:pressure_against_measured_figure",
+            ("pressures", "agreement"),
+            ("intervals",),
+        ),
+        Figure(
+            "load_by_level",
+            "Load on every joint",
+            "figures.load_by_level:load_by_level_figure",
+            ("tasks", "levels"),
+        ),
+        Figure(
+            "load_over_flexion",
+            "Load and muscle forces while bending forwards",
+            "figures.load_over_flexion:load_over_flexion_figure",
+            ("tasks", "muscles"),
+        ),
+        Figure(
+            "muscle_force_bars",
+            "Forces of the muscles",
+            "figures.muscle_force_bars:muscle_force_bars_figure",
+            ("tasks", "muscles"),
+        ),
+        Figure(
+            "drivers",
+            "How far answers can be trusted, and what drives them",
+            "figures.drivers:drivers_figure",
+            ("intervals", "drivers"),
+        ),
+        Figure(
+            "cost_of_simplifications",
+            "What four wrong simplifications cost",
+            "figures.cost_of_simplifications:cost_of_simplifications_figure",
+            ("simplified",),
+        ),
+        Figure(
+            "upright",
+            "How persons stand upright",
+            "figures.upright:upright_figure",
+            ("upright",),
+        ),
+    )
 
     study: TrunkLoads
     rebuilt: bool
