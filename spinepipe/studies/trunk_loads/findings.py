@@ -10,6 +10,7 @@ from spinepipe.report.page.document import Results, judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
 from spinepipe.studies.trunk_loads.findings_of_loads import (
     by_level,
+    filled,
     largest,
     most,
     muscles,
@@ -73,8 +74,7 @@ def _places(rows: pd.DataFrame) -> str:
 
 def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """Pressures outside the range of Eq 6."""
-    rows = sound_rows(results, "tasks")
-    known = rows.dropna(subset=["inside_eq_6"])
+    known = filled(sound_rows(results, "tasks"), "inside_eq_6")
     if known.empty:
         return
     out = known[~known["inside_eq_6"].astype(bool)]
@@ -90,7 +90,7 @@ def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 
 def slack(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """The largest moment that no muscle holds, in tasks that settled."""
-    rows = sound_rows(results, "tasks").dropna(subset=["largest_slack_nm"])
+    rows = filled(sound_rows(results, "tasks"), "largest_slack_nm")
     if rows.empty:
         return
     worst = most(rows, "largest_slack_nm")
@@ -215,7 +215,7 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """How much of the strength tasks take."""
     rows = results.table("tasks")
-    known = rows.dropna(subset=["strength_used"]) if len(rows) else rows
+    known = filled(rows, "strength_used")
     if known.empty:
         return
     near = known[known["strength_used"] > _NEAR_LIMIT]
@@ -231,7 +231,7 @@ def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[st
 def stability(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """Whether the spine stands when pushed a little, and what co-activation that takes."""
     rows = sound_rows(results, "tasks")
-    known = rows.dropna(subset=["stable"]) if len(rows) else rows
+    known = filled(rows, "stable")
     if known.empty:
         return
     fall = known[~known["stable"].astype(bool)]

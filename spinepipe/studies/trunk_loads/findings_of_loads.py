@@ -27,6 +27,11 @@ def sound_rows(results: Results, table: str) -> pd.DataFrame:
     return rows if rows.empty else rows[sound(rows)]
 
 
+def filled(rows: pd.DataFrame, *columns: str) -> pd.DataFrame:
+    """Rows with values in these columns; none of a table that is absent."""
+    return rows if rows.empty else rows.dropna(subset=list(columns))
+
+
 def most(rows: pd.DataFrame, column: str) -> Row:
     """The row with the largest value, of at least one."""
     return max(rows.to_dict("records"), key=lambda row: float(row[column]))
@@ -37,7 +42,7 @@ def largest(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     rows = sound_rows(results, "tasks")
     told = []
     for column, words in _LOADS.items():
-        known = rows.dropna(subset=[column]) if len(rows) else rows
+        known = filled(rows, column)
         if len(known):
             row = most(known, column)
             told.append(
@@ -50,7 +55,7 @@ def largest(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 def by_level(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """Which level of the task of the headline carries most."""
     found = answer_of(study, cohort, results)
-    rows = _of_answer(found, results.table("levels")).dropna(subset=["compression_n"])
+    rows = filled(_of_answer(found, results.table("levels")), "compression_n")
     if found is None or rows.empty:
         return
     highest = most(rows, "compression_n")
@@ -67,7 +72,7 @@ def by_level(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[st
 def muscles(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """Which muscles hold the task of the headline."""
     found = answer_of(study, cohort, results)
-    rows = _of_answer(found, results.table("muscles")).dropna(subset=["force_n"])
+    rows = filled(_of_answer(found, results.table("muscles")), "force_n")
     if found is None or rows.empty or rows["force_n"].sum() <= 0.0:
         return
     summed = grouped(rows, ("force_n",)).groupby("group")["force_n"].sum()
@@ -163,7 +168,7 @@ def upright(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     """What finding the upright posture does to the moments of the joints."""
     rows = results.table("upright")
     columns = ["moment_before_nm", "moment_after_nm"]
-    known = rows.dropna(subset=columns) if len(rows) else rows
+    known = filled(rows, *columns)
     if known.empty:
         return
     total = known[columns].abs().groupby(known["specimen"], sort=False).sum()
@@ -179,6 +184,6 @@ def upright(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 def _of_answer(found: Answer | None, rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of the task of the headline."""
     if found is None or rows.empty:
-        return pd.DataFrame(columns=["compression_n", "force_n"])
+        return pd.DataFrame()
     own = of_person(rows, found.task["specimen"])
     return own[own["task"] == found.task["task"]]

@@ -1,6 +1,7 @@
 """Figures of trunk loads: drawn for any persons and tasks, and true to the tables."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
 from typing import Any
@@ -67,8 +68,13 @@ def words(figure: Figure) -> str:
 
 
 def panel(figure: Figure, title: str) -> Axes:
-    """The panel whose heading ends with some words."""
-    return next(axis for axis in figure.axes if axis.get_title("left").endswith(title))
+    """The panel of a heading, after its letter."""
+    return next(axis for axis in figure.axes if axis.get_title("left")[1:].strip() == title)
+
+
+def rows_of(axis: Axes) -> list[str]:
+    """Names of the rows of a panel, from the bottom up."""
+    return [label.get_text() for label in axis.get_yticklabels()]
 
 
 def points(axis: Axes, marker: str) -> set[tuple[float, float]]:
@@ -195,15 +201,13 @@ def test_what_is_beyond_strength_is_drawn_hollow_and_said() -> None:
     drawn = Size(1, ("standing", "exertion_extension"), (BEYOND,), drawn=("exertion_extension",))
     figure = draw("load_by_level", drawn)
     assert "Hollow: forces did not settle" in words(figure)
-    faces = {
-        line.get_markerfacecolor() for line in figure.axes[0].lines if len(line.get_xdata()) == 7
-    }
-    assert "#FFFFFF" in faces
+    courses = [line for line in figure.axes[0].lines if len(np.asarray(line.get_xdata())) == 7]
+    assert "#FFFFFF" in {line.get_markerfacecolor() for line in courses}
 
 
 def test_levels_stand_as_in_a_spine() -> None:
     axis = draw("load_by_level", Size(1)).axes[0]
-    labels = [label.get_text() for label in axis.get_yticklabels()]
+    labels = rows_of(axis)
     assert labels[0] == "L5S1"
     assert labels[-1] == "T11T12"
     assert axis.get_ylim()[0] < axis.get_ylim()[1]
@@ -273,22 +277,15 @@ def test_costs_are_shares_of_the_whole_model() -> None:
 
 
 def test_factors_stand_in_the_order_of_their_indices() -> None:
-    axis = draw("drivers", Size(1)).axes[3]
-    labels = [label.get_text() for label in axis.get_yticklabels()]
+    labels = rows_of(draw("drivers", Size(1)).axes[3])
     assert labels[-1] == "how far ahead the hands are"
     assert labels[0] == "stiffness of joints"
     rows = tables_of(Size(1))["drivers"]
     rows.loc[rows["factor"] == "passive_rotation", "total"] = 0.9
-    labels = [
-        label.get_text()
-        for label in draw("drivers", Size(1), drivers=rows).axes[3].get_yticklabels()
-    ]
-    assert labels[-1] == "stiffness of joints"
+    assert rows_of(draw("drivers", Size(1), drivers=rows).axes[3])[-1] == "stiffness of joints"
 
 
 def test_the_paper_stands_beside_its_own_volunteers_alone() -> None:
-    from dataclasses import replace
-
     size = Size(1)
     assert "Ghezelbash 2016 Table 2" in words(draw("upright", size))
     other = replace(cohort_of(size), name="mine")
