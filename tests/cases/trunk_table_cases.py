@@ -114,7 +114,8 @@ def cohort_of(size: Size) -> Cohort:
 def study_of(size: Size) -> TrunkLoads:
     """The study."""
     asked: Row = {"study": "s", "kind": "trunk_loads", "cohort": "trunk_volunteers"}
-    asked["drawn_tasks"] = list(size.drawn)
+    if size.drawn:
+        asked["drawn_tasks"] = list(size.drawn)
     if size.samples:
         asked["uncertain"] = {
             "tasks": list(SAMPLED),

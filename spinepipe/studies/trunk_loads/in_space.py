@@ -45,7 +45,7 @@ LEAST_MPA = 0.05
 _XYZ = ["x_mm", "y_mm", "z_mm"]
 _LINE_PX, _SPINE_PX = 4.0, 9.0
 _VIEWS = (("From the right", "x_mm", "forwards (mm)"), ("From behind", "z_mm", "to the right (mm)"))
-_WIDTH_MM, _AROUND_MM, _MARGIN_MM, _LARGEST = 135.0, 16.0, 12.0, 0.4
+_WIDTH_MM, _AROUND_MM, _MARGIN_MM, _LARGEST = 135.0, 22.0, 12.0, 0.4
 """Width of both views on paper, what is around them, margin in the body, scale at most."""
 
 

@@ -7,16 +7,14 @@ import pandas as pd
 from spinepipe.report.words import fixed, number, plain
 from spinepipe.status import Balanced
 
-NO_FORCES = Balanced.OUT_OF_REACH.value
-
 ENDED = {
-    Balanced.BEYOND_STRENGTH.value: "is beyond the strength of the muscles",
-    Balanced.NOT_CONVERGED.value: "did not settle",
-    Balanced.CYCLING.value: "goes to and fro between answers",
-    Balanced.TWO_ANSWERS.value: "has two answers, by where the search begins",
-    Balanced.OUT_OF_REACH.value: "could not be posed",
+    Balanced.BEYOND_STRENGTH.value: "beyond the strength of the muscles",
+    Balanced.NOT_CONVERGED.value: "unsettled",
+    Balanced.CYCLING.value: "going to and fro between answers",
+    Balanced.TWO_ANSWERS.value: "with two answers, by where the search begins",
+    Balanced.OUT_OF_REACH.value: "out of reach, without a posture",
 }
-"""Endings other than converged, said of one task."""
+"""How tasks ended that did not converge."""
 
 FACTORS = {
     "height_cm": "body height",

@@ -1,0 +1,214 @@
+"""The answer first: the load that a person would look for, and what is not to be trusted in it.
+
+One task of one person stands for the others: with a load in the hands if there is one, sampled if
+any is, and of these the one that presses L4L5 most.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.words import capital, count, fixed, listed, number, plain
+from spinepipe.studies.trunk_loads.chosen import of_person, relaxed, shown_person
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.words import (
+    ENDED,
+    TIERS,
+    factor,
+    held_words,
+    mpa,
+    newton,
+    sound,
+)
+
+COMPRESSION, PRESSURE = "l4l5_compression_n", "l4l5_pressure_mpa"
+MOST = 0.5
+"""Total index above which most of a variance hangs on a factor."""
+
+Row = dict[Any, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The task that the answer is of.
+
+    Attributes
+    ----------
+    task : its row. standing : row of relaxed standing of the same person, None where there is none
+        or the task is that one itself.
+    """
+
+    task: Row
+    standing: Row | None
+
+    @property
+    def name(self) -> str:
+        """The task in words."""
+        return plain(str(self.task["task"]))
+
+
+def answer_of(study: TrunkLoads, cohort: Cohort, results: Results) -> Answer | None:
+    """The task that stands for the others, None where no task has sound forces."""
+    tasks = results.table("tasks")
+    if tasks.empty:
+        return None
+    person = shown_person(study, tasks[sound(tasks)])
+    own = of_person(tasks, person)
+    good = own[sound(own)] if len(own) else own
+    if good.empty:
+        return None
+    intervals = of_person(results.table("intervals"), person)
+    known = intervals.dropna(subset=["low", "high"])["task"] if len(intervals) else ()
+    rank = pd.DataFrame(
+        {
+            "loaded": good["hand_load_kg"] > 0.0,
+            "sampled": good["task"].isin(list(known)),
+            "n": good[COMPRESSION].astype(float),
+        }
+    )
+    best = good.loc[rank.sort_values(["loaded", "sampled", "n"], kind="stable").index[-1]]
+    still = relaxed(own, cohort)
+    others = own[(own["task"] == still) & (own["task"] != best["task"])]
+    rows = others.to_dict("records")
+    return Answer(best.to_dict(), rows[0] if rows else None)
+
+
+def headline(study: TrunkLoads, cohort: Cohort, results: Results) -> Headline:
+    """The answer, how sure it is, and what casts doubt on it."""
+    found = answer_of(study, cohort, results)
+    doubts = tuple(_doubts(results, found))
+    if found is None:
+        return Headline(
+            "No load can be told: no task has muscle forces that settled and hold it.", "", doubts
+        )
+    sure = (_sampled(found, results), _beside_measured(results))
+    return Headline(_words(found, results), " ".join(part for part in sure if part), doubts)
+
+
+def interval(results: Results, row: Row, quantity: str) -> tuple[float, float] | None:
+    """Middle 95 % of the samples of a quantity of a task; None where it is not known."""
+    rows = results.table("intervals")
+    if rows.empty:
+        return None
+    same = (rows["specimen"] == row["specimen"]) & (rows["task"] == row["task"])
+    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=["low", "high"])
+    if known.empty:
+        return None
+    return float(known["low"].iloc[0]), float(known["high"].iloc[0])
+
+
+def leading(results: Results, row: Row, quantity: str = PRESSURE) -> list[tuple[str, float]]:
+    """Factors of a quantity of a task with their total indices, the largest first."""
+    rows = results.table("drivers")
+    if rows.empty:
+        return []
+    same = (rows["specimen"] == row["specimen"]) & (rows["task"] == row["task"])
+    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=["total"])
+    known = known.sort_values("total", ascending=False, kind="stable")
+    return [(str(n), float(v)) for n, v in zip(known["factor"], known["total"], strict=True)]
+
+
+def _words(found: Answer, results: Results) -> str:
+    row = found.task
+    ends = interval(results, row, COMPRESSION)
+    between = f" ({newton(ends[0])} to {newton(ends[1])})" if ends else ""
+    told = (
+        f"Task {found.name}{held_words(row)} presses L4L5 of {row['specimen']} with "
+        f"{newton(row[COMPRESSION])}{between}"
+    )
+    if found.standing is not None and found.standing[COMPRESSION] > 0.0:
+        times = row[COMPRESSION] / found.standing[COMPRESSION]
+        told += f", {number(times, 2)} times relaxed standing"
+    ends = interval(results, row, PRESSURE)
+    between = f" ({fixed(ends[0])} to {mpa(ends[1])})" if ends else ""
+    told += f"; the pressure in the disc is {mpa(row[PRESSURE])}{between}"
+    first = leading(results, row)[:1]
+    if ends and first:
+        name, share = first[0]
+        part = "most" if share > MOST else "the largest part"
+        told += f"; {part} of that spread comes of {factor(name)}"
+    return f"{told}."
+
+
+def _sampled(found: Answer, results: Results) -> str:
+    rows = results.table("intervals")
+    if interval(results, found.task, COMPRESSION) is None:
+        return "How far this can be trusted is not known: the task was not sampled."
+    row = of_person(rows, found.task["specimen"])
+    row = row[row["task"] == found.task["task"]].iloc[0]
+    held, failed = int(row["n_samples"]), int(row["n_failed"])
+    lost = f"; {failed} more did not hold" if failed else ""
+    return (
+        f"In brackets: middle 95 % of {count(held, 'sample')} of the uncertain inputs{lost}. What "
+        "the model leaves out is not in it."
+    )
+
+
+def _beside_measured(results: Results) -> str:
+    """What agreement with measured pressures says of the untuned answer."""
+    rows = results.table("agreement")
+    if rows.empty:
+        return ""
+    own = rows[rows["tier"] == "untuned"].dropna(subset=["rmse_mpa"])
+    if own.empty:
+        return "No computed pressure can be held against a measured one."
+    row = own.to_dict("records")[0]
+    return (
+        f"With {TIERS['untuned']}, pressures are off from measured ones by "
+        f"{mpa(row['rmse_mpa'])} (root mean square over {count(int(row['n_tasks']), 'task')})."
+    )
+
+
+def _doubts(results: Results, found: Answer | None) -> list[str]:
+    """What should be looked at before the answer is believed."""
+    tasks = results.table("tasks")
+    doubts = []
+    lost = tasks[~sound(tasks)] if len(tasks) else tasks
+    if len(lost):
+        ends = [
+            f"{len(part)} {plain(str(status))} ({listed(_names(part), 3)})"
+            for status, part in lost.groupby("status", sort=False)
+        ]
+        doubts.append(
+            f"Look at this first: {len(lost)} of {count(len(tasks), 'task')} of all persons did "
+            f"not settle or cannot be held: {'; '.join(ends)}."
+        )
+    inside = None if found is None else found.task["inside_eq_6"]
+    if found is not None and pd.notna(inside) and not inside:
+        doubts.append(
+            f"The pressure of task {found.name} lies outside the range in which its formula was "
+            "fitted."
+        )
+    missed = missed_goals(results)
+    if missed:
+        doubts.append(f"{capital(missed)}.")
+    return doubts
+
+
+def _names(rows: pd.DataFrame) -> list[str]:
+    return [plain(str(name)) for name in dict.fromkeys(rows["task"])]
+
+
+def missed_goals(results: Results) -> str:
+    """Goals of agreement that are missed, and by how much; nothing where none is."""
+    rows = results.table("agreement")
+    if rows.empty:
+        return ""
+    known = rows.dropna(subset=["rmse_mpa"])
+    told = [
+        f"{plain(row['tier'])} {mpa(row['rmse_mpa'])} instead of at most "
+        f"{mpa(row['goal_rmse_mpa'])} ({fixed(row['rmse_mpa'] - row['goal_rmse_mpa'], 3)} more)"
+        for row in known.to_dict("records")
+        if not row["reached"]
+    ]
+    if not told:
+        return ""
+    return f"pressures are further from measured ones than was asked for: {'; '.join(told)}"
+
+
+def ended_words(status: str) -> str:
+    """An ending, said of one task."""
+    return ENDED.get(status, plain(status))

@@ -1,0 +1,159 @@
+"""The report of trunk loads: the answer first, the trunk in space, fetching nothing."""
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from trunk_table_cases import DRAWN, Size, cohort_of, study_of, tables_of
+
+from spinepipe.report.page.document import Picture, Results
+from spinepipe.studies.trunk_loads import tables, tables_of_studies
+from spinepipe.studies.trunk_loads.in_space import MOST_SCENES, trunk_in_space
+from spinepipe.studies.trunk_loads.page import READ, document, left_out, shown_tables
+
+PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
+SIZES = {
+    "five persons": Size(),
+    "one person, nothing more": Size(1, volunteer=False, samples=False, simplified=False),
+    "nothing drawn": Size(1, drawn=()),
+    "one task": Size(1, ("standing",)),
+    "nothing settled": Size(1, ("standing",), (("standing", "out_of_reach", "<no>"),)),
+}
+
+
+def results(size: Size, **changed: pd.DataFrame) -> Results:
+    """Made-up results with a picture."""
+    made = tables_of(size, **changed)
+    picture = Picture.of("load_by_level", "Loads by level", PICTURE, "What it shows.")
+    metadata = {name: {"seed": "7", "code_digest": name} for name in made}
+    return Results(made, metadata, {"load_by_level": picture})
+
+
+def page_of(size: Size, **changed: pd.DataFrame) -> str:
+    """The page of made-up results."""
+    study, cohort = study_of(size), cohort_of(size)
+    return document(study, cohort, results(size, **changed)).html(study, cohort)
+
+
+def scenes_of(page: str) -> dict[str, Any]:
+    """What the script of the page is given."""
+    found = re.search(r'<script type="application/json" id="scenes">(.*?)</script>', page)
+    assert found is not None
+    scenes: dict[str, Any] = json.loads(found[1])
+    return scenes
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+def test_page_of_any_study_fetches_nothing(size: Size) -> None:
+    page = page_of(size)
+    before_scripts = page.split("<script")[0]
+    for address in re.findall(r' (?:src|href)="([^"]*)"', before_scripts):
+        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
+    assert '<h2 id="findings-title">Verdict</h2>' in page
+    assert "nan" not in re.sub("<[^>]*>", " ", before_scripts).lower().split()
+    drawn = bool(len(tables_of(size)["paths"]))
+    assert ("drawScene();" in page) == drawn
+    assert ("The trunk in 3-D" in page) == drawn
+
+
+def test_page_has_the_same_bytes_twice() -> None:
+    assert page_of(Size(1)) == page_of(Size(1))
+
+
+def test_the_answer_stands_before_all_else() -> None:
+    page = page_of(Size(1))
+    order = ["Verdict", "Look at this first", 'class="headline"', "Figure 1.", "The trunk in 3-D"]
+    places = [page.index(words) for words in [*order, "Table 1."]]
+    assert places == sorted(places)
+
+
+def test_tables_are_those_of_the_kind_and_empty_ones_are_left_out() -> None:
+    shapes = {
+        shape.name
+        for module in (tables, tables_of_studies)
+        for shape in vars(module).values()
+        if isinstance(shape, tables.Table)
+    }
+    assert set(READ) - {"against_ghezelbash_2016"} <= shapes
+    shown = [table.name for table in shown_tables(results(Size(1)))]
+    assert shown[:3] == ["tasks", "agreement", "pressures"]
+    assert not {"masses", "scaling"} & set(shown)
+    empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}
+    assert not shown_tables(results(Size(1), **empty))
+    assert "No load can be told" in page_of(Size(1), **empty)
+
+
+def test_what_the_study_leaves_out_is_told_with_its_reason() -> None:
+    assert left_out(study_of(Size(1))) == ()
+    told = left_out(study_of(Size(1, volunteer=False, samples=False)))
+    assert len(told) == 2
+    assert "(no task is to be sampled)" in told[0]
+    assert "(nobody stands for the volunteer)" in told[1]
+
+
+def test_every_drawn_task_has_a_scene_and_every_group_a_switch() -> None:
+    page = page_of(Size(1))
+    scenes = scenes_of(page)
+    assert set(scenes) == {name.replace("_", " ") for name in DRAWN}
+    assert re.findall(r"<option>(.*?)</option>", page) == [n.replace("_", " ") for n in DRAWN]
+    groups = set(re.findall(r'data-group="(.*?)"', page))
+    shown = {trace["meta"] for scene in scenes.values() for trace in scene["data"]}
+    assert groups == shown
+    assert {"spine", "load", "multifidus"} < groups
+
+
+def test_lines_are_the_paths_and_their_colour_is_the_stress() -> None:
+    rows = tables_of(Size(1))["paths"]
+    scene = scenes_of(page_of(Size(1)))["load away"]
+    trace = next(trace for trace in scene["data"] if trace["meta"] == "psoas")
+    own = rows[(rows["task"] == "load_away") & (rows["group"] == "psoas")]
+    first = own[own["muscle"] == own["muscle"].iloc[0]]
+    n = len(first)
+    drawn = np.array([trace[axis][:n] for axis in "xyz"], dtype=float).T
+    # places are written to 0.1 mm
+    np.testing.assert_allclose(drawn, first[["x_mm", "y_mm", "z_mm"]], rtol=0, atol=0.0501)
+    assert trace["x"][n] is None, "a gap before the next fascicle"
+    assert trace["line"]["color"][0] == pytest.approx(first["stress_mpa"].iloc[0], abs=1e-4)
+    assert len(trace["line"]["color"]) == len(trace["x"]) == len(trace["text"])
+    box = scene["layout"]["coloraxis"]
+    assert box["cmin"] == 0.0
+    assert box["cmax"] == pytest.approx(float(rows["stress_mpa"].max()), abs=1e-4)
+    assert box["colorbar"]["title"]["text"] == "stress (MPa)"
+
+
+def test_millimetres_are_equally_long_along_all_axes() -> None:
+    scene = scenes_of(page_of(Size(1)))["load away"]
+    shape = scene["layout"]["scene"]["aspectratio"]
+    for letter, other in ("xy", "yz"):
+        sizes = []
+        for axis in (letter, other):
+            values = [v for trace in scene["data"] for v in trace[axis] if v is not None]
+            sizes.append(max(values) - min(values))
+        assert shape[letter] / shape[other] == pytest.approx(sizes[0] / sizes[1], rel=1e-3)
+
+
+def test_the_load_stands_where_the_task_says() -> None:
+    scenes = scenes_of(page_of(Size(1)))
+    load = next(trace for trace in scenes["one handed"]["data"] if trace["meta"] == "load")
+    assert (load["x"], load["y"], load["z"]) == ([0.0], [-150.0], [340.0])
+    assert "19.8 kg" in load["text"][0]
+    assert all(trace["meta"] != "load" for trace in scenes["standing"]["data"])
+
+
+def test_no_more_than_some_scenes_and_that_is_said() -> None:
+    made = tables_of(Size())
+    space = trunk_in_space(cohort_of(Size()), made["paths"], made["levels"])
+    assert len(space.scenes) == MOST_SCENES < 15
+    assert f"The first {MOST_SCENES} of 15 postures." in space.caption
+    assert next(iter(space.scenes)) == "standing, volunteer"
+
+
+def test_names_cannot_end_the_script() -> None:
+    rows = tables_of(Size(1))["paths"]
+    rows["muscle"] = rows["muscle"] + "</script><b>"
+    page = page_of(Size(1), paths=rows)
+    assert "</script><b>" not in page
+    assert "</script><b>" in json.dumps(scenes_of(page))
