@@ -22,6 +22,7 @@ from spinepipe.status import Balanced
 L4L5 = LEVELS.index("L4L5")
 _SHORTEST, _LONGEST = 0.1, 5.0
 _HEAVY_N = 3000.0
+_LOWEST = 3
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
     """
     least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
     first = _rounds(person, task, how, least, np.zeros(len(LEVELS)))
-    if not how.twice or first.status is not Balanced.CONVERGED:
+    if not (how.twice and how.feedback) or first.status is not Balanced.CONVERGED:
         return first
     again = _rounds(person, task, how, least, np.full(len(LEVELS), _HEAVY_N))
     apart = _change(again.found.forces, first.found.forces)
@@ -151,9 +152,7 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
         now = _at(person, task, how, tone, rotations, pushes, trail[-1] if trail else None)
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
-        residual = float(np.abs(now.demand.required - now.demand.arms @ before).max())
-        if trail and not now.found.enough:
-            residual = float(np.abs(now.demand.arms @ (now.found.forces - before)).max())
+        residual = _residual(now, before, how)
         trail.append(now.found.forces)
         rounds.append(Round(change, residual if change is not None else 0.0, now.compression[L4L5]))
         settled = change is not None and change < how.change and residual < how.residual_nm
@@ -172,6 +171,17 @@ def _step(step: float, off: Array, last: Array) -> float:
     size = float(by @ by)
     wanted = -step * float(last.ravel() @ by) / size if size > 0.0 else 1.0
     return min(max(wanted, _SHORTEST), _LONGEST)
+
+
+def _residual(now: Held, before: Array, how: How) -> float:
+    """N m by which the forces of the round before miss what this one asks of them.
+
+    Beyond strength they are held against those of this round, which miss it, too.
+    """
+    off = now.demand.required - now.demand.arms @ before
+    if not now.found.enough:
+        off = now.demand.arms @ (now.found.forces - before)
+    return float(np.abs(off[: _LOWEST if how.lowest_alone else None]).max())
 
 
 def _ended(
@@ -231,6 +241,8 @@ def _at(
     )
     if given is None:
         found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+        slack = demand.required - demand.arms @ found.forces
+        found = replace(found, slack=slack)
     else:
         found = Forces(given, demand.required - demand.arms @ given, True)
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
@@ -252,7 +264,7 @@ def _at(
 
 def _lowest(demand: Demand) -> Demand:
     """The same demand at L5S1 alone."""
-    return replace(demand, arms=demand.arms[:3], required=demand.required[:3])
+    return replace(demand, arms=demand.arms[:_LOWEST], required=demand.required[:_LOWEST])
 
 
 def _change(now: Array, before: Array) -> float:

@@ -102,7 +102,7 @@ def rows_of(
 
 def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> Outcome:
     """What becomes of a task."""
-    how, gain = how_of(settings), settings.solving.stiffness_gain
+    how, gain = how_of(settings, twice=True), settings.solving.stiffness_gain
     try:
         return _outcome(settings, person, task, how, gain)
     except ValueError as why:
@@ -137,7 +137,7 @@ def _upright(stood: Standing) -> Iterator[Row]:
         below = number - 1
         yield {
             "body": body,
-            "start_deg": 0.0,
+            "start_deg": DEG_PER_RAD * float(found.start[number]),
             "upright_deg": DEG_PER_RAD * float(found.angles[number]),
             "bound": bool(found.at_bound[number]),
             "moment_before_nm": float(found.before[below]) if number else None,

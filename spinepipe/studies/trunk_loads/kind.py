@@ -70,7 +70,7 @@ class TrunkFiles(StudyFiles):
     @classmethod
     def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort))
+        return cls(study, cohort.specimen_names, stands_for(cohort.name))
 
     @property
     def tables(self) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 REACH_RAD = 5.0 / DEG_PER_RAD
-"""How far bodies may turn from the source's pose to stand upright (Ghezelbash 2016 2.6)."""
+"""How far bodies may turn from the start to stand upright (Ghezelbash 2016 2.6)."""
 
 NOMINAL: Mapping[str, float] = {
     "disc_area": 1.0,
@@ -177,7 +177,7 @@ def standing(
         np.ones(len(trunk.muscles)),
         np.ones(len(trunk.muscles)),
     )
-    found = upright(person, np.zeros(len(BODIES)), REACH_RAD)
+    found = upright(person, np.array(settings.upright_start_deg) / DEG_PER_RAD, REACH_RAD)
     return Standing(person.standing(found.turned), found)
 
 
@@ -201,7 +201,7 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Value
     )
 
 
-def how_of(settings: TrunkLoads) -> How:
-    """When rounds have settled."""
+def how_of(settings: TrunkLoads, twice: bool = False) -> How:
+    """When rounds have settled; `twice`: whether to look for a second answer."""
     solving = settings.solving
-    return How(solving.change, solving.residual_nm, solving.most_iterations, twice=True)
+    return How(solving.change, solving.residual_nm, solving.most_iterations, twice=twice)

@@ -8,7 +8,7 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 Geometry = Literal["myo_sim", "cohort"]
-Curves = Literal["mixed", "segment", "disc_heuer", "disc_jaramillo", "disc_han"]
+Curves = Literal["segment_gould", "mixed", "segment", "disc_heuer", "disc_jaramillo", "disc_han"]
 TrunkAngle = Literal["measured_at_thorax", "rotation_of_t11"]
 Factor = Literal[
     "height_cm",
@@ -183,6 +183,14 @@ class TrunkLoads(Study):
         min_length=1,
         description="how size follows from sex, age, height and mass: ct_trends, constant_density, "
         "or a CSV file in the cohort's folder",
+    )
+    upright_start_deg: tuple[float, ...] = Field(
+        default=(-2.5, -2.5, -0.5, 1.5, 2.5, 2.5, 1.0, -1.5),
+        min_length=8,
+        max_length=8,
+        description="extension of S1, L5, ... L1, T12, T11 from the source's pose about which the "
+        "upright posture is sought, within 5 deg; by default half of what whole segments as stiff "
+        "as those of Gould 2024b stand in",
     )
     trunk_angle: TrunkAngle = Field(
         default="measured_at_thorax", description="what a task's rotation of the trunk means"

@@ -32,9 +32,12 @@ def run(root: str, study: str, tables: list[str], intervals: str, drivers: str) 
     read = read_frames(tables)
     responses, nominal = read["responses"], read["tasks"]
     made_by = provenance("spread", settings, cohort)
-    groups = list(responses.groupby(["specimen", "task"], sort=False))
-    trusted = [row for (who, task), rows in groups for row in _intervals(who, task, rows, nominal)]
-    driving = [row for (who, task), rows in groups for row in _drivers(settings, who, task, rows)]
+    pairs = responses[["specimen", "task"]].drop_duplicates().to_numpy(str).tolist()
+    trusted, driving = list[Row](), list[Row]()
+    for who, task in pairs:
+        rows = responses[(responses["specimen"] == who) & (responses["task"] == task)]
+        trusted += _intervals(who, task, rows, nominal)
+        driving += _drivers(settings, who, task, rows)
     write(from_rows(INTERVALS, trusted), intervals, made_by)
     write(from_rows(DRIVERS, driving), drivers, made_by)
 

@@ -15,6 +15,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.task import Task
 from spinepipe.progress import Progress
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
 from spinepipe.studies.trunk_loads.persons import (
     NOMINAL,
@@ -216,6 +217,7 @@ def agreement(tier: str, pressures: Sequence[Row]) -> Row:
     measured = np.array([row["measured_mpa"] for row in rows])
     computed = np.array([row["computed_mpa"] for row in rows])
     off, n = computed - measured, len(rows)
+    not_held = sum(row["status"] != Balanced.CONVERGED for row in rows)
     r = float(np.corrcoef(measured, computed)[0, 1]) if n >= LEAST_FOR_R else None
     low, high = _interval(r, n)
     rmse = float(np.sqrt(np.mean(off**2))) if n else None
@@ -227,8 +229,9 @@ def agreement(tier: str, pressures: Sequence[Row]) -> Row:
         "r_high": high,
         "rmse_mpa": rmse,
         "mean_error_mpa": float(off.mean()) if n else None,
+        "n_not_held": not_held,
         "goal_rmse_mpa": GOALS_MPA[tier],
-        "reached": None if rmse is None else rmse <= GOALS_MPA[tier],
+        "reached": None if rmse is None else rmse <= GOALS_MPA[tier] and not not_held,
     }
 
 
