@@ -33,6 +33,9 @@ from spinepipe.studies.trunk_loads.words import (
 )
 
 _MOST_PLACES = 4
+_MOST_SHARE = 1.1
+"""Sobol's estimate of a share may exceed 1 by chance; by more than this it is no number."""
+
 _NEAR_LIMIT = 0.8
 """Tasks that take more of the strength than this are named."""
 
@@ -205,7 +208,10 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     for place in rows.drop_duplicates(["specimen", "task"]).to_dict("records"):
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
-        if first:
+        if first and first[0][1] > _MOST_SHARE:
+            few = "its share of the variance comes out above all of it: too few samples for a number"
+            told.append(f"{name}: {factor(first[0][0])} ({few})")
+        elif first:
             parts = [f"{factor(one)} ({fixed(share)})" for one, share in first]
             told.append(f"{name}: {listed(parts)}")
     if told:
@@ -246,7 +252,10 @@ def stability(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[s
         f"{len(known) - len(fall)} of {count(len(known), 'posture')} asked about would stand when "
         f"pushed a little{which}."
     )
-    least = known[(known["tone"] == "stable") & known["tone_share"].notna()]
+    asked = known[(known["tone"] == "stable") & known["tone_share"].notna()]
+    least = asked[asked["stable"].astype(bool)]
+    if len(never := asked[~asked["stable"].astype(bool)]):
+        yield f"No tone that can be held makes these postures stable: {_places(never)}."
     if len(least):
         told = [
             f"{plain(row['task'])} of {row['specimen']} {number(100.0 * row['tone_share'], 2)} %"
