@@ -88,7 +88,7 @@ class OneTask:
 
 @dataclass(frozen=True)
 class Sampled:
-    """Samples of a person in the twelve tasks: held, not reached by the arms, CPU seconds of all."""
+    """Samples of a person in twelve tasks: held, not reached by the arms, CPU seconds of all."""
 
     samples: int
     runs: int
