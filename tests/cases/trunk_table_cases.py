@@ -407,6 +407,7 @@ def agreement_rows(size: Size) -> Iterator[Row]:
             "r_high": 0.99 if n >= 4 else None,
             "rmse_mpa": error if n else None,
             "mean_error_mpa": 0.01 if n else None,
+            "n_not_held": sum(row["status"] == "beyond_strength" for row in own),
             "goal_rmse_mpa": GOALS[tier],
             "reached": error <= GOALS[tier] if n else None,
         }

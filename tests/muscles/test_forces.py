@@ -43,11 +43,12 @@ def test_two_solvers_agree(task: str) -> None:
     assert ours.forces == pytest.approx(by_clarabel(demand), abs=1e-2)
 
 
-def test_a_start_nearby_changes_nothing() -> None:
-    demand = held_task("flexion_50").demand
-    cold = least_stress(demand).forces
-    warm = least_stress(demand, 1.02 * cold).forces
-    assert warm == pytest.approx(cold, abs=1e-6)
+@pytest.mark.parametrize("task", ["flexion_50", "exertion_torsion"])
+def test_what_is_asked_first_changes_nothing(task: str) -> None:
+    demand = held_task(task).demand
+    quadratic_first, slack_first = (least_stress(demand, beyond) for beyond in (False, True))
+    assert quadratic_first.enough == slack_first.enough
+    assert slack_first.forces == pytest.approx(quadratic_first.forces, abs=1e-6)
 
 
 def two(required: float, most: float = 1000.0, least: float = 0.0) -> Demand:

@@ -127,7 +127,13 @@ def _goal(row: dict[Any, Any]) -> str:
     goal, off = float(row["goal_rmse_mpa"]), float(row["rmse_mpa"])
     if row["reached"]:
         return f"The goal of {mpa(goal)} is reached."
-    return f"The goal of {mpa(goal)} is missed by {fixed(off - goal, 3)} MPa."
+    if off > goal:
+        return f"The goal of {mpa(goal)} is missed by {fixed(off - goal, 3)} MPa."
+    lost = count(int(row["n_not_held"]), "counted task")
+    return (
+        f"That is within the goal of {mpa(goal)}, but no muscle forces hold {lost}: it does not "
+        "count as reached."
+    )
 
 
 def unsettled(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:

@@ -202,7 +202,7 @@ def missed_goals(results: Results) -> str:
         f"{plain(row['tier'])} {mpa(row['rmse_mpa'])} instead of at most "
         f"{mpa(row['goal_rmse_mpa'])} ({fixed(row['rmse_mpa'] - row['goal_rmse_mpa'], 3)} more)"
         for row in known.to_dict("records")
-        if not row["reached"]
+        if row["rmse_mpa"] > row["goal_rmse_mpa"]
     ]
     if not told:
         return ""
