@@ -209,7 +209,9 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
         if first and first[0][1] > _MOST_SHARE:
-            few = "its share of the variance comes out above all of it: too few samples for a number"
+            few = (
+                "its share of the variance comes out above all of it: too few samples for a number"
+            )
             told.append(f"{name}: {factor(first[0][0])} ({few})")
         elif first:
             parts = [f"{factor(one)} ({fixed(share)})" for one, share in first]

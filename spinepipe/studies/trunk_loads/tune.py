@@ -64,7 +64,7 @@ def run(root: str, study: str, pressures: str, tuning: str, agreement: str) -> N
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     rows = rows_of(volunteer_of(settings, cohort, source_of(settings, cohort).trunk), progress)
-    made_by = provenance("tune", settings, cohort, None, marks_of(settings))
+    made_by = provenance("tune", settings, cohort, None, marks_of(settings, cohort))
     for table, path in ((PRESSURES, pressures), (TUNING, tuning), (AGREEMENT, agreement)):
         write(from_rows(table, rows[table.name]), path, made_by)
 
