@@ -14,6 +14,7 @@ rule hold:
         upright=f"{TRUNKS}/jobs/specimen={{specimen}}/upright.parquet",
         masses=f"{TRUNKS}/jobs/specimen={{specimen}}/masses.parquet",
         scaling=f"{TRUNKS}/jobs/specimen={{specimen}}/scaling.parquet",
+        remarks=f"{TRUNKS}/jobs/specimen={{specimen}}/remarks.parquet",
     log:
         f"{LOGS}/hold/specimen={{specimen}}.log",
     resources:

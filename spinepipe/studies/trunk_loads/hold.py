@@ -46,6 +46,7 @@ from spinepipe.studies.trunk_loads.tables import (
     MASSES,
     MUSCLES,
     PATHS,
+    REMARKS,
     SCALING,
     TASKS,
     UPRIGHT,
@@ -53,7 +54,7 @@ from spinepipe.studies.trunk_loads.tables import (
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-HELD = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING)
+HELD = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS)
 """Tables that this job makes."""
 
 NO_TONE = "no tone that can be held makes it stable; shown without"
@@ -77,7 +78,8 @@ def rows_of(
     settings: TrunkLoads, cohort: Cohort, specimen: str, progress: Progress
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
-    who, source = subject_of(cohort, specimen), source_of(settings, cohort).trunk
+    who, read = subject_of(cohort, specimen), source_of(settings, cohort)
+    source = read.trunk
     regressions = regressions_of(settings, cohort.folder)
     stood = standing(settings, source, who, regressions)
     known: Row = {"specimen": specimen}
@@ -86,6 +88,7 @@ def rows_of(
     found["masses"] = [known | row for row in _masses(stood.person)]
     ratios = applied_ratios(source, who, REFERENCE, regressions)
     found["scaling"] = [known | dict(vars(ratio)) for ratio in ratios]
+    found["remarks"] = [known | {"remark": remark} for remark in read.remarks]
     tasks = read_tasks(cohort, settings.trunk_angle)
     drawn = settings.drawn_tasks or tuple(tasks)[:1]
     for name in progress.through(list(tasks), f"{specimen}: tasks"):

@@ -20,6 +20,7 @@ from spinepipe.studies.trunk_loads.tables import (
     MASSES,
     MUSCLES,
     PATHS,
+    REMARKS,
     SCALING,
     TASKS,
     UPRIGHT,
@@ -37,7 +38,9 @@ from spinepipe.studies.trunk_loads.tables_of_studies import (
 
 HELD = tuple(
     table.name
-    for table in (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING)
+    for table in (
+        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS),
+    )
 )
 """Tables with one job file for each person."""
 
@@ -156,7 +159,8 @@ KIND = Kind(
     checks=(check_trunk,),
     checks_at_start=(check_source,),
     tables=(
-        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, SIMPLIFIED),
+        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS),
+        SIMPLIFIED,
         *(PRESSURES, TUNING, AGREEMENT, DESIGN, RESPONSES, INTERVALS, DRIVERS),
         AGAINST_GHEZELBASH_2016,
     ),

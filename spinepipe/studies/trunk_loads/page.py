@@ -12,6 +12,7 @@ from spinepipe.studies.trunk_loads.tables import (
     MASSES,
     MUSCLES,
     PATHS,
+    REMARKS,
     SCALING,
     TASKS,
     UPRIGHT,
@@ -47,6 +48,7 @@ _TITLES = {
     MASSES: "Where every kilogram goes",
     SCALING: "What makes persons differ",
     MUSCLES: "Force of every fascicle",
+    REMARKS: "What was put right, added or assumed in the geometry",
 }
 """Tables of the page in their order, with their titles."""
 

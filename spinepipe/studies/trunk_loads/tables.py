@@ -293,6 +293,14 @@ MASSES = Table(
     ),
 )
 
+REMARKS = Table(
+    "remarks",
+    "What was put right, added or assumed when geometry and muscles were read: one row per person "
+    "and remark.",
+    ("specimen", "remark"),
+    (SPECIMEN, Column("remark", "text", "what was done, and why")),
+)
+
 SCALING = Table(
     "scaling",
     "What makes the person differ from the reference person: one row per person and quantity.",
