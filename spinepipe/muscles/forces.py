@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import daqp
 import numpy as np
 from scipy.optimize import linprog
-from scipy.sparse import csr_matrix, hstack, identity
 
 from spinepipe.effects.contract import Array
 
@@ -97,12 +96,12 @@ def least_slack(demand: Demand) -> Array:
 
 def _least_slack_forces(demand: Demand) -> Array:
     many = len(demand.required)
-    short = identity(many, format="csr")
+    short = np.eye(many)
     solved = linprog(
         np.concatenate([np.zeros(len(demand.pcsa)), np.ones(2 * many)]),
-        A_eq=hstack([csr_matrix(demand.arms), short, -short]),
+        A_eq=np.hstack([demand.arms, short, -short]),
         b_eq=demand.required,
-        A_ub=hstack([csr_matrix(-demand.sheath), csr_matrix((2, 2 * many))]),
+        A_ub=np.hstack([-demand.sheath, np.zeros((2, 2 * many))]),
         b_ub=np.zeros(2),
         bounds=[*zip(demand.least, demand.most, strict=True), *[(0.0, None)] * (2 * many)],
         method="highs",
@@ -129,4 +128,4 @@ def most_along(demand: Demand, direction: Array, start: Array) -> float | None:
         bounds=[*zip(demand.least, demand.most, strict=True), (0.0, 1e4)],
         method="highs",
     )
-    return float(solved.x[-1]) if solved.status == 0 else None
+    return float(solved.x[-1]) if solved.status == 0 and solved.x is not None else None

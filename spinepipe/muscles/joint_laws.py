@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from spinepipe.anatomy import published
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.units import DEG_PER_RAD
@@ -80,6 +81,10 @@ class Curve:
         return found
 
 
+def _linear(nm_per_rad: float) -> Curve:
+    return _both_sides((10.0,), (10.0 * nm_per_rad / DEG_PER_RAD,))
+
+
 def _both_sides(degrees: tuple[float, ...], newton_metres: tuple[float, ...]) -> Curve:
     return Curve(
         (*(-d for d in reversed(degrees)), 0.0, *degrees),
@@ -98,6 +103,7 @@ def _sagittal(
     )
 
 
+_GOULD = published("gould_2024b")["uniform_stiffness"]
 _HEUER_NM = (1.0, 2.5, 5.0, 7.5)
 _JARAMILLO_NM = (2.0, 4.0, 6.0, 8.0)
 
@@ -113,6 +119,11 @@ _HEUER = (  # Heuer 2007, disc L4L5 alone, medians
 )
 
 CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
+    "segment_gould": (  # Gould 2024b Table 2, uniform: linear, whole segments
+        _linear(_GOULD["right_bending_nm_per_rad"]),
+        _linear(_GOULD["left_rotation_nm_per_rad"]),
+        _linear(_GOULD["extension_nm_per_rad"]),
+    ),
     "mixed": (_HEUER[0], _SCHMIDT[1], _SCHMIDT[2]),
     "segment": _SCHMIDT,
     "disc_heuer": _HEUER,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
@@ -59,7 +60,7 @@ class BodyPoses:
     discs: Array
     turned: Array
 
-    def of(self, body: Array, points: Array) -> Array:
+    def of(self, body: NDArray[np.int64], points: Array) -> Array:
         """(..., 3) m, points (..., 3) of bodies (...) where they are now."""
         turned = np.einsum("...ij,...j->...i", self.rotations[body], points - self.origins[body])
         found: Array = turned + self.places[body]

@@ -37,8 +37,8 @@ def multifidus_above_l1(
             found += _raised(of_side, body - _L1, joints, tilts)
     area = 1e6 * sum(one.pcsa for one in found)
     remark = (
-        f"the source's multifidus ends at L1 and nothing short spans T11T12: {len(found)} fascicles "
-        f"of L1 are repeated for T12 and T11, {area:.0f} mm2 in all"
+        f"the source's multifidus ends at L1 and nothing short spans T11T12: {len(found)} "
+        f"fascicles of L1 are repeated for T12 and T11, {area:.0f} mm2 in all"
     )
     return found, remark
 

@@ -22,6 +22,7 @@ from spinepipe.status import Balanced
 L4L5 = LEVELS.index("L4L5")
 _SHORTEST, _LONGEST = 0.1, 5.0
 _HEAVY_N = 3000.0
+_LOWEST = 3
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class How:
     Attributes
     ----------
     change, residual_nm : of forces over their size, and out of balance; less than that at the end.
+    slack_nm : moment that may be left over before a task counts as beyond strength.
     most : rounds.
     feedback : whether forces move the spine at all. translates : whether joints do more than turn.
     lowest_alone : whether L5S1 alone is balanced.
@@ -39,6 +41,7 @@ class How:
 
     change: float = 0.01
     residual_nm: float = 0.1
+    slack_nm: float = 0.5
     most: int = 60
     feedback: bool = True
     translates: bool = True
@@ -119,7 +122,7 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
     """
     least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
     first = _rounds(person, task, how, least, np.zeros(len(LEVELS)))
-    if not how.twice or first.status is not Balanced.CONVERGED:
+    if not (how.twice and how.feedback) or first.status is not Balanced.CONVERGED:
         return first
     again = _rounds(person, task, how, least, np.full(len(LEVELS), _HEAVY_N))
     apart = _change(again.found.forces, first.found.forces)
@@ -127,6 +130,16 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
         told = f"another start ends {100.0 * apart:.1f} % away"
         return replace(first, status=Balanced.TWO_ANSWERS, message=told)
     return first
+
+
+def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Held:
+    """The task with given muscle forces (M,) N, where the spine has moved to under them."""
+    rotations = rotations_of(person.chain, angles_of(person, task))
+    pushes, how = np.zeros((len(LEVELS), 3)), How()
+    for _ in range(rounds):
+        now = _at(person, task, how, 0.0, rotations, pushes, None, given=forces)
+        pushes = now.pushes
+    return now
 
 
 def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> Held:
@@ -141,14 +154,13 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
         now = _at(person, task, how, tone, rotations, pushes, trail[-1] if trail else None)
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
-        residual = float(np.abs(now.demand.required - now.demand.arms @ before).max())
-        if trail and not now.found.enough:
-            residual = float(np.abs(now.demand.arms @ (now.found.forces - before)).max())
+        residual = _residual(now, before, how)
         trail.append(now.found.forces)
         rounds.append(Round(change, residual if change is not None else 0.0, now.compression[L4L5]))
         settled = change is not None and change < how.change and residual < how.residual_nm
         if settled or not how.feedback or len(rounds) >= how.most:
-            status, message = _ended(now, rounds, trail, settled or not how.feedback)
+            done = settled or not how.feedback
+            status, message = _ended(now, how, rounds, trail, done)
             return replace(now, status=status, message=message, rounds=tuple(rounds))
         off = now.pushes - pushes
         step, last = (_step(step, off, last) if len(rounds) > 1 else step), off
@@ -164,8 +176,19 @@ def _step(step: float, off: Array, last: Array) -> float:
     return min(max(wanted, _SHORTEST), _LONGEST)
 
 
+def _residual(now: Held, before: Array, how: How) -> float:
+    """N m by which the forces of the round before miss what this one asks of them.
+
+    Beyond strength they are held against those of this round, which miss it, too.
+    """
+    off = now.demand.required - now.demand.arms @ before
+    if not now.found.enough:
+        off = now.demand.arms @ (now.found.forces - before)
+    return float(np.abs(off[: _LOWEST if how.lowest_alone else None]).max())
+
+
 def _ended(
-    now: Held, rounds: list[Round], trail: list[Array], settled: bool
+    now: Held, how: How, rounds: list[Round], trail: list[Array], settled: bool
 ) -> tuple[Balanced, str]:
     if not settled:
         last = rounds[-1]
@@ -179,11 +202,10 @@ def _ended(
     if not now.found.enough:
         slack = now.found.slack.reshape(-1, 3)
         worst = int(np.argmax(np.abs(slack).max(axis=1)))
-        short = float(np.abs(slack).max())
-        return (
-            Balanced.BEYOND_STRENGTH,
-            f"{short:.1f} N m too much for the muscles at {LEVELS[worst]}",
-        )
+        short, level = float(np.abs(slack).max()), LEVELS[worst]
+        if short > how.slack_nm:
+            return Balanced.BEYOND_STRENGTH, f"{short:.1f} N m too much for the muscles at {level}"
+        return Balanced.CONVERGED, f"{short:.2f} N m left over at {level}"
     return Balanced.CONVERGED, ""
 
 
@@ -195,8 +217,9 @@ def _at(
     rotations: Array,
     pushes: Array,
     near: Array | None,
+    given: Array | None = None,
 ) -> Held:
-    """Forces where the joints' forces were `pushes` (7, 3) N."""
+    """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
     moves = how.feedback and how.translates
     translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
     poses = posed(person.chain, rotations, translations)
@@ -218,7 +241,12 @@ def _at(
         muscles.pcsa,
         pulls.along_sheath,
     )
-    found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+    if given is None:
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+        slack = demand.required - demand.arms @ found.forces
+        found = replace(found, slack=slack)
+    else:
+        found = Forces(given, demand.required - demand.arms @ given, True)
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
     told = np.einsum("kji,kj->ki", poses.discs, on_joints)
     return Held(
@@ -238,7 +266,7 @@ def _at(
 
 def _lowest(demand: Demand) -> Demand:
     """The same demand at L5S1 alone."""
-    return replace(demand, arms=demand.arms[:3], required=demand.required[:3])
+    return replace(demand, arms=demand.arms[:_LOWEST], required=demand.required[:_LOWEST])
 
 
 def _change(now: Array, before: Array) -> float:

@@ -66,9 +66,11 @@ def _gap(p: Array, q: Array, bar: Array, along: Array, behind: Array) -> tuple[f
     d, w = q - p, p - bar
     a, b, c = d @ d, d @ along, w @ along
     rest = a - b * b
-    t = 0.0 if rest < 1e-18 else min(max((b * c - d @ w) / rest, 0.0), 1.0)
+    t = 0.0
+    if rest > 1e-18:
+        t = min(max(float((b * c - d @ w) / rest), 0.0), 1.0)
     x = w + t * d
-    return x @ behind, x @ along
+    return float(x @ behind), float(x @ along)
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ given where it lies in the source's own pose, so bodies are not turned there and
 body is counted from that pose.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,10 +109,6 @@ class Trunk:
     arm_length: float
     sheath: Array
     muscles: Muscles
-
-    def with_muscles(self, **changed: Array) -> "Trunk":
-        """The same with other muscles' attributes."""
-        return replace(self, muscles=replace(self.muscles, **changed))
 
 
 @dataclass(frozen=True, eq=False)

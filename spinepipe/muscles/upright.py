@@ -8,6 +8,7 @@ range of the start.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from spinepipe.effects.contract import Array
@@ -28,13 +29,15 @@ class Upright:
 
     Attributes
     ----------
-    angles : (8,) rad, extension of the bodies from the source's pose.
+    angles, start : (8,) rad, extension of the bodies from the source's pose; found, and where the
+        search began.
     at_bound : (8,) whether at the end of the range.
     before, after : (7,) N m lacking at L5 to T11, extension positive, at the start and upright.
     """
 
     angles: Array
-    at_bound: Array
+    start: Array
+    at_bound: NDArray[np.bool_]
     before: Array
     after: Array
 
@@ -94,7 +97,7 @@ def upright(person: Person, start: Array, reach_rad: float) -> Upright:
         if trust < 1e-7 or least < _SMALL_NM:
             break
     at_bound = np.abs(angles - start) > reach_rad - 1e-9
-    return Upright(angles, at_bound, before, lacking(person, angles))
+    return Upright(angles, start, at_bound, before, lacking(person, angles))
 
 
 def _least_sum(at: Array, slope: Array, low: Array, high: Array, trust: float) -> Array:

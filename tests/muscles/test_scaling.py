@@ -152,7 +152,7 @@ def test_a_mirrored_trunk_scales_to_the_mirrored_trunk() -> None:
     mirror = np.array([1.0, 1.0, -1.0])
     trunk = made_up_trunk()
     trunk = replace(trunk, vertebrae=trunk.vertebrae * [1, 1, 0], joints=trunk.joints * [1, 1, 0])
-    other = trunk.with_muscles(point=mirror * trunk.muscles.point)
+    other = replace(trunk, muscles=replace(trunk.muscles, point=mirror * trunk.muscles.point))
     woman = Subject("female", 60.0, 1.62, 80.0)
     found, mirrored = (
         scaled(t, woman, REFERENCE, packaged()).muscles.point for t in (trunk, other)

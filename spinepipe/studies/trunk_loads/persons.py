@@ -1,4 +1,4 @@
-"""From a study and its cohort to persons that can hold tasks, and to the tasks as they are varied."""
+"""From a study and its cohort to persons that hold tasks, and to tasks as they are varied."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,18 +23,19 @@ from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import Chain
 from spinepipe.muscles.regressions import Regressions, packaged, read_regressions
 from spinepipe.muscles.scaling import Choices, scaled
+from spinepipe.muscles.settle import How
 from spinepipe.muscles.subject import CM_PER_M, REFERENCE, Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, Trunk
 from spinepipe.muscles.upright import Upright, upright
 from spinepipe.studies.trunk_loads.postures import between
-from spinepipe.studies.trunk_loads.settings import Factor, TrunkLoads
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 REACH_RAD = 5.0 / DEG_PER_RAD
-"""How far bodies may turn from the source's pose to stand upright (Ghezelbash 2016 2.6)."""
+"""How far bodies may turn from the start to stand upright (Ghezelbash 2016 2.6)."""
 
-NOMINAL: Mapping[Factor, float] = {
+NOMINAL: Mapping[str, float] = {
     "disc_area": 1.0,
     "pcsa": 1.0,
     "passive_rotation": 1.0,
@@ -85,12 +86,6 @@ def source_of(settings: TrunkLoads, cohort: Cohort) -> Source:
 @lru_cache(maxsize=1)
 def _of_package(_sha256: str) -> Source:
     return source_of_myo_sim()
-
-
-def marks_of_source(settings: TrunkLoads) -> list[str]:
-    """What decides besides the cohort: digests of files that the study reads."""
-    found = [origin_of_myo_sim().sha256] if settings.geometry == "myo_sim" else []
-    return found
 
 
 def regressions_of(settings: TrunkLoads, folder: Path) -> Regressions:
@@ -181,7 +176,7 @@ def standing(
         np.ones(len(trunk.muscles)),
         np.ones(len(trunk.muscles)),
     )
-    found = upright(person, np.zeros(len(BODIES)), REACH_RAD)
+    found = upright(person, np.array(settings.upright_start_deg) / DEG_PER_RAD, REACH_RAD)
     return Standing(person.standing(found.turned), found)
 
 
@@ -202,4 +197,16 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Value
         axial,
         size.axial * np.repeat(across, len(LEVELS), axis=0),
         passive.stiffens_under_compression,
+    )
+
+
+def how_of(settings: TrunkLoads, twice: bool = False) -> How:
+    """When rounds have settled; `twice`: whether to look for a second answer."""
+    solving = settings.solving
+    return How(
+        solving.change,
+        solving.residual_nm,
+        solving.slack_nm,
+        solving.most_iterations,
+        twice=twice,
     )

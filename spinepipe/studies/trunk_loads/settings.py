@@ -8,7 +8,7 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 Geometry = Literal["myo_sim", "cohort"]
-Curves = Literal["mixed", "segment", "disc_heuer", "disc_jaramillo", "disc_han"]
+Curves = Literal["segment_gould", "mixed", "segment", "disc_heuer", "disc_jaramillo", "disc_han"]
 TrunkAngle = Literal["measured_at_thorax", "rotation_of_t11"]
 Factor = Literal[
     "height_cm",
@@ -101,6 +101,12 @@ class Solving(BaseModel):
     residual_nm: float = Field(
         default=0.1, gt=0, le=10, description="moment out of balance, less than"
     )
+    slack_nm: float = Field(
+        default=0.5,
+        ge=0,
+        le=10,
+        description="moment that may be left over before a task counts as beyond strength",
+    )
     most_iterations: int = Field(default=60, ge=2, le=1000, description="rounds at most")
     stiffness_gain: float = Field(
         default=5.0,
@@ -183,6 +189,14 @@ class TrunkLoads(Study):
         min_length=1,
         description="how size follows from sex, age, height and mass: ct_trends, constant_density, "
         "or a CSV file in the cohort's folder",
+    )
+    upright_start_deg: tuple[float, ...] = Field(
+        default=(-2.5, -2.5, -0.5, 1.5, 2.5, 2.5, 1.0, -1.5),
+        min_length=8,
+        max_length=8,
+        description="extension of S1, L5, ... L1, T12, T11 from the source's pose about which the "
+        "upright posture is sought, within 5 deg; by default half of what whole segments as stiff "
+        "as those of Gould 2024b stand in",
     )
     trunk_angle: TrunkAngle = Field(
         default="measured_at_thorax", description="what a task's rotation of the trunk means"

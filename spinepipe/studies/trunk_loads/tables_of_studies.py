@@ -98,8 +98,14 @@ AGREEMENT = Table(
         Column("r_high", "number", "upper end of it", null="fewer than 4 tasks"),
         Column("rmse_mpa", "number", "root mean square error", "MPa", null="no task", low=0.0),
         Column("mean_error_mpa", "number", "mean of computed less measured", "MPa", null="no task"),
+        Column("n_not_held", "integer", "counted tasks that no muscle forces hold", low=0),
         Column("goal_rmse_mpa", "number", "what was asked for", "MPa"),
-        Column("reached", "flag", "whether the goal is reached", null="no task"),
+        Column(
+            "reached",
+            "flag",
+            "whether the goal is reached, and by forces that hold every counted task",
+            null="no task",
+        ),
     ),
 )
 

@@ -1,0 +1,168 @@
+"""Job: one person in all tasks."""
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.masses import ARM, shares
+from spinepipe.muscles.person import Person
+from spinepipe.muscles.scaling import applied_ratios
+from spinepipe.muscles.settle import How, held
+from spinepipe.muscles.stability import smallest_eigenvalue
+from spinepipe.muscles.strength import capacity_left, load_factor
+from spinepipe.muscles.subject import REFERENCE
+from spinepipe.muscles.task import Task
+from spinepipe.muscles.tone import least_stable
+from spinepipe.muscles.trunk import BODIES
+from spinepipe.progress import Progress
+from spinepipe.studies.trunk_loads.persons import (
+    Standing,
+    how_of,
+    regressions_of,
+    source_of,
+    standing,
+    subject_of,
+)
+from spinepipe.studies.trunk_loads.postures import read_tasks
+from spinepipe.studies.trunk_loads.rows import (
+    Outcome,
+    Row,
+    iteration_rows,
+    level_rows,
+    muscle_rows,
+    path_rows,
+    task_row,
+)
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.source_marks import marks_of
+from spinepipe.studies.trunk_loads.tables import (
+    ITERATIONS,
+    LEVELS_TABLE,
+    MASSES,
+    MUSCLES,
+    PATHS,
+    SCALING,
+    TASKS,
+    UPRIGHT,
+)
+from spinepipe.tables import from_rows, write
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+HELD = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING)
+"""Tables that this job makes."""
+
+NO_TONE = "no tone that can be held makes it stable; shown without"
+
+
+def run(root: str, study: str, specimen: str, **paths: str) -> None:
+    """Write the rows of a person, a file for each table."""
+    settings, cohort = study_of_kind(TrunkLoads, root, study)
+    rows = rows_of(settings, cohort, specimen, Progress(_said(study)))
+    made_by = provenance("hold", settings, cohort, [specimen], marks_of(settings))
+    for table in HELD:
+        whole = [{c.name: row.get(c.name) for c in table.columns} for row in rows[table.name]]
+        write(from_rows(table, whole), paths[table.name], made_by)
+
+
+def _said(study: str) -> Any:
+    return lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True)
+
+
+def rows_of(
+    settings: TrunkLoads, cohort: Cohort, specimen: str, progress: Progress
+) -> dict[str, list[Row]]:
+    """Rows of each table, by its name."""
+    who, source = subject_of(cohort, specimen), source_of(settings, cohort).trunk
+    regressions = regressions_of(settings, cohort.folder)
+    stood = standing(settings, source, who, regressions)
+    known: Row = {"specimen": specimen}
+    found: dict[str, list[Row]] = {table.name: [] for table in HELD}
+    found["upright"] = [known | row for row in _upright(stood)]
+    found["masses"] = [known | row for row in _masses(stood.person)]
+    ratios = applied_ratios(source, who, REFERENCE, regressions)
+    found["scaling"] = [known | dict(vars(ratio)) for ratio in ratios]
+    tasks = read_tasks(cohort, settings.trunk_angle)
+    drawn = settings.drawn_tasks or tuple(tasks)[:1]
+    for name in progress.through(list(tasks), f"{specimen}: tasks"):
+        outcome = outcome_of(settings, stood.person, tasks[name])
+        place = known | {"task": name}
+        found["tasks"].append(place | task_row(outcome))
+        found["levels"] += [place | row for row in level_rows(outcome)]
+        found["muscles"] += [place | row for row in muscle_rows(outcome)]
+        found["iterations"] += [place | row for row in iteration_rows(outcome)]
+        if name in drawn:
+            found["paths"] += [place | row for row in path_rows(outcome)]
+    return found
+
+
+def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> Outcome:
+    """What becomes of a task."""
+    how, gain = how_of(settings, twice=True), settings.solving.stiffness_gain
+    try:
+        return _outcome(settings, person, task, how, gain)
+    except ValueError as why:
+        return Outcome(person, task, None, str(why))
+
+
+def _outcome(settings: TrunkLoads, person: Person, task: Task, how: How, gain: float) -> Outcome:
+    message, tone = "", task.tone_share if task.tone == "stated" else 0.0
+    found = None
+    if task.tone == "stable":
+        toned = least_stable(person, task, how, gain)
+        message = "" if toned else NO_TONE
+        found, tone = (toned.held, toned.tone) if toned else (None, 0.0)
+    found = found or held(person, task, how, tone)
+    stable = smallest_eigenvalue(person, found, gain) >= 0.0
+    asked = settings.solving.strength
+    return Outcome(
+        person,
+        task,
+        found,
+        "; ".join(part for part in (found.message, message) if part),
+        tone,
+        stable,
+        load_factor(found) if asked else None,
+        capacity_left(found) if asked else None,
+    )
+
+
+def _upright(stood: Standing) -> Iterator[Row]:
+    found = stood.upright
+    for number, body in enumerate(BODIES):
+        below = number - 1
+        yield {
+            "body": body,
+            "start_deg": DEG_PER_RAD * float(found.start[number]),
+            "upright_deg": DEG_PER_RAD * float(found.angles[number]),
+            "bound": bool(found.at_bound[number]),
+            "moment_before_nm": float(found.before[below]) if number else None,
+            "moment_after_nm": float(found.after[below]) if number else None,
+        }
+
+
+def _masses(person: Person) -> Iterator[Row]:
+    """Slices and head with their places, arms and what is left without."""
+    subject, origin = person.subject, person.chain.centres[0]
+    for mass in person.masses:
+        x, y, z = (MM_PER_M * (mass.at - origin)).tolist()
+        yield {
+            "part": mass.name,
+            "carried_by": BODIES[mass.body],
+            "mass_kg": float(mass.kg),
+            "share": float(mass.kg / subject.mass_kg),
+            **{"x_mm": x, "y_mm": y, "z_mm": z},
+        }
+    arms = {f"both {segment.name.replace('_', ' ')}s" for segment in ARM}
+    for share in shares(subject):
+        if share.part in arms or not share.carried:
+            yield {
+                "part": share.part,
+                "carried_by": BODIES[-1] if share.carried else None,
+                "mass_kg": float(np.float64(share.percent) / 100.0 * subject.mass_kg),
+                "share": share.percent / 100.0,
+            }

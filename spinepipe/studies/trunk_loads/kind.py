@@ -1,0 +1,185 @@
+"""The kind trunk_loads: muscle forces, joint loads and disc pressure of persons in tasks."""
+
+from dataclasses import dataclass
+
+from spinepipe.cohort import Cohort
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
+from spinepipe.studies.trunk_loads.checks import check_trunk
+from spinepipe.studies.trunk_loads.forms import SUBJECTS
+from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
+from spinepipe.studies.trunk_loads.geometry_forms import GEOMETRY_FORMS
+from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
+from spinepipe.studies.trunk_loads.sampling import batches, sampled
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.source_marks import marks_of_source
+from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
+from spinepipe.studies.trunk_loads.tables import (
+    ITERATIONS,
+    LEVELS_TABLE,
+    MASSES,
+    MUSCLES,
+    PATHS,
+    SCALING,
+    TASKS,
+    UPRIGHT,
+)
+from spinepipe.studies.trunk_loads.tables_of_studies import (
+    AGREEMENT,
+    DESIGN,
+    DRIVERS,
+    INTERVALS,
+    PRESSURES,
+    RESPONSES,
+    SIMPLIFIED,
+    TUNING,
+)
+
+HELD = tuple(
+    table.name
+    for table in (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING)
+)
+"""Tables with one job file for each person."""
+
+TUNED = ("pressures", "tuning", "agreement")
+
+_SPREAD = Job("spread", "", ("tasks", "responses"), ("intervals", "drivers"))
+_AGAINST = Job(
+    "against_ghezelbash_2016",
+    "ghezelbash_2016.against",
+    ("tasks", "levels", "muscles", "upright", "scaling", "pressures", "agreement"),
+    ("against_ghezelbash_2016",),
+)
+
+
+@dataclass(frozen=True)
+class TrunkFiles(StudyFiles):
+    """The result files of one study of trunk loads.
+
+    Attributes
+    ----------
+    rebuilt : whether the cohort stands for that of a paper.
+    """
+
+    joined = (*HELD, "simplified", "responses")
+    drawings = (
+        Figure(
+            "pressure_against_measured",
+            "Computed against measured pressure of the disc",
+            "figures.pressure_against_measured:pressure_against_measured_figure",
+            ("pressures", "agreement"),
+            ("intervals",),
+        ),
+        Figure(
+            "load_by_level",
+            "Load on every joint",
+            "figures.load_by_level:load_by_level_figure",
+            ("tasks", "levels"),
+        ),
+        Figure(
+            "load_over_flexion",
+            "Load and muscle forces while bending forwards",
+            "figures.load_over_flexion:load_over_flexion_figure",
+            ("tasks", "muscles"),
+        ),
+        Figure(
+            "muscle_force_bars",
+            "Forces of the muscles",
+            "figures.muscle_force_bars:muscle_force_bars_figure",
+            ("tasks", "muscles"),
+        ),
+        Figure(
+            "drivers",
+            "How far answers can be trusted, and what drives them",
+            "figures.drivers:drivers_figure",
+            ("intervals", "drivers"),
+        ),
+        Figure(
+            "cost_of_simplifications",
+            "What four wrong simplifications cost",
+            "figures.cost_of_simplifications:cost_of_simplifications_figure",
+            ("simplified",),
+        ),
+        Figure(
+            "upright",
+            "How persons stand upright",
+            "figures.upright:upright_figure",
+            ("upright",),
+        ),
+    )
+
+    study: TrunkLoads
+    rebuilt: bool
+
+    @classmethod
+    def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
+        """The files of a study of a cohort."""
+        return cls(study, cohort.specimen_names, stands_for(cohort.name))
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """The tables that this study has."""
+        tuned = TUNED if self.study.volunteer else ()
+        samples = ("design", "responses", *_SPREAD.writes) if self.study.uncertain.tasks else ()
+        against = _AGAINST.writes if self.rebuilt else ()
+        return (*HELD, "simplified", *tuned, *samples, *against)
+
+    @property
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The tables that are made of job files."""
+        return tuple(table for table in self.joined if table in self.tables)
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        return {"simplified": "simplify", "responses": "respond"}.get(table, "hold")
+
+    def blocks(self, table: str) -> list[tuple[str, str]]:
+        """One block per person, of samples as many as it takes."""
+        if table == "responses":
+            return numbered_blocks(sampled(self.study, self.specimens), batches(self.study))
+        return numbered_blocks(self.specimens, 1)
+
+    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
+        """The job files of which a block is made."""
+        place = f"{self.folder}/jobs/specimen={specimen}"
+        if table == "responses":
+            numbers = files_of_block(block, batches(self.study))
+            return [f"{place}/batch={number:05d}/responses.parquet" for number in numbers]
+        return [f"{place}/{table}.parquet"]
+
+
+_NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
+
+KIND = Kind(
+    settings=TrunkLoads,
+    files=TrunkFiles,
+    checks=(check_trunk,),
+    tables=(
+        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, SIMPLIFIED),
+        *(PRESSURES, TUNING, AGREEMENT, DESIGN, RESPONSES, INTERVALS, DRIVERS),
+        AGAINST_GHEZELBASH_2016,
+    ),
+    jobs=(
+        Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=marks_of_source),
+        Job(
+            "simplify",
+            ignores=ignoring("uncertain", "volunteer", "drawn_tasks"),
+            also=marks_of_source,
+        ),
+        Job(
+            "tune",
+            ignores=ignoring("uncertain", "drawn_tasks", "simplified_tasks"),
+            also=marks_of_source,
+        ),
+        Job("draw", "draw_design", header_alone=True),
+        Job(
+            "respond",
+            many=True,
+            ignores=ignoring("volunteer", "drawn_tasks", "simplified_tasks"),
+            also=marks_of_source,
+        ),
+        _SPREAD,
+        _AGAINST,
+    ),
+    forms=(SUBJECTS, TASK_FORM, *GEOMETRY_FORMS),
+)

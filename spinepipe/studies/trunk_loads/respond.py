@@ -1,0 +1,72 @@
+"""Job: a batch of samples of one person: all sampled tasks, inputs as drawn."""
+
+import sys
+from collections.abc import Iterator, Mapping
+
+from spinepipe.cohort import Cohort
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.settle import held
+from spinepipe.progress import Progress
+from spinepipe.studies.trunk_loads.persons import (
+    changed_task,
+    how_of,
+    regressions_of,
+    source_of,
+    standing,
+    subject_of,
+)
+from spinepipe.studies.trunk_loads.postures import read_tasks
+from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
+from spinepipe.studies.trunk_loads.sampling import drawn, of_batch
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.source_marks import marks_of
+from spinepipe.studies.trunk_loads.tables_of_studies import QUANTITIES, RESPONSES
+from spinepipe.tables import from_rows, read_frame, write
+
+
+def run(root: str, study: str, specimen: str, batch: str, design: str, output: str) -> None:
+    """Write the rows of the batch."""
+    settings, cohort = study_of_kind(TrunkLoads, root, study)
+    samples = of_batch(settings, int(batch))
+    values = drawn(read_frame(design), samples)
+    progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
+    numbered = dict(zip(samples, values, strict=True))
+    rows = list(rows_of(settings, cohort, specimen, numbered, progress))
+    write(
+        from_rows(RESPONSES, rows),
+        output,
+        provenance("respond", settings, cohort, [specimen], marks_of(settings)),
+    )
+
+
+def rows_of(
+    settings: TrunkLoads,
+    cohort: Cohort,
+    specimen: str,
+    samples: Mapping[int, Mapping[str, float]],
+    progress: Progress,
+) -> Iterator[Row]:
+    """Rows of table responses."""
+    source, who = source_of(settings, cohort).trunk, subject_of(cohort, specimen)
+    regressions, how = regressions_of(settings, cohort.folder), how_of(settings)
+    tasks = read_tasks(cohort, settings.trunk_angle)
+    for sample in progress.through(list(samples), f"{specimen}: samples"):
+        values = samples[sample]
+        person = standing(settings, source, who, regressions, values).person
+        for name in settings.uncertain.tasks:
+            task = changed_task(tasks[name], values)
+            try:
+                found = held(person, task, how)
+                outcome = Outcome(person, task, found, found.message)
+            except ValueError as why:
+                outcome = Outcome(person, task, None, str(why))
+            told = task_row(outcome)
+            yield {
+                "specimen": specimen,
+                "task": name,
+                "sample": sample,
+                **{column: told.get(column) for column in QUANTITIES},
+                "status": told["status"],
+                "message": told["message"],
+            }

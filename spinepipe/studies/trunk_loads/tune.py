@@ -1,0 +1,253 @@
+"""Job: computed beside measured pressures, untuned, tuned, and tuned with each task left out."""
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import atanh, sqrt, tanh
+
+import numpy as np
+
+from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.settle import held
+from spinepipe.muscles.task import Task
+from spinepipe.muscles.trunk import Trunk
+from spinepipe.progress import Progress
+from spinepipe.status import Balanced
+from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
+from spinepipe.studies.trunk_loads.persons import (
+    NOMINAL,
+    changed_task,
+    how_of,
+    regressions_of,
+    source_of,
+    standing,
+    subject_of,
+)
+from spinepipe.studies.trunk_loads.postures import read_tasks
+from spinepipe.studies.trunk_loads.rows import Outcome, Row
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.source_marks import marks_of
+from spinepipe.studies.trunk_loads.tables_of_studies import AGREEMENT, PRESSURES, TUNING
+from spinepipe.tables import from_rows, write
+
+RANGE = {
+    "disc_area": (0.5, 2.0, 0.2, ""),
+    "pcsa": (0.5, 2.0, 0.2, ""),
+    "passive_rotation": (0.1, 3.0, 0.3, ""),
+    "passive_muscle": (0.0, 5.0, 0.5, ""),
+    "trunk_mass_ahead": (0.0, 2.0, 0.3, ""),
+    "hand_anterior_mm": (-150.0, 150.0, 30.0, "mm"),
+    "pelvis_extension_deg": (-10.0, 10.0, 3.0, "deg"),
+    "height_cm": (-5.0, 5.0, 2.0, "cm"),
+    "bmi": (-3.0, 3.0, 1.0, "kg/m2"),
+    "age_years": (-10.0, 10.0, 5.0, "years"),
+    "pressure_kpa": (0.0, 10.0, 2.0, "kPa"),
+    "largest_stress_mpa": (-0.2, 0.6, 0.1, "MPa"),
+}
+"""What each number may be: lowest, highest, size of a first step, unit."""
+
+SETTLED = Settled(cost=1e-4, step=1e-3, slope=1e-8, evaluations=25)
+_DIFFERENCE = 0.02
+"""Share of a first step by which slopes are taken."""
+
+GOALS_MPA = {"untuned": 0.35, "tuned": 0.14, "left_out": 0.18}
+LEAST_FOR_R, LEAST_FOR_INTERVAL = 3, 4
+_Z = 1.959963984540054
+
+
+def run(root: str, study: str, pressures: str, tuning: str, agreement: str) -> None:
+    """Write the three tables."""
+    settings, cohort = study_of_kind(TrunkLoads, root, study)
+    progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
+    rows = rows_of(volunteer_of(settings, cohort, source_of(settings, cohort).trunk), progress)
+    made_by = provenance("tune", settings, cohort, None, marks_of(settings))
+    for table, path in ((PRESSURES, pressures), (TUNING, tuning), (AGREEMENT, agreement)):
+        write(from_rows(table, rows[table.name]), path, made_by)
+
+
+@dataclass
+class Volunteer:
+    """The person whose pressures were measured, and what was computed already.
+
+    Attributes
+    ----------
+    source : trunk of the reference person. tasks : all tasks, by name. beside : measured pressures.
+    """
+
+    settings: TrunkLoads
+    cohort: Cohort
+    source: Trunk
+    tasks: Mapping[str, Task]
+    beside: tuple[Beside, ...]
+    _known: dict[tuple[float, ...], dict[str, tuple[float | None, str]]] = field(
+        default_factory=dict
+    )
+
+    @property
+    def specimen(self) -> str:
+        """The person who stands for the volunteer."""
+        assert self.settings.volunteer is not None
+        return self.settings.volunteer.specimen
+
+    def computed(self, values: Mapping[str, float]) -> dict[str, tuple[float | None, str]]:
+        """MPa, and how it ended, of every task beside which a pressure was measured."""
+        key = tuple(values.get(name, NOMINAL[name]) for name in RANGE)
+        if key not in self._known:
+            self._known[key] = dict(self._computed(values))
+        return self._known[key]
+
+    def _computed(
+        self, values: Mapping[str, float]
+    ) -> Iterator[tuple[str, tuple[float | None, str]]]:
+        settings, how = self.settings, how_of(self.settings)
+        who = subject_of(self.cohort, self.specimen)
+        regressions = regressions_of(settings, self.cohort.folder)
+        person = standing(settings, self.source, who, regressions, values).person
+        for one in self.beside:
+            task = changed_task(self.tasks[one.task], values)
+            try:
+                outcome = Outcome(person, task, held(person, task, how), "")
+            except ValueError:
+                outcome = Outcome(person, task, None, "")
+            pressure = outcome.pressure
+            told = None if pressure is None else 1e-6 * float(pressure.pa)
+            yield one.task, (told, outcome.status.value)
+
+
+def volunteer_of(settings: TrunkLoads, cohort: Cohort, source: Trunk) -> Volunteer:
+    """The volunteer of a study, before anything is computed."""
+    tasks = read_tasks(cohort, settings.trunk_angle)
+    return Volunteer(settings, cohort, source, tasks, beside_tasks(tasks))
+
+
+def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
+    """Rows of each table, by its name."""
+    assert who.settings.volunteer is not None
+    tuned = who.settings.volunteer.tuned
+    counted = [one for one in who.beside if one.counted]
+    progress.round("fitting all counted tasks")
+    best, bound = fitted(who, tuned, counted, np.array([NOMINAL[name] for name in tuned]))
+    tiers = {"untuned": who.computed({}), "tuned": who.computed(_named(tuned, best))}
+    tuning = list(_tuning("tuned", "", tuned, best, bound))
+    without: dict[str, tuple[float | None, str]] = {}
+    for one in progress.through(counted, "tasks left out"):
+        rest = [other for other in counted if other is not one]
+        left, at_bound = fitted(who, tuned, rest, best)
+        without[one.task] = who.computed(_named(tuned, left))[one.task]
+        tuning += _tuning("left_out", one.task, tuned, left, at_bound)
+    tiers["left_out"] = without
+    known: Row = {"specimen": who.specimen}
+    pressures = [known | row for tier, found in tiers.items() for row in _rows(who, tier, found)]
+    return {
+        PRESSURES.name: pressures,
+        TUNING.name: [known | row for row in tuning],
+        AGREEMENT.name: [known | agreement(tier, pressures) for tier in tiers],
+    }
+
+
+def fitted(
+    who: Volunteer, names: Sequence[str], counted: Sequence[Beside], start: Array
+) -> tuple[Array, Array]:
+    """Values (P,) of the named numbers with the least squares of errors, and whether at a bound."""
+    low, high, step = (np.array([RANGE[name][k] for name in names]) for k in range(3))
+
+    def errors(x: Array) -> Array | None:
+        found = who.computed(_named(names, x))
+        off = [(found[one.task][0], one.mpa) for one in counted]
+        if any(mpa is None for mpa, _ in off):
+            return None
+        return np.array([mpa - wanted for mpa, wanted in off if mpa is not None])
+
+    def point(x: Array) -> tuple[Array, Array] | None:
+        here = errors(x)
+        if here is None:
+            return None
+        columns = []
+        for k, size in enumerate(_DIFFERENCE * step):
+            moved = x.copy()
+            moved[k] += size if x[k] + size <= high[k] else -size
+            there = errors(moved)
+            columns.append(
+                np.zeros_like(here) if there is None else (there - here) / (moved - x)[k]
+            )
+        return here, np.stack(columns, axis=1)
+
+    start = np.clip(start, low, high)
+    if not len(counted) or errors(start) is None:
+        return start, np.zeros(len(names), dtype=bool)
+    found = descend(once(point), start, (low, high), step, len(counted), SETTLED).x
+    return found, (found - low < 1e-3 * step) | (high - found < 1e-3 * step)
+
+
+def _named(names: Sequence[str], x: Array) -> dict[str, float]:
+    return dict(zip(names, x.tolist(), strict=True))
+
+
+def _tuning(
+    tier: str, left_out: str, names: Sequence[str], x: Array, bound: Array
+) -> Iterator[Row]:
+    for name, value, at_bound in zip(names, x.tolist(), bound.tolist(), strict=True):
+        yield {
+            "tier": tier,
+            "left_out": left_out,
+            "parameter": name,
+            "value": value,
+            "default": NOMINAL[name],
+            "unit": RANGE[name][3],
+            "at_bound": bool(at_bound),
+        }
+
+
+def _rows(
+    who: Volunteer, tier: str, found: Mapping[str, tuple[float | None, str]]
+) -> Iterator[Row]:
+    for one in who.beside:
+        if one.task not in found:
+            continue
+        computed, status = found[one.task]
+        yield {
+            "tier": tier,
+            "task": one.task,
+            "measured_mpa": one.mpa,
+            "measured_status": one.status,
+            "measured_source": one.source,
+            "counted": one.counted,
+            "computed_mpa": computed,
+            "status": status,
+        }
+
+
+def agreement(tier: str, pressures: Sequence[Row]) -> Row:
+    """Correlation with its interval (Fisher's z), and errors, over the counted tasks of a tier."""
+    rows = [row for row in pressures if row["tier"] == tier and row["counted"]]
+    rows = [row for row in rows if row["computed_mpa"] is not None]
+    measured = np.array([row["measured_mpa"] for row in rows])
+    computed = np.array([row["computed_mpa"] for row in rows])
+    off, n = computed - measured, len(rows)
+    not_held = sum(row["status"] != Balanced.CONVERGED for row in rows)
+    r = float(np.corrcoef(measured, computed)[0, 1]) if n >= LEAST_FOR_R else None
+    low, high = _interval(r, n)
+    rmse = float(np.sqrt(np.mean(off**2))) if n else None
+    return {
+        "tier": tier,
+        "n_tasks": n,
+        "r": r,
+        "r_low": low,
+        "r_high": high,
+        "rmse_mpa": rmse,
+        "mean_error_mpa": float(off.mean()) if n else None,
+        "n_not_held": not_held,
+        "goal_rmse_mpa": GOALS_MPA[tier],
+        "reached": None if rmse is None else rmse <= GOALS_MPA[tier] and not not_held,
+    }
+
+
+def _interval(r: float | None, n: int) -> tuple[float | None, float | None]:
+    if r is None or n < LEAST_FOR_INTERVAL or abs(r) >= 1.0:
+        return None, None
+    z, reach = atanh(r), _Z / sqrt(n - 3)
+    return tanh(z - reach), tanh(z + reach)
