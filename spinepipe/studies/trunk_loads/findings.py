@@ -200,12 +200,15 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
         if first:
-            parts = [f"{factor(one)} ({fixed(share)})" for one, share in first]
+            parts = [
+                f"{factor(one.factor)} {fixed(one.total)} ({fixed(one.low)} to {fixed(one.high)})"
+                for one in first
+            ]
             told.append(f"{name}: {listed(parts)}")
     if told:
         yield (
-            "What the pressure in L4L5 hangs on most, as share of its variance, interactions "
-            f"included: {'; '.join(told)}."
+            "What the pressure in L4L5 hangs on most, as share of its variance with interactions "
+            f"and 95 % interval: {'; '.join(told)}."
         )
     lost = rows.drop_duplicates(["specimen", "task"])
     failed, n = int(lost["n_failed"].sum()), int((lost["n_failed"] + lost["n_samples"]).sum())
@@ -214,16 +217,15 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 
 def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """How much of the strength tasks take."""
-    rows = results.table("tasks")
-    known = filled(rows, "strength_used")
+    known = filled(sound_rows(results, "tasks"), "strength_used")
     if known.empty:
         return
     near = known[known["strength_used"] > _NEAR_LIMIT]
     worst = most(known, "strength_used")
     share = number(100.0 * float(worst["strength_used"]), 2)
     yield (
-        f"Most of the strength is taken by {plain(worst['task'])} of {worst['specimen']}, "
-        f"{share} % of it; {len(near)} of {count(len(known), 'task')} take more than "
+        f"Of tasks that settled, {plain(worst['task'])} of {worst['specimen']} takes most of the "
+        f"strength, {share} % of it; {len(near)} of {count(len(known), 'task')} take more than "
         f"{number(100.0 * _NEAR_LIMIT, 2)} %."
     )
 
