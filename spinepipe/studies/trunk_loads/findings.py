@@ -23,6 +23,7 @@ from spinepipe.studies.trunk_loads.findings_of_loads import (
 from spinepipe.studies.trunk_loads.headline import (
     ended_words,
     leading,
+    missed,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import (
@@ -124,10 +125,9 @@ def _correlated(row: dict[Any, Any]) -> str:
 
 
 def _goal(row: dict[Any, Any]) -> str:
-    goal, off = float(row["goal_rmse_mpa"]), float(row["rmse_mpa"])
     if row["reached"]:
-        return f"The goal of {mpa(goal)} is reached."
-    return f"The goal of {mpa(goal)} is missed by {fixed(off - goal, 3)} MPa."
+        return f"The goal of {mpa(float(row['goal_rmse_mpa']))} is reached."
+    return f"The goal is not reached: {missed(row)}."
 
 
 def unsettled(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:

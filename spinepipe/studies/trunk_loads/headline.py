@@ -220,14 +220,24 @@ def missed_goals(results: Results) -> str:
         return ""
     known = rows.dropna(subset=["rmse_mpa"])
     told = [
-        f"{plain(row['tier'])} {mpa(row['rmse_mpa'])} instead of at most "
-        f"{mpa(row['goal_rmse_mpa'])} ({fixed(row['rmse_mpa'] - row['goal_rmse_mpa'], 3)} more)"
+        f"{plain(row['tier'])} {missed(row)}"
         for row in known.to_dict("records")
         if not row["reached"]
     ]
-    if not told:
-        return ""
-    return f"pressures are further from measured ones than was asked for: {'; '.join(told)}"
+    return f"agreement with measured pressures is not what was asked for: {'; '.join(told)}" * bool(
+        told
+    )
+
+
+def missed(row: Row) -> str:
+    """Of a tier whose goal is not reached: by how much, and tasks that no muscle forces hold."""
+    off, goal, loose = float(row["rmse_mpa"]), float(row["goal_rmse_mpa"]), int(row["n_not_held"])
+    near = f"{mpa(off)} off, {mpa(goal)} asked for"
+    parts = [near if off <= goal else f"{near}, {fixed(off - goal, 3)} MPa too much"]
+    if loose:
+        held = count(loose, "counted task is", "counted tasks are")
+        parts.append(f"{held} not held by any muscle forces")
+    return ", and ".join(parts)
 
 
 def ended_words(status: str) -> str:

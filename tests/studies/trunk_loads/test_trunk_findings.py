@@ -104,11 +104,11 @@ def test_goals_that_are_missed_are_told_with_how_much() -> None:
     rows.loc[rows["tier"] == "tuned", ["rmse_mpa", "reached"]] = [0.2, False]
     found = answer(ONE, agreement=rows).warnings[-1]
     assert found == (
-        "Pressures are further from measured ones than was asked for: tuned 0.20 MPa instead of at "
-        "most 0.14 MPa (0.060 more)."
+        "Agreement with measured pressures is not what was asked for: tuned 0.20 MPa off, 0.14 MPa "
+        "asked for, 0.060 MPa too much."
     )
     sentences = told(ONE, agreement=rows)
-    assert "The goal of 0.14 MPa is missed by 0.060 MPa." in sentences
+    assert "The goal is not reached: 0.20 MPa off, 0.14 MPa asked for, 0.060 MPa too" in sentences
     assert "The goal of 0.35 MPa is reached." in sentences
 
 
@@ -131,6 +131,8 @@ def test_pressures_that_do_not_count_and_unsettled_ones_are_told() -> None:
     found = told(Size(1, failing=failing))
     assert "left out of the agreement: untuned flexion 50;" in found
     assert "do not hold them: untuned load close;" in found
+    loose = "0.10 MPa off, 0.14 MPa asked for, and 1 counted task is not held by any muscle forces"
+    assert loose in found
 
 
 def test_fitted_numbers_and_their_bounds_are_told() -> None:

@@ -29,6 +29,7 @@ SHOWN_TO = 1.3
 """Indices are shares: those estimated above this are written down, not drawn."""
 
 _ROW_MM, _TASK_MM, _AROUND_MM, _KEY_MM = 4.6, 5.5, 16.0, 17.0
+_APART = 1.6
 _UNKNOWN = "not known: too few samples held"
 
 
@@ -107,7 +108,7 @@ def _indices(axis: Axes, rows: pd.DataFrame, factors: Sequence[str]) -> None:
                 continue
             if not -SHOWN_TO < value < SHOWN_TO:
                 told = f"{fixed(value)} ({fixed(ends[0])} to {fixed(ends[1])})"
-                note(axis, 0.98, y + aside, told, color, ha="right")
+                note(axis, 0.98, y + _APART * aside, told, color, ha="right")
                 continue
             draw_interval(axis, value, (ends[0], ends[1]), y + aside, color)
     axis.axvline(0.0, color=BLACK, lw=0.5, zorder=1)
