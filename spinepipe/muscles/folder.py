@@ -92,6 +92,17 @@ def source_of_folder(name: str, tables: Tables, stress_pa: float | None = None) 
     return Source(_trunk(name, poses, muscles), remarks)
 
 
+def in_ground(frames: pd.DataFrame, names: list[str], points: Array) -> Array:
+    """(P, 3) m, points of bodies, each in the frame of its own, in ground.
+
+    Raises
+    ------
+    ValueError
+        For a body without a frame.
+    """
+    return _Bodies.of(frames).in_ground(names, points)
+
+
 def _joint_poses(joints: pd.DataFrame) -> dict[str, Pose]:
     poses = {str(row["joint"]): _pose(row) for _, row in joints.iterrows()}
     if missing := [joint for joint in _CHAIN if joint not in poses]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import daqp
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from spinepipe.effects.contract import Array
 
@@ -54,35 +54,37 @@ class Forces:
     enough: bool
 
 
-def least_stress(demand: Demand, start: Array | None = None) -> Forces:
-    """Forces with the least sum of squared stress; `start` (M,) N are near them, if known."""
-    found = _quadratic(demand, demand.required, start)
-    if found is not None:
-        return Forces(found, demand.required - demand.arms @ found, True)
-    lacking = least_slack(demand)
-    met = demand.required - lacking
-    found = _quadratic(demand, met, start, tolerance=1e-5)
+def least_stress(demand: Demand, beyond: bool = False) -> Forces:
+    """Forces with the least sum of squared stress.
+
+    Parameters
+    ----------
+    beyond : whether muscles are likely too weak, so that it is asked first what must be left over.
+    """
+    lacking = least_slack(demand) if beyond else None
+    if lacking is None or np.abs(lacking).sum() < SMALL_NM:
+        found = _quadratic(demand, demand.required)
+        if found is not None:
+            return Forces(found, demand.required - demand.arms @ found, True)
+    met = demand.required - (least_slack(demand) if lacking is None else lacking)
+    found = _quadratic(demand, met, tolerance=1e-5)
     if found is None:
         found = _least_slack_forces(demand)
     return Forces(found, demand.required - demand.arms @ found, False)
 
 
-def _quadratic(
-    demand: Demand, required: Array, start: Array | None, tolerance: float = 0.0
-) -> Array | None:
-    """Forces (M,) N of the quadratic programme, None where there are none."""
+def _quadratic(demand: Demand, required: Array, tolerance: float = 0.0) -> Array | None:
+    """Forces (M,) N of the quadratic programme, None where there are none.
+
+    DAQP starts from no active bounds: from those of forces nearby it takes longer.
+    """
     unit = demand.pcsa * STRESS_PA
     rows = np.ascontiguousarray(np.vstack([demand.arms * unit, demand.sheath * unit / 1e2]))
     upper = np.concatenate([demand.most / unit, required + tolerance, np.full(2, 1e30)])
     lower = np.concatenate([demand.least / unit, required - tolerance, np.zeros(2)])
-    equal = _EQUAL if tolerance == 0.0 else 0
-    sense = np.concatenate(
-        [np.zeros(len(unit)), np.full(len(required), equal), np.zeros(2)]
-    ).astype(np.int32)
-    if start is not None:
-        at = start / unit
-        near = (at >= upper[: len(unit)] - 1e-9) | (at <= lower[: len(unit)] + 1e-9)
-        sense[: len(unit)][near] = 1
+    sense = np.zeros(len(upper), dtype=np.int32)
+    if tolerance == 0.0:
+        sense[len(unit) : -2] = _EQUAL
     x, _, flag, _ = daqp.solve(
         np.eye(len(unit)), np.zeros(len(unit)), rows, upper, lower, sense, iter_limit=4000
     )
@@ -95,20 +97,23 @@ def least_slack(demand: Demand) -> Array:
 
 
 def _least_slack_forces(demand: Demand) -> Array:
-    many = len(demand.required)
-    short = np.eye(many)
-    solved = linprog(
-        np.concatenate([np.zeros(len(demand.pcsa)), np.ones(2 * many)]),
-        A_eq=np.hstack([demand.arms, short, -short]),
-        b_eq=demand.required,
-        A_ub=np.hstack([-demand.sheath, np.zeros((2, 2 * many))]),
-        b_ub=np.zeros(2),
-        bounds=[*zip(demand.least, demand.most, strict=True), *[(0.0, None)] * (2 * many)],
-        method="highs",
+    """(M,) N; a linear programme by HiGHS, asked through `milp`, which adds least of its own."""
+    many, rows = len(demand.pcsa), len(demand.required)
+    either = np.hstack([np.eye(rows), -np.eye(rows)])
+    weights = np.block([[demand.arms, either], [demand.sheath, np.zeros((2, 2 * rows))]])
+    low = np.concatenate([demand.required, np.zeros(2)])
+    high = np.concatenate([demand.required, np.full(2, np.inf)])
+    solved = milp(
+        np.concatenate([np.zeros(many), np.ones(2 * rows)]),
+        constraints=LinearConstraint(weights, low, high),
+        bounds=Bounds(
+            np.concatenate([demand.least, np.zeros(2 * rows)]),
+            np.concatenate([demand.most, np.full(2 * rows, np.inf)]),
+        ),
     )
     if solved.x is None:
         raise ValueError(f"the linear programme of the least slack failed: {solved.message}")
-    found: Array = np.asarray(solved.x[: len(demand.pcsa)])
+    found: Array = np.asarray(solved.x[:many])
     return found
 
 

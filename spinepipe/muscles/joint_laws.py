@@ -164,15 +164,15 @@ class JointLaws:
     stiffens: bool
 
     def stiffening(self, compression: Array) -> Array:
-        """(7,) factor of the moments under compressions (7,) N."""
+        """(..., 7) factor of the moments under compressions (..., 7) N."""
         if not self.stiffens:
-            return np.ones(len(LEVELS))
+            return np.ones(np.shape(compression))
         return np.interp(compression, PRELOADS_N, PRELOAD_FACTORS)
 
     def moments(self, turned: Array, compression: Array) -> Array:
-        """(7, 3) N m on what is above, on the axes of the disc, for rotation vectors (7, 3)."""
-        curve = np.stack([c.moment(turned[:, k]) for k, c in enumerate(self.curves)], axis=1)
-        found: Array = -self.stiffening(compression)[:, None] * self.angular * curve
+        """(..., 7, 3) N m on what is above, axes of the disc, for rotation vectors (..., 7, 3)."""
+        curve = np.stack([c.moment(turned[..., k]) for k, c in enumerate(self.curves)], axis=-1)
+        found: Array = -self.stiffening(compression)[..., None] * self.angular * curve
         return found
 
     def slopes(self, turned: Array, compression: Array) -> Array:
@@ -182,6 +182,6 @@ class JointLaws:
         return found
 
     def translations(self, pushes: Array) -> Array:
-        """(7, 3) m by which the upper vertebra moves when it is pushed with (7, 3) N, disc axes."""
-        forwards, right = (pushes[:, k] / self.shear[:, n] for n, k in enumerate((0, 2)))
-        return np.stack([forwards, pushes[:, 1] / self.axial, right], axis=1)
+        """(..., 7, 3) m by which the upper vertebra moves, pushed with (..., 7, 3) N, disc axes."""
+        forwards, right = (pushes[..., k] / self.shear[:, n] for n, k in enumerate((0, 2)))
+        return np.stack([forwards, pushes[..., 1] / self.axial, right], axis=-1)

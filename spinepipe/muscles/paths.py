@@ -146,21 +146,19 @@ class Lines:
             for end, body in ((0, _SACRUM), (1, THORAX))
         )
         up = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
-        sides = _sides(muscles)
-        for m in np.flatnonzero(muscles.in_sheath):
-            side, bone = sides[m], muscles.body[m, 0]
-            reach = points[m, 1] - points[m, 0]
-            line = reach / np.linalg.norm(reach)
-            pull = float(line @ up[side])
-            along[side, m] = pull
-            on_ribs = line if bone == THORAX else np.zeros(3)
-            forces[m], moments[m] = 0.0, 0.0
-            forces[m, THORAX] = on_ribs - pull * up[side]
-            moments[m, THORAX] = np.cross(points[m, 0], on_ribs) - np.cross(
-                high[side], pull * up[side]
-            )
-            forces[m, _SACRUM] = -forces[m, THORAX]
-            moments[m, _SACRUM] = -moments[m, THORAX]
+        hung = np.flatnonzero(muscles.in_sheath)
+        side, ends = _sides(muscles)[hung], points[hung, :2]
+        line = ends[:, 1] - ends[:, 0]
+        line /= np.linalg.norm(line, axis=1, keepdims=True)
+        pull = np.einsum("ki,ki->k", line, up[side])
+        along[side, hung] = pull
+        down = pull[:, None] * up[side]
+        on_ribs = np.where((muscles.body[hung, 0] == THORAX)[:, None], line, 0.0)
+        forces[hung], moments[hung] = 0.0, 0.0
+        forces[hung, THORAX] = on_ribs - down
+        moments[hung, THORAX] = np.cross(ends[:, 0], on_ribs) - np.cross(high[side], down)
+        forces[hung, _SACRUM] = -forces[hung, THORAX]
+        moments[hung, _SACRUM] = -moments[hung, THORAX]
         return along
 
 

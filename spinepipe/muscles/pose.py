@@ -68,8 +68,8 @@ class BodyPoses:
 
     def masses(self, masses: tuple[Mass, ...]) -> Array:
         """(K, 3) m, where centres of mass are now."""
-        body = np.array([mass.body for mass in masses])
-        return self.of(body, np.array([mass.at for mass in masses]))
+        body = np.array([mass.body for mass in masses], dtype=np.int64)
+        return self.of(body, np.array([mass.at for mass in masses]).reshape(-1, 3))
 
 
 def rotations_of(chain: Chain, angles: Array) -> Array:

@@ -137,7 +137,7 @@ def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Hel
     rotations = rotations_of(person.chain, angles_of(person, task))
     pushes, how = np.zeros((len(LEVELS), 3)), How()
     for _ in range(rounds):
-        now = _at(person, task, how, 0.0, rotations, pushes, None, given=forces)
+        now = _at(person, task, how, 0.0, rotations, pushes, given=forces)
         pushes = now.pushes
     return now
 
@@ -149,9 +149,10 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
     pushes[:, 1] = -start
     rounds: list[Round] = []
     trail: list[Array] = []
-    step, last = 1.0, np.zeros_like(pushes)
+    step, last, beyond = 1.0, np.zeros_like(pushes), False
     while True:
-        now = _at(person, task, how, tone, rotations, pushes, trail[-1] if trail else None)
+        now = _at(person, task, how, tone, rotations, pushes, beyond)
+        beyond = not now.found.enough
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
         residual = _residual(now, before, how)
@@ -216,7 +217,7 @@ def _at(
     tone: float,
     rotations: Array,
     pushes: Array,
-    near: Array | None,
+    beyond: bool = False,
     given: Array | None = None,
 ) -> Held:
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
@@ -242,7 +243,7 @@ def _at(
         pulls.along_sheath,
     )
     if given is None:
-        found = least_stress(_lowest(demand) if how.lowest_alone else demand, near)
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand, beyond)
         slack = demand.required - demand.arms @ found.forces
         found = replace(found, slack=slack)
     else:

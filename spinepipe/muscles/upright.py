@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.applied import applied
-from spinepipe.muscles.person import Person, above
-from spinepipe.muscles.pose import posed, rotations_of
-from spinepipe.muscles.task import Task
-from spinepipe.muscles.trunk import BODIES, LEVELS
+from spinepipe.model import STANDARD_GRAVITY
+from spinepipe.muscles.masses import arm_masses
+from spinepipe.muscles.person import Person
+from spinepipe.muscles.pose import Chain
+from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
 
 MOST_ROUNDS = 30
 _STEP_RAD = 1e-6
 _SMALL_NM = 1e-6
+_EXTENSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,51 +54,92 @@ def turned(angles: Array) -> Array:
 
 
 def lacking(person: Person, angles: Array) -> Array:
-    """(7,) N m that L5 to T11 lack for their own equilibrium, no muscle pulling.
+    """(..., 7) N m that L5 to T11 lack for their own equilibrium, no muscle pulling.
 
     What acts on the vertebra itself, the joints' moments on it, and the force of the joint above,
     about the joint below: what all above the joint below lacks less what all above the joint above
-    lacks. Joints are as far pressed and as stiff as the weight makes them.
+    lacks. Joints are as far pressed and as stiff as the weight makes them. All is in the sagittal
+    plane, where turns add up; arms hang, so their weight acts at the shoulders.
+
+    Parameters
+    ----------
+    angles : (..., 8) rad, extension of the bodies from the source's pose.
     """
-    rotations = rotations_of(person.chain, turned(angles))
-    pushes = np.zeros((len(LEVELS), 3))
-    nothing = Task("upright", None, turned(angles), from_upright=False)
-    for _ in range(3):
-        poses = posed(person.chain, rotations, person.laws.translations(pushes))
-        loads = applied(person, nothing, poses)
-        forces, turning = above(loads.forces, loads.moments, poses.centres)
-        pushes = np.einsum("kji,kj->ki", poses.discs, forces)
-    joint = person.laws.moments(poses.turned, -pushes[:, 1])
-    total = (turning + np.einsum("kij,kj->ki", poses.discs, joint))[:, 2]
+    weights, bodies, at = _hanging(person)
+    chain, turns = person.chain, _turns(angles)
+    discs = _turns(0.5 * (angles[..., 1:] + angles[..., :-1])) @ chain.discs[:, :2, :2]
+    carried = np.cumsum(np.bincount(bodies, weights, len(BODIES))[:0:-1])[::-1]
+    pushes = np.zeros((*angles.shape[:-1], len(LEVELS), 3))
+    pushes[..., :2] = -carried[:, None] * discs[..., 1, :]
+    moved = np.einsum("...ij,...j->...i", discs, person.laws.translations(pushes)[..., :2])
+    legs = np.einsum("...ij,...j->...i", turns[..., :-1, :, :], _legs(chain))
+    centres = chain.origins[0, :2] + np.cumsum(legs, axis=-2)
+    centres[..., 1:, :] += np.cumsum(moved, axis=-2)[..., :-1, :]
+    places = np.concatenate([centres[..., :1, :], centres + moved], axis=-2)
+    arms = at - chain.origins[bodies, :2]
+    forwards = places[..., bodies, 0] + np.einsum("...j,...j->...", turns[..., bodies, 0, :], arms)
+    above = bodies > np.arange(len(LEVELS))[:, None]
+    turning = carried * centres[..., 0] - (weights * forwards) @ above.T
+    bent = np.zeros_like(pushes)
+    bent[..., _EXTENSION] = np.diff(angles, axis=-1)
+    total = turning + person.laws.moments(bent, -pushes[..., 1])[..., _EXTENSION]
     own = total.copy()
-    own[:-1] -= total[1:]
+    own[..., :-1] -= total[..., 1:]
     return -own
+
+
+def _hanging(person: Person) -> tuple[Array, NDArray[np.int64], Array]:
+    """Weights (K,) N, the bodies (K,) that carry them, and where (K, 2) m, forwards and up."""
+    arms = (
+        one
+        for side, shoulder in zip(SIDES, person.lines.trunk.shoulders, strict=True)
+        for one in arm_masses(side, shoulder, shoulder, person.subject)
+    )
+    masses = (*person.masses, *arms)
+    return (
+        -STANDARD_GRAVITY[1] * np.array([mass.kg for mass in masses]),
+        np.array([mass.body for mass in masses]),
+        np.array([mass.at[:2] for mass in masses]),
+    )
+
+
+def _legs(chain: Chain) -> Array:
+    """(7, 2) m, from the point that a body's pose is told of to the joint above it."""
+    found: Array = (chain.centres - chain.origins[:-1])[:, :2]
+    return found
+
+
+def _turns(angles: Array) -> Array:
+    """(..., 2, 2) rotations in the sagittal plane."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    rows = [np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)]
+    return np.stack(rows, axis=-2)
 
 
 def upright(person: Person, start: Array, reach_rad: float) -> Upright:
     """The posture within `reach_rad` of the start (8,) rad."""
     angles = start.copy()
-    before = lacking(person, angles)
-    least, trust = float(np.abs(before).sum()), reach_rad
+    before, slope = _with_slope(person, angles)
+    at, least, trust = before, float(np.abs(before).sum()), reach_rad
     for _ in range(MOST_ROUNDS):
-        at = lacking(person, angles)
-        slope = np.stack(
-            [
-                (lacking(person, angles + _STEP_RAD * one) - at) / _STEP_RAD
-                for one in np.eye(len(BODIES))
-            ],
-            axis=1,
-        )
         step = _least_sum(at, slope, start - reach_rad - angles, start + reach_rad - angles, trust)
         size = float(np.abs(lacking(person, angles + step)).sum())
         if size < least - _SMALL_NM:
             angles, least = angles + step, size
+            at, slope = _with_slope(person, angles)
         else:
             trust *= 0.25
         if trust < 1e-7 or least < _SMALL_NM:
             break
     at_bound = np.abs(angles - start) > reach_rad - 1e-9
-    return Upright(angles, start, at_bound, before, lacking(person, angles))
+    return Upright(angles, start, at_bound, before, at)
+
+
+def _with_slope(person: Person, angles: Array) -> tuple[Array, Array]:
+    """(7,) N m lacking, and (7, 8) N m/rad, how fast that grows with each angle."""
+    steps = np.vstack([np.zeros(len(BODIES)), _STEP_RAD * np.eye(len(BODIES))])
+    found = lacking(person, angles + steps)
+    return found[0], (found[1:] - found[0]).T / _STEP_RAD
 
 
 def _least_sum(at: Array, slope: Array, low: Array, high: Array, trust: float) -> Array:

@@ -266,6 +266,7 @@ SOLVING = {
     },
     "range_of_motion": {"simulate"},
     "scoliosis": {"personalise", "population", "variants"},
+    "trunk_loads": {"hold", "simplify", "tune", "respond"},
 }
 """Jobs that solve equilibria."""
 

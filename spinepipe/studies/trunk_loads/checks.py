@@ -1,16 +1,20 @@
 """What a study of trunk loads demands of its cohort: each fault with its place and remedy."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
+from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import SEXES, SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.geometry_forms import MUSCLE_PARAMETERS, MUSCLES
+from spinepipe.studies.trunk_loads.persons import regressions_of, source_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 HEIGHT_CM = (120.0, 220.0)
@@ -38,7 +42,43 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
         file = f"{cohort.name}/{TASKS.file}"
         yield from task_problems(file, further["tasks"], tallest, study.trunk_angle)
         yield from _named(document, study, cohort, list(further["tasks"]["task"]))
-    yield from muscle_problems(cohort.name, further)
+    if study.geometry == "cohort":
+        yield from _without_geometry(document, cohort)
+    yield from muscle_problems(cohort)
+    yield from _regressions(study, cohort)
+
+
+def check_source(
+    document: Document, study: TrunkLoads, cohort: Cohort, _root: Path
+) -> Iterator[Problem]:
+    """Refuse a study whose geometry and muscles cannot be read or make no trunk."""
+    place = at(document, "geometry")
+    try:
+        source_of(study, cohort)
+    except NoSource as error:
+        allowed = f"{PACKAGE} in version {VERSION}"
+        yield Problem(*place, error.found, allowed, f"{REMEDY}, or write geometry: cohort")
+    except ValueError as error:
+        allowed = "a trunk from S1 to T1 with its muscles"
+        yield Problem(*place, str(error), allowed, f"complete the files of {cohort.name}")
+
+
+def _without_geometry(document: Document, cohort: Cohort) -> Iterator[Problem]:
+    """Files that a cohort must have which brings its own geometry."""
+    there = {name: name in cohort.further for name in (MUSCLES.stem, MUSCLE_PARAMETERS.stem)}
+    there["joints"] = cohort.joints is not None
+    for name in [name for name, is_there in there.items() if not is_there]:
+        found = f"cohort, and {cohort.name} has no {name}.csv"
+        remedy = f"add {name}.csv, or write geometry: myo_sim"
+        yield Problem(*at(document, "geometry"), found, f"a cohort with {name}.csv", remedy)
+
+
+def _regressions(study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
+    """Faults of a table of the user's own."""
+    try:
+        regressions_of(study, cohort.folder)
+    except InputError as error:
+        yield from error.problems
 
 
 def _subjects(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:

@@ -1,44 +1,75 @@
 """What may be wrong with muscles that a cohort brings along, and with tables that name levels."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+import numpy as np
 import pandas as pd
 
+from spinepipe.cohort import Cohort
+from spinepipe.muscles.folder import PELVIS, SHEATH, in_ground
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
 from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.units import MM_PER_M
 
-PLACES = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
-"""Bodies that a point of a muscle may belong to: T1 to T10 move with T11."""
+CARRIERS = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
+"""Vertebrae that a body may move with: T1 to T10 move with T11."""
+
+PLACES = (*CARRIERS, *PELVIS, SHEATH)
+"""Bodies that a point of a muscle may belong to, where the cohort tells of no others."""
 
 STRENGTHS = ("pcsa_mm2", "max_isometric_force_n")
 
 
-def muscle_problems(cohort: str, further: Mapping[str, pd.DataFrame]) -> Iterator[Problem]:
-    """Everything that is wrong with muscles.csv, muscle_parameters.csv and columns of levels.
-
-    Parameters
-    ----------
-    further : tables by stem, indexed by the number of the line.
-    """
+def muscle_problems(cohort: Cohort) -> Iterator[Problem]:
+    """Everything that is wrong with muscles.csv, muscle_parameters.csv, body_frames.csv and columns
+    of levels."""
+    name, further = cohort.name, cohort.further
     points, muscles = further.get("muscles"), further.get("muscle_parameters")
+    frames = _frames_of_owner(cohort)
+    if frames is not None:
+        yield from _frames(f"{name}/body_frames.csv", frames)
     if points is not None:
-        yield from _points(f"{cohort}/muscles.csv", points)
+        yield from _points(f"{name}/muscles.csv", points, frames)
     if muscles is not None:
-        yield from _parameters(f"{cohort}/muscle_parameters.csv", muscles)
+        yield from _parameters(f"{name}/muscle_parameters.csv", muscles)
     if points is not None and muscles is not None:
-        yield from _both(cohort, points, muscles)
-        yield from _sides(f"{cohort}/muscles.csv", points, muscles)
+        yield from _both(name, points, muscles)
+        yield from _sides(f"{name}/muscles.csv", points, muscles, frames)
     for stem, rows in further.items():
         if "level" in rows:
-            yield from _levels(f"{cohort}/{stem}.csv", rows["level"].dropna())
+            yield from _levels(f"{name}/{stem}.csv", rows["level"].dropna())
 
 
-def _points(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
+def _frames_of_owner(cohort: Cohort) -> pd.DataFrame | None:
+    """Frames of the specimen whose joints are taken, the first of joints.csv."""
+    frames = cohort.further.get("body_frames")
+    if frames is None or cohort.joints is None:
+        return frames
+    return frames[frames["specimen"] == cohort.joints["specimen"].iloc[0]]
+
+
+def _frames(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
+    """Bodies that move with nothing known; no rows at all where points are told in their frames."""
+    if rows.empty:
+        found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
+        yield Problem(file, None, "specimen", found, allowed, "add its rows, or delete the file")
+    for line, body in rows["carried_by"].items():
+        if body not in CARRIERS:
+            remedy = did_you_mean(str(body), CARRIERS, "ribs, arms and head move with a vertebra")
+            place = (file, int(str(line)), "carried_by")
+            yield Problem(*place, f"unknown vertebra '{body}'", one_of(CARRIERS), remedy)
+
+
+def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[Problem]:
+    known = PLACES if frames is None else tuple(frames["body"])
+    otherwise = "ribs, arms and head belong to T11, or add body_frames.csv with their frames"
+    if frames is not None:
+        otherwise = "add its frame to body_frames.csv"
     for line, body in rows["body"].items():
-        if body not in PLACES:
-            remedy = did_you_mean(str(body), PLACES, "ribs, arms and head belong to T11")
+        if body not in known:
+            remedy = did_you_mean(str(body), known, otherwise)
             place = (file, int(str(line)), "body")
-            yield Problem(*place, f"unknown body '{body}'", one_of(PLACES), remedy)
+            yield Problem(*place, f"unknown body '{body}'", one_of(known), remedy)
     counted = rows["muscle"].map(rows["muscle"].value_counts())
     for line, name in rows["muscle"][counted == 1].items():
         found, allowed = f"{name} has one point", "two points or more, from end to end"
@@ -76,29 +107,46 @@ def _both(cohort: str, points: pd.DataFrame, muscles: pd.DataFrame) -> Iterator[
             yield Problem(*place, f"{name} is not in {other}.csv", allowed, remedy)
 
 
-def _sides(file: str, points: pd.DataFrame, muscles: pd.DataFrame) -> Iterator[Problem]:
-    """Muscles that lie on the other side than they are said to, or all of them."""
+def _sides(
+    file: str, points: pd.DataFrame, muscles: pd.DataFrame, frames: pd.DataFrame | None
+) -> Iterator[Problem]:
+    """Sides most of whose muscles lie on the other one; single ones are mirrored with a remark."""
     side = dict(zip(muscles["muscle"], muscles["side"], strict=True))
-    judged = {
-        str(name): rows["z_mm"]
-        for name, rows in points.groupby("muscle", sort=False)
-        if side.get(name) in SIDES
-    }
-    wrong = {name: z for name, z in judged.items() if (_outwards(z, side[name]) < 0.0).all()}
-    if len(judged) > 1 and len(wrong) == len(judged):
-        found, allowed = "every muscle on the other side of the body", "z to the right"
+    if frames is not None:
+        points = points[points["body"].isin(list(frames["body"]))]
+    if points.empty:
+        return
+    right = points.assign(right_m=_right_of_midline(points, frames)).groupby("muscle", sort=False)
+    lies = {str(name): float(rows["right_m"].sum()) for name, rows in right}
+    wrong = {one: [m for m, z in lies.items() if _wrong(z, side.get(m), one)] for one in SIDES}
+    judged = {one: [m for m in lies if side.get(m) == one] for one in SIDES}
+    most = [one for one in SIDES if 2 * len(wrong[one]) > len(judged[one])]
+    if len(most) == len(SIDES):
+        found, allowed = "most muscles on the other side of the body", "z to the right"
         remedy = "change the sign of z: the axes are x forwards, y up, z to the right"
         yield Problem(file, None, "z_mm", found, allowed, remedy)
         return
-    for name, z in wrong.items():
-        found = f"{name} is {side[name]} and lies at z {z.min():g} to {z.max():g} mm"
+    for one in most:
+        first = points.index[points["muscle"] == wrong[one][0]][0]
+        found = (
+            f"{len(wrong[one])} of {len(judged[one])} muscles that are {one} lie on the other side,"
+            f" {wrong[one][0]} among them"
+        )
         allowed = "z above 0 on the right, below 0 on the left"
-        remedy = "mirrored twice? change the sign of its z, or its side"
-        yield Problem(file, int(str(z.index[0])), "z_mm", found, allowed, remedy)
+        remedy = "not mirrored, or mirrored twice? change the sign of their z, or their side"
+        yield Problem(file, int(str(first)), "z_mm", found, allowed, remedy)
 
 
-def _outwards(z: "pd.Series[float]", side: str) -> "pd.Series[float]":
-    return z if side == "right" else -z
+def _right_of_midline(points: pd.DataFrame, frames: pd.DataFrame | None) -> "pd.Series[float]":
+    """Metres by which points lie to the right in ground."""
+    own = points[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
+    placed = own if frames is None else in_ground(frames, points["body"].tolist(), own)
+    return pd.Series(np.asarray(placed[:, 2]), points.index)
+
+
+def _wrong(right_m: float, called: str | None, side: str) -> bool:
+    """Whether a muscle is called by a side and lies on the other."""
+    return called == side and (right_m < 0.0 if side == "right" else right_m > 0.0)
 
 
 def _levels(file: str, column: "pd.Series[str]") -> Iterator[Problem]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
-from spinepipe.studies.trunk_loads.checks import check_trunk
+from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
 from spinepipe.studies.trunk_loads.forms import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
 from spinepipe.studies.trunk_loads.geometry_forms import GEOMETRY_FORMS
@@ -154,6 +154,7 @@ KIND = Kind(
     settings=TrunkLoads,
     files=TrunkFiles,
     checks=(check_trunk,),
+    checks_at_start=(check_source,),
     tables=(
         *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, SIMPLIFIED),
         *(PRESSURES, TUNING, AGREEMENT, DESIGN, RESPONSES, INTERVALS, DRIVERS),

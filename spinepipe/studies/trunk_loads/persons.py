@@ -92,7 +92,8 @@ def regressions_of(settings: TrunkLoads, folder: Path) -> Regressions:
     """How size follows from sex, age, height and mass."""
     if settings.regressions in ("ct_trends", "constant_density"):
         return packaged(settings.regressions)
-    return read_regressions(folder / settings.regressions)
+    file = f"{folder.name}/{settings.regressions}"
+    return read_regressions(folder / settings.regressions, file)
 
 
 def subject_of(cohort: Cohort, specimen: str) -> Subject:

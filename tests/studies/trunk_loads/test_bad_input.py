@@ -1,22 +1,30 @@
 """Whatever is wrong with subjects, tasks and muscles is told with file, row, found and remedy."""
 
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from cohort_cases import Change, Files, add, both, cell, line, swap, text, without
+from installed import need_male
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort.columns import Column, TableForm
 from spinepipe.cohort.text import Document
+from spinepipe.muscles import myo_sim
+from spinepipe.muscles.trunk import LEVELS
 from spinepipe.problems import InputError, Problem
-from spinepipe.studies.trunk_loads.checks import check_trunk
+from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
+from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
 from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.geometry_forms import GEOMETRY_FORMS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 YAML, SUBJECT, TASK = "cohort.yaml", "subjects.csv", "tasks.csv"
 POINTS, MUSCLES, SCALING = "muscles.csv", "muscle_parameters.csv", "muscle_regressions.csv"
 NAME = "small"
+DOCUMENT = Document("s.yaml", {}, {})
 
 TASK_HEADER = (
     "task,number,counted_from,trunk_extension_deg,trunk_right_bending_deg,pelvis_extension_deg,"
@@ -53,26 +61,7 @@ def _key(name: str) -> Column:
 
 
 FORMS = (
-    SUBJECTS,
-    TASKS,
-    TableForm(
-        "muscles",
-        "muscle x point",
-        (
-            *map(_key, ("muscle", "point", "body")),
-            *(Column(name, name) for name in ("x_mm", "y_mm", "z_mm")),
-        ),
-        ("muscle", "point"),
-    ),
-    TableForm(
-        "muscle_parameters",
-        "muscle",
-        (
-            *map(_key, ("muscle", "group", "side")),
-            *(Column(name, name) for name in ("pcsa_mm2", "max_isometric_force_n")),
-        ),
-        ("muscle",),
-    ),
+    *(SUBJECTS, TASKS, *GEOMETRY_FORMS),
     TableForm(
         "muscle_regressions",
         "muscle x level",
@@ -80,27 +69,37 @@ FORMS = (
         ("muscle", "level"),
     ),
 )
-"""Those of muscles stand for what a cohort may bring along, whatever else their columns be."""
+"""The last stands for any table with levels, whatever else its columns be."""
+
+
+MALE_STRESS_MPA = 1.0
+"""Force over cross-section; what it is does not count here, only that it is given."""
 
 
 def told(folder: Path, *changes: Change, **asked: object) -> list[Problem]:
     """What is said of the cohort, changed, by the reader or else by the checks of the kind."""
+    try:
+        cohort = small(folder, *changes)
+    except InputError as error:
+        return list(error.problems)
+    return list(check_trunk(DOCUMENT, study(**asked), cohort))
+
+
+def small(folder: Path, *changes: Change) -> cohorts.Cohort:
+    """The small cohort, changed, where it can be read."""
     files = dict(VALID)
     for change in changes:
         change(files)
-    folder = folder / NAME
-    folder.mkdir()
+    (folder / NAME).mkdir()
     for name, content in files.items():
         assert isinstance(content, str)
-        (folder / name).write_text(content)
-    try:
-        cohort = cohorts.read(folder, FORMS)
-    except InputError as error:
-        return list(error.problems)
-    study = TrunkLoads.model_validate(
-        {"study": "s", "kind": "trunk_loads", "cohort": NAME, **asked}
-    )
-    return list(check_trunk(Document("s.yaml", {}, {}), study, cohort))
+        (folder / NAME / name).write_text(content)
+    return cohorts.read(folder / NAME, FORMS)
+
+
+def study(**asked: object) -> TrunkLoads:
+    """A study of the small cohort."""
+    return TrunkLoads.model_validate({"study": "s", "kind": "trunk_loads", "cohort": NAME, **asked})
 
 
 @dataclass(frozen=True)
@@ -136,13 +135,34 @@ STRESS, PRESSURE = "largest_stress_mpa", "intra_abdominal_pressure_kpa"
 TRUNK, PELVIS = "trunk_extension_deg", "pelvis_extension_deg"
 BENT, PELVIS_BENT = "trunk_right_bending_deg", "pelvis_right_bending_deg"
 STANDING_AGAIN = "upright,1,,0,,,,,,,,,,,,,,,,,,,,,,,,"
-MIRRORED = swap(
+HEADER = "muscle,point,body,x_mm,y_mm,z_mm\n"
+MIRRORED = both(
+    swap(
+        POINTS, "-50,0,-20\nLTpT_T12_l,2,T12,-50,200,-30", "-50,0,20\nLTpT_T12_l,2,T12,-50,200,30"
+    ),
+    swap(POINTS, "-60,0,-40\nLD_l,2,T7,-50,300,-10", "-60,0,40\nLD_l,2,T7,-50,300,10"),
+)
+ONE_MIRRORED = swap(
     POINTS, "-50,0,-20\nLTpT_T12_l,2,T12,-50,200,-30", "-50,0,20\nLTpT_T12_l,2,T12,-50,200,30"
 )
 ALL_MIRRORED = text(
     POINTS,
-    "muscle,point,body,x_mm,y_mm,z_mm\nLD_r,1,S1,0,0,-4\nLD_r,2,T7,0,0,-1\nLD_l,1,S1,0,0,4\nLD_l,2,T7,0,0,1\nLTpT_T12_l,1,S1,0,0,2\nLTpT_T12_l,2,T12,0,0,3\n",
+    f"{HEADER}LD_r,1,S1,0,0,-4\nLD_r,2,T7,0,0,-1\nLD_l,1,S1,0,0,4\nLD_l,2,T7,0,0,1\n"
+    "LTpT_T12_l,1,S1,0,0,2\nLTpT_T12_l,2,T12,0,0,3\n",
 )
+FRAMES = "body_frames.csv"
+IN_FRAMES = text(
+    FRAMES,
+    "specimen,body,carried_by,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+    "a,S1,S1,0,0,0,0,0,0\na,T7,T7,0,0,0,0,0,0\na,T12,T12,0,200,0,0,0,0\n",
+)
+"""The bodies of the muscles, where points are told in their frames."""
+
+
+def framed(*changes: Change) -> Change:
+    """With frames, changed."""
+    return both(IN_FRAMES, *changes)
+
 
 # One fault a line, however long: this is a table to look things up in.
 # fmt: off
@@ -201,8 +221,10 @@ EXERTION_CASES = [
 MUSCLE_CASES = [
     Case("one point", line(POINTS, 7, None), POINTS, 6, "muscle", "LTpT_T12_l has one point", "add its other end"),
     Case("unknown body", cell(POINTS, 3, "body", "humerus"), POINTS, 3, "body", "unknown body 'humerus'", "belong to T11"),
-    Case("mirrored twice", MIRRORED, POINTS, 6, "z_mm", "LTpT_T12_l is left and lies at z 20 to 30 mm", "mirrored twice?"),
-    Case("all mirrored", ALL_MIRRORED, POINTS, None, "z_mm", "every muscle on the other side", "change the sign of z"),
+    Case("a body without a frame", framed(line(FRAMES, 4, None)), POINTS, 7, "body", "unknown body 'T12'", "add its frame"),
+    Case("rib on nothing", framed(cell(FRAMES, 4, "carried_by", "sternum")), FRAMES, 4, "carried_by", "unknown vertebra 'sternum'", "move with a vertebra"),
+    Case("mirrored twice", MIRRORED, POINTS, 4, "z_mm", "2 of 2 muscles that are left lie on the other side, LD_l", "mirrored twice?"),
+    Case("all mirrored", ALL_MIRRORED, POINTS, None, "z_mm", "most muscles on the other side", "change the sign of z"),
     Case("PCSA 0", cell(MUSCLES, 2, "pcsa_mm2", "0"), MUSCLES, 2, "pcsa_mm2", "LD_r has 0", "delete the muscle"),
     Case("force 0", cell(MUSCLES, 4, "max_isometric_force_n", "0"), MUSCLES, 4, "max_isometric_force_n", "LTpT_T12_l has 0", "delete the muscle"),
     Case("no size", cell(MUSCLES, 2, "pcsa_mm2", ""), MUSCLES, 2, "pcsa_mm2", "neither of LD_r", "fill one"),
@@ -228,6 +250,39 @@ def test_one_fault_is_told_once_with_place_and_remedy(case: Case, tmp_path: Path
 
 def test_a_sound_cohort_is_not_blamed(tmp_path: Path) -> None:
     assert told(tmp_path) == []
+
+
+def test_bodies_of_frames_and_the_sheath_are_known(tmp_path: Path) -> None:
+    rib = framed(
+        cell(FRAMES, 4, "body", "rib12_L"),
+        cell(POINTS, 7, "body", "rib12_L"),
+        cell(POINTS, 3, "body", "Abdomen"),
+        cell(FRAMES, 3, "body", "Abdomen"),
+        cell(POINTS, 5, "body", "Abdomen"),
+    )
+    assert told(tmp_path, rib) == []
+    (tmp_path / "unframed").mkdir()
+    pelvis = both(cell(POINTS, 2, "body", "pelvis"), cell(POINTS, 3, "body", "Abdomen"))
+    assert told(tmp_path / "unframed", pelvis) == []
+
+
+def test_one_muscle_on_the_other_side_is_left_to_be_mirrored(tmp_path: Path) -> None:
+    assert told(tmp_path, ONE_MIRRORED) == []
+
+
+def test_sides_are_judged_in_ground(tmp_path: Path) -> None:
+    """Frames that lie 100 mm to the left: points right of their origins still lie to the left."""
+    left = "a,T7,T7,0,0,-100,0,0,0\na,T12,T12,0,0,-100,0,0,0\n"
+    moved = swap(FRAMES, "a,T7,T7,0,0,0,0,0,0\na,T12,T12,0,200,0,0,0,0\n", left)
+    own = both(
+        swap(POINTS, "T7,-50,300,-10", "T7,-50,300,70"),
+        swap(POINTS, "T7,-50,300,10", "T7,-50,300,170"),
+        swap(POINTS, "T12,-50,200,-30", "T12,-50,200,60"),
+    )
+    assert told(tmp_path, framed(moved, own)) == []
+    (tmp_path / "ground").mkdir()
+    (problem,) = told(tmp_path / "ground", own)
+    assert "left lie on the other side" in problem.found
 
 
 def test_muscles_need_not_come_along(tmp_path: Path) -> None:
@@ -277,3 +332,72 @@ def test_names_in_the_study_are_looked_up(tmp_path: Path) -> None:
     keys = ["drawn_tasks.0", "uncertain.specimens.0", "volunteer.specimen"]
     assert [problem.column for problem in found] == keys
     assert "did you mean 'bend'" in found[0].remedy
+
+
+def test_geometry_of_the_cohort_must_be_there(tmp_path: Path) -> None:
+    found = told(tmp_path, without(POINTS), without(MUSCLES), geometry="cohort")
+    assert {problem.column for problem in found} == {"geometry"}
+    files = (POINTS, MUSCLES, "joints.csv")
+    assert [problem.allowed for problem in found] == [f"a cohort with {file}" for file in files]
+    (tmp_path / "joints").mkdir()
+    (alone,) = told(tmp_path / "joints", geometry="cohort")
+    assert "no joints.csv" in alone.found
+    assert "geometry: myo_sim" in alone.remedy
+
+
+def test_a_table_of_regressions_is_read(tmp_path: Path) -> None:
+    (absent,) = told(tmp_path, regressions="mine.csv")
+    assert absent.file == f"{NAME}/mine.csv"
+    (tmp_path / "bad").mkdir()
+    bad = told(tmp_path / "bad", text("mine.csv", "sex,age\n"), regressions="mine.csv")
+    assert {(problem.file, problem.row) for problem in bad} == {(f"{NAME}/mine.csv", 1)}
+
+
+@pytest.mark.parametrize("installed", [None, "0.1.0"])
+def test_a_package_that_is_not_there_is_named_with_its_remedy(
+    installed: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cohort = small(tmp_path)
+
+    def distribution(name: str) -> SimpleNamespace:
+        if installed is None:
+            raise PackageNotFoundError(name)
+        return SimpleNamespace(version=installed)
+
+    monkeypatch.setattr(myo_sim, "distribution", distribution)
+    (problem,) = check_source(DOCUMENT, study(), cohort, tmp_path)
+    assert (problem.file, problem.column) == ("s.yaml", "geometry")
+    assert (installed or "not installed") in problem.found
+    assert f"myo-sim=={myo_sim.VERSION}" in problem.remedy
+    assert myo_sim.VERSION in problem.allowed
+
+
+def test_muscles_that_make_no_trunk_are_refused_at_the_start(tmp_path: Path) -> None:
+    """Joints of half a spine: each file is sound, and no trunk comes of them."""
+    joints = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+    joints += "".join(
+        f"{who},{level},0,{40 * k},0,0,0,0\n" for who in "ab" for k, level in enumerate(LEVELS)
+    )
+    cohort = small(tmp_path, text("joints.csv", joints))
+    asked = study(geometry="cohort")
+    assert list(check_trunk(DOCUMENT, asked, cohort)) == []
+    (problem,) = check_source(DOCUMENT, asked, cohort, tmp_path)
+    assert "T10T11" in problem.found
+    assert NAME in problem.remedy
+
+
+def test_the_generic_male_is_sound() -> None:
+    """Ribs, pelvis, rectus sheath, and one left fascicle that lies right, as published."""
+    cohort = cohorts.read(need_male(), FORMS)
+    assert list(muscle_problems(cohort)) == []
+    assert (
+        list(
+            check_source(
+                DOCUMENT,
+                study(geometry="cohort", source_stress_mpa=MALE_STRESS_MPA),
+                cohort,
+                cohort.folder,
+            )
+        )
+        == []
+    )

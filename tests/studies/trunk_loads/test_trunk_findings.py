@@ -112,6 +112,14 @@ def test_goals_that_are_missed_are_told_with_how_much() -> None:
     assert "The goal of 0.35 MPa is reached." in sentences
 
 
+def test_a_goal_is_not_reached_by_forces_that_hold_nothing() -> None:
+    rows = tables_of(ONE)["agreement"]
+    rows.loc[rows["tier"] == "untuned", ["n_not_held", "reached"]] = [2, False]
+    sentences = told(ONE, agreement=rows)
+    assert "and 2 counted tasks are not held by any muscle forces." in sentences
+    assert "The goal of 0.35 MPa" not in sentences
+
+
 def test_agreement_is_told_with_the_interval_of_r() -> None:
     found = told(ONE)
     assert "Untuned (nothing fitted): over 6 tasks computed pressures are off" in found

@@ -1,0 +1,129 @@
+"""Fascicles as strings: tight over bars, their lever arms the slopes of their length."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from trunk_person import held_task, tasks, volunteer
+
+from spinepipe.muscles.pose import BodyPoses, posed, rotation_of_vector, rotations_of
+from spinepipe.muscles.settle import angles_of
+from spinepipe.muscles.strings import tight
+from spinepipe.muscles.trunk import LEVELS
+
+NO_MOVES = np.zeros((len(LEVELS), 3))
+
+
+def string(ends: np.ndarray, bars: np.ndarray, along: np.ndarray, behind: np.ndarray) -> tuple:
+    """Length and touched bars of one string from the first end to the second."""
+    count = len(bars)
+    found = tight(
+        ends[None],
+        np.array([[0, 1]]),
+        np.array([0, count]),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count, dtype=np.int64),
+        bars,
+        along,
+        behind,
+        2,
+    )
+    return float(found[0][0]), int(found[3][0])
+
+
+def shortest(ends: np.ndarray, bars: np.ndarray, along: np.ndarray, behind: np.ndarray) -> float:
+    """Length of the shortest string that passes every bar behind it or on it.
+
+    Where it passes a bar it may be anywhere along it and at or behind it: a convex problem.
+    """
+    count = len(bars)
+
+    def length(x: np.ndarray) -> float:
+        passing = bars + x[:count, None] * along + x[count:, None] * behind
+        points = np.vstack([ends[:1], passing, ends[1:]])
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+    limits = [(None, None)] * count + [(0.0, None)] * count
+    options = {"ftol": 1e-16, "gtol": 1e-10, "maxiter": 10_000, "maxfun": 100_000}
+    start = np.full(2 * count, 0.01)
+    found = minimize(length, start, method="L-BFGS-B", bounds=limits, options=options)
+    return float(found.fun)
+
+
+def back_to_back(seed: int) -> tuple[np.ndarray, ...]:
+    """A string up a bent back of three vertebrae whose bars lean each their own way."""
+    rng = np.random.default_rng(seed)
+    heights = np.array([0.1, 0.2, 0.3])
+    bars = np.stack([-0.02 * np.sin(heights / 0.4 * np.pi), heights, np.zeros(3)], axis=1)
+    bars[:, 0] += rng.uniform(-0.004, 0.004, 3)
+    turns = [rotation_of_vector(rng.uniform(-0.15, 0.15, 3)) for _ in bars]
+    along = np.array([turn[:, 2] for turn in turns])
+    behind = np.array([-turn[:, 0] for turn in turns])
+    ends = np.array([[0.0, 0.0, 0.03], [0.0, 0.4, 0.05]])
+    return ends, bars, along, behind
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_string_is_as_long_as_the_shortest_behind_all_bars(seed: int) -> None:
+    given = back_to_back(seed)
+    length, touched = string(*given)
+    assert length == pytest.approx(shortest(*given), abs=1e-8)
+    assert touched >= 1
+
+
+def test_a_string_in_front_of_no_bar_runs_straight() -> None:
+    ends, bars, along, behind = back_to_back(0)
+    length, touched = string(ends, bars + np.array([0.1, 0.0, 0.0]), along, behind)
+    assert (length, touched) == (pytest.approx(np.linalg.norm(ends[1] - ends[0]), abs=1e-15), 0)
+
+
+def at_flexion(degrees: float) -> BodyPoses:
+    """The volunteer bent so far forwards, all bodies alike."""
+    person = volunteer()
+    share = degrees / 100.0
+    angles = person.upright + share * tasks()["forward_100"].turned
+    return posed(person.chain, rotations_of(person.chain, angles), NO_MOVES)
+
+
+def test_lengths_do_not_jump_while_the_trunk_bends() -> None:
+    lines = volunteer().lines
+    sweep = np.array([lines.pulls(at_flexion(0.1 * k)).lengths for k in range(0, 1001, 4)])
+    step = np.diff(sweep, axis=0)
+    assert np.abs(np.diff(step, axis=0)).max() < 0.1e-3
+    wraps = lines.trunk.muscles.wraps
+    first, last = lines.pulls(at_flexion(0.0)), lines.pulls(at_flexion(100.0))
+    assert last.contacts[wraps].sum() > first.contacts[wraps].sum()
+
+
+def turned_above(poses: BodyPoses, level: int, by: np.ndarray) -> BodyPoses:
+    """All that is above a joint, turned by a small vector (3,) about its centre."""
+    turn, centre = rotation_of_vector(by), poses.centres[level]
+    rotations, places = poses.rotations.copy(), poses.places.copy()
+    for body in range(level + 1, len(rotations)):
+        rotations[body] = turn @ rotations[body]
+        places[body] = centre + turn @ (places[body] - centre)
+    return BodyPoses(rotations, places, poses.origins, poses.centres, poses.discs, poses.turned)
+
+
+@pytest.mark.parametrize("task", ["standing", "full_flexion", "side_20"])
+def test_lever_arms_are_slopes_of_length(task: str) -> None:
+    """Virtual work; pulls along the rectus sheath are no string and left out."""
+    person, found = volunteer(), held_task(task)
+    free = ~person.lines.trunk.muscles.in_sheath
+    step = 1e-6
+    for level in range(len(LEVELS)):
+        for axis, unit in enumerate(np.eye(3)):
+            there, back = (
+                person.lines.pulls(turned_above(found.poses, level, sign * step * unit)).lengths
+                for sign in (1.0, -1.0)
+            )
+            slope = (there - back) / (2.0 * step)
+            arm = found.demand.arms[3 * level + axis]
+            # A string that just touches has two slopes; its difference stops there.
+            close = np.isclose(-arm[free], slope[free], atol=2e-7)
+            assert close.mean() > 0.99
+            assert np.abs(arm[free] + slope[free]).max() < 2e-3
+
+
+def test_angles_of_a_task_are_counted_from_upright() -> None:
+    person, task = volunteer(), tasks()["flexion_50"]
+    assert angles_of(person, task) == pytest.approx(person.upright + task.turned)
