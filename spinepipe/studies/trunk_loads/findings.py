@@ -83,9 +83,9 @@ def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
         yield "All pressures lie where the formula of the pressure was fitted."
         return
     yield (
-        f"{len(out)} of {count(len(known), 'pressure')} ({percent(len(out), len(known))}) lie "
-        "outside the range in which the formula of the pressure was fitted (0 to 1.86 MPa of "
-        f"nominal pressure, 0 to 10° of flexion) and are extrapolated: {_places(out)}."
+        "Extrapolated, as outside the range in which the formula of the pressure was fitted (0 to "
+        f"1.86 MPa of nominal pressure, 0 to 10° of flexion): {len(out)} of "
+        f"{count(len(known), 'pressure')} ({percent(len(out), len(known))}), {_places(out)}."
     )
 
 
@@ -225,8 +225,8 @@ def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[st
     share = number(100.0 * float(worst["strength_used"]), 2)
     yield (
         f"Of tasks that settled, {plain(worst['task'])} of {worst['specimen']} takes most of the "
-        f"strength, {share} % of it; {len(near)} of {count(len(known), 'task')} take more than "
-        f"{number(100.0 * _NEAR_LIMIT, 2)} %."
+        f"strength, {share} % of it; more than {number(100.0 * _NEAR_LIMIT, 2)} % is taken by "
+        f"{len(near)} of {count(len(known), 'task')}."
     )
 
 
