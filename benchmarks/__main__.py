@@ -23,6 +23,7 @@ from benchmarks import (
     sensitivity,
     study,
     summary,
+    trunk,
 )
 from benchmarks.memory import processes
 from benchmarks.timing import machine
@@ -44,6 +45,7 @@ def main() -> None:
         "memory": memory_part,
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
+        "trunk": trunk_part,
         "summary": lambda: summary.write(RESULTS),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
@@ -300,6 +302,52 @@ def _study_lines(lines: list[str], runs: Iterable[study.Run]) -> list[dict[str, 
         )
         print(lines[-1], flush=True)
     return rows
+
+
+def trunk_part() -> None:
+    """Tasks of a person, samples of them, and one posture beside OpenSim's static optimisation."""
+    about = _about()
+    lines = _head("Trunk loads", about)
+    lines += ["", "| task | ended | rounds | ms (goal 60) |", "|---|---|---|---|"]
+    rows = []
+    for row in trunk.tasks():
+        rows.append(asdict(row))
+        lines.append(f"| {row.name} | {row.status} | {row.rounds} | {1e3 * row.seconds:.0f} |")
+        print(lines[-1], flush=True)
+    twelve_s, standing_s = sum(row["seconds"] for row in rows), trunk.standing_s()
+    sampled, peak_mib, beside = trunk.samples(), trunk.memory_mib(), trunk.beside_opensim()
+    lines += [
+        "",
+        f"Twelve tasks: {twelve_s:.2f} s. A person of another size, upright: "
+        f"{1e3 * standing_s:.0f} ms (goal 60).",
+        f"{trunk.SAMPLES:,} samples x twelve tasks: {sampled.whole_s:.0f} s, extrapolated from "
+        f"{sampled.samples} samples in {sampled.seconds:.0f} s; in {sampled.out_of_reach} of their "
+        f"{sampled.runs + sampled.out_of_reach} tasks the hands were out of reach.",
+        f"Largest memory of a process that holds the twelve tasks: {peak_mib:.0f} MiB.",
+        "",
+        f"One posture ({trunk.POSTURE}), straight muscles, 21 moments, nine tenths of what the "
+        "muscles can make; OpenSim's `StaticOptimization`, one frame more.",
+        "",
+        "| what | spinepipe ms | OpenSim ms | ratio |",
+        "|---|---|---|---|",
+        f"| the same question, once | {1e3 * beside.ours_s:.1f} | {1e3 * beside.peer_s:.0f} "
+        f"| {beside.peer_s / beside.ours_s:.0f} |",
+        f"| the whole task: muscles wrap, forces and spine settled | {1e3 * beside.settled_s:.1f} "
+        f"| {1e3 * beside.peer_s:.0f}, once, straight | {beside.peer_s / beside.settled_s:.0f} |",
+        "",
+        f"Forces differ by {beside.apart_n:.1g} N at most; the largest is "
+        f"{beside.largest_n:.0f} N.",
+    ]
+    print(*lines[-13:], sep="\n", flush=True)
+    data = {
+        "tasks": rows,
+        "twelve_s": twelve_s,
+        "standing_s": standing_s,
+        "sampled": {**asdict(sampled), "whole_s": sampled.whole_s},
+        "peak_mib": peak_mib,
+        "beside": asdict(beside),
+    }
+    _write("trunk", lines, {"machine": about, **data})
 
 
 def lost_fits_parts() -> None:

@@ -42,17 +42,18 @@ class Memory:
 
 def processes() -> Iterator[Memory]:
     """One process of each."""
-    yield Memory("spinepipe: equilibrium T12-S1", _peak_mib(_OURS))
-    yield Memory("OpenSim: equilibrium T12-S1", _peak_mib(_THEIRS))
+    yield Memory("spinepipe: equilibrium T12-S1", peak_mib(_OURS))
+    yield Memory("OpenSim: equilibrium T12-S1", peak_mib(_THEIRS))
 
 
 def per_row(job: str, call: str, rows: int) -> float:
     """Bytes per row that a job of `spinepipe` holds at most, beyond those of its modules."""
     imported = f"import spinepipe.{job} as job\n"
-    return (_peak_mib(imported + call) - _peak_mib(imported)) * 2**20 / rows
+    return (peak_mib(imported + call) - peak_mib(imported)) * 2**20 / rows
 
 
-def _peak_mib(program: str) -> float:
+def peak_mib(program: str) -> float:
+    """Most memory of a process that runs a program, MiB."""
     done = subprocess.run(
         [sys.executable, "-c", program + _PEAK],
         cwd=ROOT,

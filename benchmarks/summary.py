@@ -19,6 +19,7 @@ PARTS = (
     "many_spines",
     "memory",
     "sensitivity",
+    "trunk",
 )
 """Parts whose figures are gathered."""
 
@@ -90,6 +91,12 @@ def _throughput(parts: dict[str, Data]) -> Iterator[str]:
         peer_s = row["equilibria"] * growth[row["joints"]]["static_s"] / CORES
         peer = "OpenSim static root-find (extrapolated)"
         yield _line(what, row["responses"]["wall_s"], peer, peer_s, "sensitivity")
+    beside = parts["trunk"]["beside"]
+    peer = "OpenSim static optimisation"
+    for what, key in (("once", "ours_s"), ("wrapped and settled; OpenSim's once", "settled_s")):
+        yield _line(
+            f"muscle forces of a posture, {what}", beside[key], peer, beside["peer_s"], "trunk"
+        )
 
 
 def _workflows(parts: dict[str, Data]) -> Iterator[str]:

@@ -110,7 +110,7 @@ _JARAMILLO_NM = (2.0, 4.0, 6.0, 8.0)
 _SCHMIDT = (  # Schmidt 1998, whole segments: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg
     _both_sides((10.0,), (23.0,)),
     _both_sides((10.0,), (84.0,)),
-    Curve((-10.0, 0.0, 10.0), (-18.0, 0.0, 26.0)),
+    Curve((-10.0, -5.0, -0.5, 0.0, 0.5, 5.0, 10.0), (-18.0, -9.0, -0.9, 0.0, 1.3, 13.0, 26.0)),
 )
 _HEUER = (  # Heuer 2007, disc L4L5 alone, medians
     _both_sides((2.27, 3.6, 5.08, 6.43), _HEUER_NM),

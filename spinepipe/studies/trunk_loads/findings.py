@@ -34,6 +34,9 @@ from spinepipe.studies.trunk_loads.words import (
 )
 
 _MOST_PLACES = 4
+_MOST_SHARE = 1.1
+"""Sobol's estimate of a share may exceed 1 by chance; by more than this it is no number."""
+
 _NEAR_LIMIT = 0.8
 """Tasks that take more of the strength than this are named."""
 
@@ -199,7 +202,12 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     for place in rows.drop_duplicates(["specimen", "task"]).to_dict("records"):
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
-        if first:
+        if first and first[0].total > _MOST_SHARE:
+            few = (
+                "its share of the variance comes out above all of it: too few samples for a number"
+            )
+            told.append(f"{name}: {factor(first[0].factor)} ({few})")
+        elif first:
             parts = [
                 f"{factor(one.factor)} {fixed(one.total)} ({fixed(one.low)} to {fixed(one.high)})"
                 for one in first
@@ -242,7 +250,10 @@ def stability(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[s
         f"{len(known) - len(fall)} of {count(len(known), 'posture')} asked about would stand when "
         f"pushed a little{which}."
     )
-    least = known[(known["tone"] == "stable") & known["tone_share"].notna()]
+    asked = known[(known["tone"] == "stable") & known["tone_share"].notna()]
+    least = asked[asked["stable"].astype(bool)]
+    if len(never := asked[~asked["stable"].astype(bool)]):
+        yield f"No tone that can be held makes these postures stable: {_places(never)}."
     if len(least):
         told = [
             f"{plain(row['task'])} of {row['specimen']} {number(100.0 * row['tone_share'], 2)} %"

@@ -63,7 +63,7 @@ def run(root: str, study: str, specimen: str, **paths: str) -> None:
     """Write the rows of a person, a file for each table."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     rows = rows_of(settings, cohort, specimen, Progress(_said(study)))
-    made_by = provenance("hold", settings, cohort, [specimen], marks_of(settings))
+    made_by = provenance("hold", settings, cohort, [specimen], marks_of(settings, cohort))
     for table in HELD:
         whole = [{c.name: row.get(c.name) for c in table.columns} for row in rows[table.name]]
         write(from_rows(table, whole), paths[table.name], made_by)

@@ -36,7 +36,7 @@ def run(root: str, study: str, specimen: str, batch: str, design: str, output: s
     write(
         from_rows(RESPONSES, rows),
         output,
-        provenance("respond", settings, cohort, [specimen], marks_of(settings)),
+        provenance("respond", settings, cohort, [specimen], marks_of(settings, cohort)),
     )
 
 

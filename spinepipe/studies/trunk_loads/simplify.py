@@ -35,7 +35,7 @@ def run(root: str, study: str, specimen: str, output: str) -> None:
     write(
         from_rows(SIMPLIFIED, rows),
         output,
-        provenance("simplify", settings, cohort, [specimen], marks_of(settings)),
+        provenance("simplify", settings, cohort, [specimen], marks_of(settings, cohort)),
     )
 
 

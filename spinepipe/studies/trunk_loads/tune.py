@@ -50,7 +50,7 @@ RANGE = {
 }
 """What each number may be: lowest, highest, size of a first step, unit."""
 
-SETTLED = Settled(cost=1e-4, step=1e-3, slope=1e-8, evaluations=25)
+SETTLED = Settled(cost=1e-3, step=3e-3, slope=1e-8, evaluations=25)
 _DIFFERENCE = 0.02
 """Share of a first step by which slopes are taken."""
 
@@ -64,9 +64,13 @@ def run(root: str, study: str, pressures: str, tuning: str, agreement: str) -> N
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     rows = rows_of(volunteer_of(settings, cohort, source_of(settings, cohort).trunk), progress)
-    made_by = provenance("tune", settings, cohort, None, marks_of(settings))
+    made_by = provenance("tune", settings, cohort, None, marks_of(settings, cohort))
     for table, path in ((PRESSURES, pressures), (TUNING, tuning), (AGREEMENT, agreement)):
         write(from_rows(table, rows[table.name]), path, made_by)
+
+
+Computed = tuple[float | None, str]
+"""Pressure, MPa, and how finding the forces ended."""
 
 
 @dataclass
@@ -83,9 +87,7 @@ class Volunteer:
     source: Trunk
     tasks: Mapping[str, Task]
     beside: tuple[Beside, ...]
-    _known: dict[tuple[float, ...], dict[str, tuple[float | None, str]]] = field(
-        default_factory=dict
-    )
+    _known: dict[tuple[float, ...], dict[str, Computed]] = field(default_factory=dict)
 
     @property
     def specimen(self) -> str:
@@ -93,29 +95,33 @@ class Volunteer:
         assert self.settings.volunteer is not None
         return self.settings.volunteer.specimen
 
-    def computed(self, values: Mapping[str, float]) -> dict[str, tuple[float | None, str]]:
-        """MPa, and how it ended, of every task beside which a pressure was measured."""
+    def computed(
+        self, values: Mapping[str, float], wanted: Sequence[Beside] | None = None
+    ) -> dict[str, Computed]:
+        """Pressures of the wanted tasks, by default of all beside which one was measured."""
+        asked = [one.task for one in (self.beside if wanted is None else wanted)]
         key = tuple(values.get(name, NOMINAL[name]) for name in RANGE)
-        if key not in self._known:
-            self._known[key] = dict(self._computed(values))
-        return self._known[key]
+        known = self._known.setdefault(key, {})
+        if missing := [task for task in asked if task not in known]:
+            known.update(self._computed(values, missing))
+        return {task: known[task] for task in asked}
 
     def _computed(
-        self, values: Mapping[str, float]
-    ) -> Iterator[tuple[str, tuple[float | None, str]]]:
+        self, values: Mapping[str, float], names: Sequence[str]
+    ) -> Iterator[tuple[str, Computed]]:
         settings, how = self.settings, how_of(self.settings)
         who = subject_of(self.cohort, self.specimen)
         regressions = regressions_of(settings, self.cohort.folder)
         person = standing(settings, self.source, who, regressions, values).person
-        for one in self.beside:
-            task = changed_task(self.tasks[one.task], values)
+        for name in names:
+            task = changed_task(self.tasks[name], values)
             try:
                 outcome = Outcome(person, task, held(person, task, how), "")
             except ValueError:
                 outcome = Outcome(person, task, None, "")
             pressure = outcome.pressure
             told = None if pressure is None else 1e-6 * float(pressure.pa)
-            yield one.task, (told, outcome.status.value)
+            yield name, (told, outcome.status.value)
 
 
 def volunteer_of(settings: TrunkLoads, cohort: Cohort, source: Trunk) -> Volunteer:
@@ -133,11 +139,11 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     best, bound = fitted(who, tuned, counted, np.array([NOMINAL[name] for name in tuned]))
     tiers = {"untuned": who.computed({}), "tuned": who.computed(_named(tuned, best))}
     tuning = list(_tuning("tuned", "", tuned, best, bound))
-    without: dict[str, tuple[float | None, str]] = {}
+    without: dict[str, Computed] = {}
     for one in progress.through(counted, "tasks left out"):
         rest = [other for other in counted if other is not one]
         left, at_bound = fitted(who, tuned, rest, best)
-        without[one.task] = who.computed(_named(tuned, left))[one.task]
+        without |= who.computed(_named(tuned, left), [one])
         tuning += _tuning("left_out", one.task, tuned, left, at_bound)
     tiers["left_out"] = without
     known: Row = {"specimen": who.specimen}
@@ -156,7 +162,7 @@ def fitted(
     low, high, step = (np.array([RANGE[name][k] for name in names]) for k in range(3))
 
     def errors(x: Array) -> Array | None:
-        found = who.computed(_named(names, x))
+        found = who.computed(_named(names, x), counted)
         off = [(found[one.task][0], one.mpa) for one in counted]
         if any(mpa is None for mpa, _ in off):
             return None
@@ -202,9 +208,7 @@ def _tuning(
         }
 
 
-def _rows(
-    who: Volunteer, tier: str, found: Mapping[str, tuple[float | None, str]]
-) -> Iterator[Row]:
+def _rows(who: Volunteer, tier: str, found: Mapping[str, Computed]) -> Iterator[Row]:
     for one in who.beside:
         if one.task not in found:
             continue

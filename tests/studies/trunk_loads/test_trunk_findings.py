@@ -243,3 +243,25 @@ def test_no_table_is_needed_and_none_needs_rows(gone: str) -> None:
     assert empty == absent
     assert "nan" not in absent.lower().split()
     assert "nan" not in headline(study_of(ONE), cohort_of(ONE), without).words
+
+
+def test_a_posture_that_no_tone_makes_stable_has_no_least_tone() -> None:
+    rows = tables_of(ONE)["tasks"]
+    rows = rows[rows["tone"] != "stable"].copy()
+    at = rows["task"] == "standing"
+    rows.loc[at, ["tone", "tone_share", "stable", "status"]] = ["stable", 0.0, False, "converged"]
+    sentences = told(ONE, tasks=rows)
+    assert "No tone that can be held makes these postures stable: standing" in sentences
+    assert "Least activation" not in sentences
+    rows.loc[at, ["tone_share", "stable"]] = [0.012, True]
+    sentences = told(ONE, tasks=rows)
+    assert "makes a posture stable: standing of volunteer 1.2 %" in sentences
+    assert "No tone" not in sentences
+
+
+def test_a_share_above_the_whole_is_no_number() -> None:
+    rows = tables_of(ONE)["drivers"]
+    largest = rows["total"].idxmax()
+    rows.loc[largest, "total"] = 2.8
+    assert "too few samples for a number" in told(ONE, drivers=rows)
+    assert "too few samples for a number" not in told(ONE)

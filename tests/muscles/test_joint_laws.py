@@ -1,0 +1,100 @@
+"""Joints and stretched muscles: measured points, slopes, and what they are stiffened by."""
+
+import numpy as np
+import pytest
+
+from spinepipe.muscles.joint_laws import CURVES, Curve, JointLaws
+from spinepipe.muscles.passive_muscle import PassiveMuscle
+
+ALL = [(name, axis) for name in CURVES for axis in range(3)]
+STEP = 1e-6
+
+
+@pytest.mark.parametrize(("name", "axis"), ALL)
+def test_curves_rise_through_nought_without_a_jump(name: str, axis: int) -> None:
+    curve = CURVES[name][axis]
+    angles = np.deg2rad(np.linspace(-30.0, 30.0, 6001))
+    moments = curve.moment(angles)
+    assert np.all(np.diff(moments) > 0.0)
+    assert curve.moment(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-12)
+    slopes = (curve.moment(angles + STEP) - curve.moment(angles - STEP)) / (2.0 * STEP)
+    corners = np.deg2rad(np.array(curve.degrees)[[0, -1]])
+    smooth = np.abs(angles[:, None] - corners).min(axis=1) > 1e-4
+    assert curve.slope(angles)[smooth] == pytest.approx(slopes[smooth], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "degrees", "moment"),
+    [
+        ("segment", 2, -5.0, -9.0),
+        ("segment", 2, 5.0, 13.0),
+        ("segment_gould", 2, 4.0, 51.0 * np.deg2rad(4.0)),
+        ("disc_heuer", 2, -8.38, -5.0),
+        ("disc_heuer", 0, 6.43, 7.5),
+        ("disc_han", 2, 10.0, 5.32),
+        ("disc_jaramillo", 1, -4.51, -4.0),
+    ],
+)
+def test_curves_run_through_measured_points(
+    name: str, axis: int, degrees: float, moment: float
+) -> None:
+    found = CURVES[name][axis].moment(np.deg2rad(np.array([degrees])))[0]
+    assert found == pytest.approx(moment, rel=1e-9)
+
+
+def test_a_curve_that_falls_is_refused() -> None:
+    with pytest.raises(ValueError, match="must rise"):
+        Curve((-1.0, 0.0, 1.0), (-1.0, 0.0, -0.5))
+
+
+def laws(stiffens: bool = True) -> JointLaws:
+    """Seven joints alike."""
+    return JointLaws(
+        CURVES["segment"],
+        np.ones((7, 3)),
+        np.full(7, 2e6),
+        np.tile([1e5, 2e5], (7, 1)),
+        stiffens,
+    )
+
+
+def test_compression_stiffens_as_measured_and_no_more_beyond() -> None:
+    """Gardner-Morse 2004: 1.71 at 250 N, 2.11 at 500 N."""
+    pressed = np.array([-100.0, 0.0, 125.0, 250.0, 375.0, 500.0, 3000.0])
+    expected = [1.0, 1.0, 1.355, 1.71, 1.91, 2.11, 2.11]
+    assert laws().stiffening(pressed) == pytest.approx(expected)
+    assert laws(stiffens=False).stiffening(pressed) == pytest.approx(np.ones(7))
+
+
+def test_joints_resist_and_yield() -> None:
+    turned = np.zeros((7, 3))
+    turned[:, 2] = np.deg2rad(-5.0)
+    moment = laws(stiffens=False).moments(turned, np.zeros(7))
+    assert moment[:, 2] == pytest.approx(np.full(7, 9.0))
+    pushes = np.tile([10.0, -400.0, 20.0], (7, 1))
+    assert laws().translations(pushes)[0] == pytest.approx([1e-4, -2e-4, 1e-4])
+
+
+@pytest.mark.parametrize(
+    ("shape", "strain", "share"),
+    [
+        (5.0, 0.1, 0.0088),
+        (5.0, 0.3, 0.0759),
+        (5.0, 0.6, 1.0),
+        (4.0, 0.2, 0.0521),
+        (4.0, 0.5, 0.5043),
+    ],
+)
+def test_stretched_muscles_follow_thelen(shape: float, strain: float, share: float) -> None:
+    curve, one = PassiveMuscle(0.6, shape), np.ones(1)
+    found = curve.forces(one * (1.0 + strain), one, one, 100.0 * one)[0]
+    assert found == pytest.approx(100.0 * share, abs=0.006)
+    assert curve.forces(0.9 * one, one, one, 100.0 * one)[0] == 0.0
+
+
+def test_slopes_of_stretched_muscles() -> None:
+    curve, one = PassiveMuscle(), np.ones(3)
+    lengths, fibres = np.array([0.95, 1.1, 1.4]), np.array([1.0, 0.5, 0.8])
+    there, back = (curve.forces(lengths + s, one, fibres, 50.0 * one) for s in (STEP, -STEP))
+    slopes = curve.slopes(lengths, one, fibres, 50.0 * one)
+    assert slopes == pytest.approx((there - back) / (2.0 * STEP), rel=1e-6, abs=1e-9)
