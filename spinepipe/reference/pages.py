@@ -95,14 +95,18 @@ def _part(name: str, page: str) -> str:
 
 @cache
 def generators() -> dict[str, Callable[[], str]]:
-    """Every part that can be generated, by the name that pages use."""
+    """Every part that can be generated, by the name that pages use.
+
+    A table with the name of another kind's is called by its kind as well.
+    """
     parts: dict[str, Callable[[], str]] = {"effects": effects}
     kinds = every_kind()
-    parts |= {
-        f"table {shape.name}": partial(result_table, shape)
-        for kind in kinds.values()
-        for shape in kind.tables
-    }
+    shapes: dict[str, Table] = {}
+    for name, kind in kinds.items():
+        for shape in kind.tables:
+            other = shapes.get(shape.name, shape) != shape
+            shapes[f"{name}/{shape.name}" if other else shape.name] = shape
+    parts |= {f"table {name}": partial(result_table, shape) for name, shape in shapes.items()}
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
         for name, form in (

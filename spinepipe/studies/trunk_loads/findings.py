@@ -23,6 +23,7 @@ from spinepipe.studies.trunk_loads.findings_of_loads import (
 from spinepipe.studies.trunk_loads.headline import (
     ended_words,
     leading,
+    missed,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import (
@@ -85,9 +86,9 @@ def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
         yield "All pressures lie where the formula of the pressure was fitted."
         return
     yield (
-        f"{len(out)} of {count(len(known), 'pressure')} ({percent(len(out), len(known))}) lie "
-        "outside the range in which the formula of the pressure was fitted (0 to 1.86 MPa of "
-        f"nominal pressure, 0 to 10° of flexion) and are extrapolated: {_places(out)}."
+        "Extrapolated, as outside the range in which the formula of the pressure was fitted (0 to "
+        f"1.86 MPa of nominal pressure, 0 to 10° of flexion): {len(out)} of "
+        f"{count(len(known), 'pressure')} ({percent(len(out), len(known))}), {_places(out)}."
     )
 
 
@@ -127,16 +128,9 @@ def _correlated(row: dict[Any, Any]) -> str:
 
 
 def _goal(row: dict[Any, Any]) -> str:
-    goal, off = float(row["goal_rmse_mpa"]), float(row["rmse_mpa"])
     if row["reached"]:
-        return f"The goal of {mpa(goal)} is reached."
-    if off > goal:
-        return f"The goal of {mpa(goal)} is missed by {fixed(off - goal, 3)} MPa."
-    lost = count(int(row["n_not_held"]), "counted task")
-    return (
-        f"That is within the goal of {mpa(goal)}, but no muscle forces hold {lost}: it does not "
-        "count as reached."
-    )
+        return f"The goal of {mpa(float(row['goal_rmse_mpa']))} is reached."
+    return f"The goal is not reached: {missed(row)}."
 
 
 def unsettled(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
@@ -208,18 +202,21 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     for place in rows.drop_duplicates(["specimen", "task"]).to_dict("records"):
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
-        if first and first[0][1] > _MOST_SHARE:
+        if first and first[0].total > _MOST_SHARE:
             few = (
                 "its share of the variance comes out above all of it: too few samples for a number"
             )
-            told.append(f"{name}: {factor(first[0][0])} ({few})")
+            told.append(f"{name}: {factor(first[0].factor)} ({few})")
         elif first:
-            parts = [f"{factor(one)} ({fixed(share)})" for one, share in first]
+            parts = [
+                f"{factor(one.factor)} {fixed(one.total)} ({fixed(one.low)} to {fixed(one.high)})"
+                for one in first
+            ]
             told.append(f"{name}: {listed(parts)}")
     if told:
         yield (
-            "What the pressure in L4L5 hangs on most, as share of its variance, interactions "
-            f"included: {'; '.join(told)}."
+            "What the pressure in L4L5 hangs on most, as share of its variance with interactions "
+            f"and 95 % interval: {'; '.join(told)}."
         )
     lost = rows.drop_duplicates(["specimen", "task"])
     failed, n = int(lost["n_failed"].sum()), int((lost["n_failed"] + lost["n_samples"]).sum())
@@ -228,17 +225,16 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
 
 def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     """How much of the strength tasks take."""
-    rows = results.table("tasks")
-    known = filled(rows, "strength_used")
+    known = filled(sound_rows(results, "tasks"), "strength_used")
     if known.empty:
         return
     near = known[known["strength_used"] > _NEAR_LIMIT]
     worst = most(known, "strength_used")
     share = number(100.0 * float(worst["strength_used"]), 2)
     yield (
-        f"Most of the strength is taken by {plain(worst['task'])} of {worst['specimen']}, "
-        f"{share} % of it; {len(near)} of {count(len(known), 'task')} take more than "
-        f"{number(100.0 * _NEAR_LIMIT, 2)} %."
+        f"Of tasks that settled, {plain(worst['task'])} of {worst['specimen']} takes most of the "
+        f"strength, {share} % of it; more than {number(100.0 * _NEAR_LIMIT, 2)} % is taken by "
+        f"{len(near)} of {count(len(known), 'task')}."
     )
 
 

@@ -4,6 +4,7 @@ One task of one person stands for the others: with a load in the hands if there 
 any is, and of these the one that presses L4L5 most.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +27,7 @@ from spinepipe.studies.trunk_loads.words import (
 
 COMPRESSION, PRESSURE = "l4l5_compression_n", "l4l5_pressure_mpa"
 MOST = 0.5
-"""Total index above which most of a variance hangs on a factor."""
+"""Lower end of a total index above which most of a variance hangs on a factor."""
 
 Row = dict[Any, Any]
 
@@ -100,15 +101,38 @@ def interval(results: Results, row: Row, quantity: str) -> tuple[float, float] |
     return float(known["low"].iloc[0]), float(known["high"].iloc[0])
 
 
-def leading(results: Results, row: Row, quantity: str = PRESSURE) -> list[tuple[str, float]]:
+@dataclass(frozen=True)
+class Driver:
+    """A factor with its total index and the index's 95 % interval."""
+
+    factor: str
+    total: float
+    low: float
+    high: float
+
+
+def leading(results: Results, row: Row, quantity: str = PRESSURE) -> list[Driver]:
     """Factors of a quantity of a task with their total indices, the largest first."""
     rows = results.table("drivers")
     if rows.empty:
         return []
     same = (rows["specimen"] == row["specimen"]) & (rows["task"] == row["task"])
-    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=["total"])
+    columns = ["total", "total_low", "total_high"]
+    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=columns)
     known = known.sort_values("total", ascending=False, kind="stable")
-    return [(str(n), float(v)) for n, v in zip(known["factor"], known["total"], strict=True)]
+    values = known[columns].to_numpy(float).tolist()
+    return [Driver(str(n), *ends) for n, ends in zip(known["factor"], values, strict=True)]
+
+
+def spread_words(drivers: Sequence[Driver]) -> str:
+    """Which input a spread comes of, as far as the indices' intervals tell; nothing without any."""
+    if not drivers:
+        return ""
+    first, second = drivers[0], drivers[1].total if len(drivers) > 1 else 0.0
+    if first.low <= second:
+        return "which input that spread comes of most, the samples do not tell"
+    part = "most" if first.low > MOST else "the largest part"
+    return f"{part} of that spread comes of {factor(first.factor)}"
 
 
 def _words(found: Answer, results: Results) -> str:
@@ -125,11 +149,8 @@ def _words(found: Answer, results: Results) -> str:
     ends = interval(results, row, PRESSURE)
     between = f" ({fixed(ends[0])} to {mpa(ends[1])})" if ends else ""
     told += f"; the pressure in the disc is {mpa(row[PRESSURE])}{between}"
-    first = leading(results, row)[:1]
-    if ends and first:
-        name, share = first[0]
-        part = "most" if share > MOST else "the largest part"
-        told += f"; {part} of that spread comes of {factor(name)}"
+    spread = spread_words(leading(results, row)) if ends else ""
+    told += f"; {spread}" if spread else ""
     return f"{told}."
 
 
@@ -199,14 +220,24 @@ def missed_goals(results: Results) -> str:
         return ""
     known = rows.dropna(subset=["rmse_mpa"])
     told = [
-        f"{plain(row['tier'])} {mpa(row['rmse_mpa'])} instead of at most "
-        f"{mpa(row['goal_rmse_mpa'])} ({fixed(row['rmse_mpa'] - row['goal_rmse_mpa'], 3)} more)"
+        f"{plain(row['tier'])} {missed(row)}"
         for row in known.to_dict("records")
         if row["rmse_mpa"] > row["goal_rmse_mpa"]
     ]
-    if not told:
-        return ""
-    return f"pressures are further from measured ones than was asked for: {'; '.join(told)}"
+    return f"agreement with measured pressures is not what was asked for: {'; '.join(told)}" * bool(
+        told
+    )
+
+
+def missed(row: Row) -> str:
+    """Of a tier whose goal is not reached: by how much, and tasks that no muscle forces hold."""
+    off, goal, loose = float(row["rmse_mpa"]), float(row["goal_rmse_mpa"]), int(row["n_not_held"])
+    near = f"{mpa(off)} off, {mpa(goal)} asked for"
+    parts = [near if off <= goal else f"{near}, {fixed(off - goal, 3)} MPa too much"]
+    if loose:
+        held = count(loose, "counted task is", "counted tasks are")
+        parts.append(f"{held} not held by any muscle forces")
+    return ", and ".join(parts)
 
 
 def ended_words(status: str) -> str:

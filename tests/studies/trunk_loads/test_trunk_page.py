@@ -2,17 +2,24 @@
 
 import json
 import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from trunk_table_cases import DRAWN, Size, cohort_of, study_of, tables_of
+from drawn import caption
+from study_cases import Size as OtherSize
+from study_cases import project
+from trunk_table_cases import DRAWN, FOLDER, Size, cohort_of, study_of, tables_of
 
+from spinepipe.jobs import draw, report
 from spinepipe.report.page.document import Picture, Results
-from spinepipe.studies.trunk_loads import tables, tables_of_studies
 from spinepipe.studies.trunk_loads.in_space import MOST_SCENES, trunk_in_space
+from spinepipe.studies.trunk_loads.kind import KIND
 from spinepipe.studies.trunk_loads.page import READ, document, left_out, shown_tables
+from spinepipe.tables import to_arrow, write
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SIZES = {
@@ -71,13 +78,7 @@ def test_the_answer_stands_before_all_else() -> None:
 
 
 def test_tables_are_those_of_the_kind_and_empty_ones_are_left_out() -> None:
-    shapes = {
-        shape.name
-        for module in (tables, tables_of_studies)
-        for shape in vars(module).values()
-        if isinstance(shape, tables.Table)
-    }
-    assert set(READ) - {"against_ghezelbash_2016"} <= shapes
+    assert set(READ) <= {table.name for table in KIND.tables}
     shown = [table.name for table in shown_tables(results(Size(1)))]
     assert shown[:3] == ["tasks", "agreement", "pressures"]
     assert not {"masses", "scaling"} & set(shown)
@@ -157,3 +158,38 @@ def test_names_cannot_end_the_script() -> None:
     page = page_of(Size(1), paths=rows)
     assert "</script><b>" not in page
     assert "</script><b>" in json.dumps(scenes_of(page))
+
+
+def test_a_figure_is_there_without_the_tables_that_it_shows_besides() -> None:
+    without = Size(1, samples=False)
+    files = KIND.files.of(study_of(without), cohort_of(without))
+    assert "pressure_against_measured" in files.figures
+    assert "drivers" not in files.figures
+    sampled = KIND.files.of(study_of(Size(1)), cohort_of(Size(1)))
+    assert set(sampled.figures) == {figure.name for figure in KIND.figures}
+
+
+def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
+    project(tmp_path, OtherSize())
+    shutil.copytree(FOLDER, tmp_path / "config/cohorts/trunk_volunteers")
+    size = Size()
+    text = "study: s\nkind: trunk_loads\ncohort: trunk_volunteers\ndrawn_tasks: [standing]\n"
+    (tmp_path / "config/studies/s.yaml").write_text(text)
+    files = {}
+    for name, rows in tables_of(size).items():
+        files[name] = str(tmp_path / f"{name}.parquet")
+        cells = rows.convert_dtypes().astype(object)
+        told = to_arrow(KIND.table(name), cells.where(cells.notna(), None))
+        write(told, files[name], {"study": "s"})
+    pictures = []
+    for figure in KIND.figures:
+        places = [str(tmp_path / f"{figure.name}.{kind}") for kind in ("svg", "png")]
+        read = [files[name] for name in (*figure.reads, *figure.also)]
+        draw.run(str(tmp_path), "s", figure.name, read, *places)
+        pictures.append(places[0])
+    page = tmp_path / "report.html"
+    captions = [str(caption("trunk_loads", figure.name)) for figure in KIND.figures]
+    report.run(str(tmp_path), "s", list(files.values()), pictures, captions, str(page))
+    text = page.read_text(encoding="utf-8")
+    for figure in KIND.figures:
+        assert f"{figure.title}." in text

@@ -13,7 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_interval
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, note, saying
-from spinepipe.report.words import count
+from spinepipe.report.words import count, fixed, listed
 from spinepipe.studies.trunk_loads.figures.looks import task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import factor
@@ -25,8 +25,11 @@ INDICES = {
     "first_order": (GREEN, -0.16, "by itself"),
 }
 MOST_TASKS = 6
+SHOWN_TO = 1.3
+"""Indices are shares: those estimated above this are written down, not drawn."""
 
 _ROW_MM, _TASK_MM, _AROUND_MM, _KEY_MM = 4.6, 5.5, 16.0, 17.0
+_APART = 1.6
 _UNKNOWN = "not known: too few samples held"
 
 
@@ -36,8 +39,8 @@ def drivers_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
     known = drivers[(drivers["quantity"] == SHOWN)].dropna(subset=["total"])
     if intervals["low"].isna().all() and known.empty:
         return saying("Nothing is known of how far answers can be trusted: no sample held.")
-    places = list(dict.fromkeys(zip(intervals["specimen"], intervals["task"], strict=True)))
-    shown = list(dict.fromkeys(zip(known["specimen"], known["task"], strict=True)))[:MOST_TASKS]
+    places = _places(intervals)
+    shown = _places(known)[:MOST_TASKS]
     factors = _order(known)
     heights = [(len(PANELS), _TASK_MM * len(places) + _AROUND_MM)]
     if shown:
@@ -51,8 +54,14 @@ def drivers_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
         head(axis, len(PANELS) + number, _named(place, several))
         own = (known["specimen"] == place[0]) & (known["task"] == place[1])
         _indices(axis, known[own], factors)
-    _explain(figure, intervals, len(shown))
+    lost = [_named(place, several) for place in places if place not in set(_places(known))]
+    _explain(figure, intervals, len(shown), lost)
     return figure
+
+
+def _places(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    """Person and task of rows, each once."""
+    return list(dict.fromkeys(zip(rows["specimen"], rows["task"], strict=True)))
 
 
 def _order(rows: pd.DataFrame) -> list[str]:
@@ -95,10 +104,16 @@ def _indices(axis: Axes, rows: pd.DataFrame, factors: Sequence[str]) -> None:
             value, *ends = (
                 float(row.get(f"{index}{end}", np.nan)) for end in ("", "_low", "_high")
             )
-            if np.isfinite([value, *ends]).all():
-                draw_interval(axis, value, (ends[0], ends[1]), y + aside, color)
+            if not np.isfinite([value, *ends]).all():
+                continue
+            if not -SHOWN_TO < value < SHOWN_TO:
+                told = f"{fixed(value)} ({fixed(ends[0])} to {fixed(ends[1])})"
+                note(axis, 0.98, y + _APART * aside, told, color, ha="right")
+                continue
+            draw_interval(axis, value, (ends[0], ends[1]), y + aside, color)
     axis.axvline(0.0, color=BLACK, lw=0.5, zorder=1)
-    axis.set_xlim(min(-0.05, axis.get_xlim()[0]), max(1.0, axis.get_xlim()[1]))
+    low, high = axis.get_xlim()
+    axis.set_xlim(max(min(-0.05, low), -SHOWN_TO), min(max(1.0, high), SHOWN_TO))
     axis.set_yticks(range(len(factors)), [factor(name) for name in factors])
     axis.tick_params(labelleft=axis.get_subplotspec().is_first_col())  # type: ignore[union-attr]
     axis.set_ylim(-0.6, len(factors) - 0.4)
@@ -107,7 +122,7 @@ def _indices(axis: Axes, rows: pd.DataFrame, factors: Sequence[str]) -> None:
     axis.spines["left"].set_visible(False)
 
 
-def _explain(figure: Figure, intervals: pd.DataFrame, shown: int) -> None:
+def _explain(figure: Figure, intervals: pd.DataFrame, shown: int, lost: Sequence[str]) -> None:
     dot: dict[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.0, "lw": 1.2}
     handles = [
         Line2D([], [], color=BLUE, **dot, label="median and middle 95 % of samples"),
@@ -121,4 +136,6 @@ def _explain(figure: Figure, intervals: pd.DataFrame, shown: int) -> None:
     failed = int(intervals["n_failed"].max()) if len(intervals) else 0
     most = int((intervals["n_samples"] + intervals["n_failed"]).max()) if len(intervals) else 0
     words = f"{count(most, 'sample')} of a task; at most {failed} of them did not hold."
+    if lost:
+        words += f" Without indices, as too few samples held: {listed(lost)}."
     explain_marks(figure, handles, words, len(handles))

@@ -45,12 +45,17 @@ def muscle_force_bars_figure(
     axes = [axis for line in lines for axis in line][: len(shown)]
     unlike = False
     for index, (axis, task) in enumerate(zip(axes, shown, strict=True)):
-        good = bool(sound(tasks[tasks["task"] == task]).iloc[0])
-        head(axis, index, task_label(task) + ("" if good else "  (not settled)"))
+        head(axis, index, _heading(tasks[tasks["task"] == task]))
         unlike |= _bars(axis, grouped_forces(rows[rows["task"] == task]), groups)
     _scales(axes, groups, across)
     _explain(figure, str(person), unlike)
     return figure
+
+
+def _heading(rows: pd.DataFrame) -> str:
+    """The task, and how it ended if not well."""
+    name, status = task_label(str(rows["task"].iloc[0])), plain(str(rows["status"].iloc[0]))
+    return name if sound(rows).all() else f"{name} ({status})"
 
 
 def grouped_forces(rows: pd.DataFrame) -> pd.DataFrame:
