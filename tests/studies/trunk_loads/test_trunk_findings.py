@@ -117,6 +117,10 @@ def test_a_goal_is_not_reached_by_forces_that_hold_nothing() -> None:
     rows.loc[rows["tier"] == "untuned", ["n_not_held", "reached"]] = [2, False]
     sentences = told(ONE, agreement=rows)
     assert "and 2 counted tasks are not held by any muscle forces." in sentences
+    assert (
+        "untuned 0.30 MPa off, 0.35 MPa asked for, and 2"
+        in answer(ONE, agreement=rows).warnings[-1]
+    )
     assert "The goal of 0.35 MPa" not in sentences
 
 
