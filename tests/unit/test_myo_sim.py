@@ -21,7 +21,7 @@ FASCICLES_A_SIDE = {
     "longissimus_thoracis": 21,
     "longissimus_lumborum": 5,
     "quadratus_lumborum": 18,
-    "multifidus": 25,
+    "multifidus": 31,  # 25 of the source, 6 repeated for T12 and T11
     "external_oblique": 6,
     "internal_oblique": 6,
 }
@@ -40,16 +40,17 @@ def trunk(source):
 
 def test_every_fascicle_is_in_its_group(trunk) -> None:
     muscles = trunk.muscles
-    assert len(muscles) == 210
-    assert len(set(muscles.names)) == 210
+    assert len(muscles) == 222
+    assert len(set(muscles.names)) == 222
     for side in ("right", "left"):
         of = Counter(g for g, s in zip(muscles.groups, muscles.sides, strict=True) if s == side)
         assert of == FASCICLES_A_SIDE
 
 
 def test_points_on_the_thorax_are_shared_between_t12_and_t11(trunk) -> None:
-    """14 insertions a side are named for T12 or rib 12; all other points go up."""
+    """14 insertions a side are named for T12 or rib 12; all other points of the source go up."""
     muscles = trunk.muscles
+    muscles = muscles.of(np.array(["_at_" not in name for name in muscles.names]))
     on_t12 = muscles.body == BODIES.index("T12")
     assert on_t12.sum() == 28
     assert (muscles.body == THORAX).sum() == 156
@@ -117,7 +118,23 @@ def test_cross_sections_are_forces_over_the_sources_stress(trunk) -> None:
 
 def test_fibre_lengths_are_not_taken(source) -> None:
     assert not source.trunk.muscles.fibre.any()
-    assert "142 of 210" in source.remarks[1]
+    assert "142 of 210" in source.remarks[2]
+
+
+def test_multifidus_goes_on_to_t11_with_as_much_of_it_as_at_l1(trunk) -> None:
+    """830 mm2 repeated: twice what ends on L1 in the source, both sides."""
+    muscles = trunk.muscles
+    of = {
+        top: sum(
+            area
+            for name, area in zip(muscles.names, muscles.pcsa, strict=True)
+            if name.startswith("MF_m1") and (f"_at_{top}_" in name if top else "_at_" not in name)
+        )
+        for top in ("", "T12", "T11")
+    }
+    assert of["T12"] == pytest.approx(of[""], rel=1e-12)
+    assert of["T11"] == pytest.approx(of[""], rel=1e-12)
+    assert 2e6 * of[""] == pytest.approx(830.0, abs=0.5)
 
 
 def test_global_extensors_mostly_have_lumbar_via_points(trunk) -> None:
