@@ -18,6 +18,7 @@ from spinepipe.muscles.pose import posed, rotations_of
 from spinepipe.muscles.settle import angles_of, held
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.upright import Upright
 from spinepipe.studies.study import COHORTS
 from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
 from spinepipe.studies.trunk_loads.persons import (
@@ -63,12 +64,24 @@ class Everyone:
         cohort = cohorts.read(ROOT / COHORTS / STUDY.cohort, (SUBJECTS, TASKS))
         return cls(cohort, read_tasks(cohort, STUDY.trunk_angle))
 
-    def person(self, wrapping: bool = True, **values: float) -> Person:
-        """The first person, standing."""
+    def person(
+        self,
+        wrapping: bool = True,
+        stood: Upright | None = None,
+        values: Mapping[str, float] = NOMINAL,
+    ) -> Person:
+        """The first person, standing as given or as is found."""
         subject = subject_of(self.cohort, self.cohort.specimen_names[0])
         source = source_of(STUDY, self.cohort).trunk
         regressions = regressions_of(STUDY, self.cohort.folder)
-        return standing(STUDY, source, subject, regressions, values, wrapping).person
+        return standing(STUDY, source, subject, regressions, values, wrapping, stood).person
+
+    def stood(self) -> Upright:
+        """How the first person stands."""
+        subject = subject_of(self.cohort, self.cohort.specimen_names[0])
+        source = source_of(STUDY, self.cohort).trunk
+        regressions = regressions_of(STUDY, self.cohort.folder)
+        return standing(STUDY, source, subject, regressions).upright
 
     def twelve(self) -> list[Task]:
         """One task of each number of Ghezelbash 2016 Table 1."""
@@ -131,13 +144,13 @@ def standing_s() -> float:
 def samples() -> Sampled:
     """As many samples of a person in twelve tasks as a minute of CPU takes."""
     everyone, rng = Everyone.read(), np.random.default_rng(1)
-    spreads = STUDY.uncertain.factors
+    spreads, stood = STUDY.uncertain.factors, everyone.stood()
     start, done, runs, far = time.process_time(), 0, 0, 0
     while time.process_time() - start < BUDGET_S:
-        values = {
+        values: dict[str, float] = {
             name: NOMINAL[name] + rng.normal(0.0, spread.sd) for name, spread in spreads.items()
         }
-        person = everyone.person(**values)
+        person = everyone.person(stood=stood, values=values)
         for task in everyone.twelve():
             try:
                 held(person, changed_task(task, values))

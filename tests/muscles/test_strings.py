@@ -86,8 +86,8 @@ def at_flexion(degrees: float) -> BodyPoses:
 
 def test_lengths_do_not_jump_while_the_trunk_bends() -> None:
     """In steps of 0.1 deg lengths change by 0.1 mm. What that changes by from step to step is a
-    twentieth of a micrometre, however many vertebrae are touched on the way: a lever arm that jumped
-    by 0.2 mm would show as 0.2 mm times 1.7e-3 rad."""
+    twentieth of a micrometre, however many vertebrae are touched on the way: a lever arm that
+    jumped by 0.2 mm would show as 0.2 mm times 1.7e-3 rad."""
     lines = volunteer().lines
     sweep = np.array([lines.pulls(at_flexion(0.1 * k)).lengths for k in range(1001)])
     assert np.abs(np.diff(sweep, axis=0)).max() < 0.2e-3
@@ -106,7 +106,7 @@ def any_posture(seed: int) -> BodyPoses:
 
 
 def seen_from(poses: BodyPoses, muscle: int, bar: int, trace: np.ndarray) -> np.ndarray:
-    """(Q, 3) m, a string as its bar's vertebra sees it: forwards of the bar, up and to the right."""
+    """(Q, 3) m, a string as its bar's vertebra sees it: forwards of the bar, up, right."""
     bars = volunteer().lines.bars
     assert bars.first[muscle] <= bar < bars.first[muscle + 1]
     found: np.ndarray = (trace - poses.of(bars.body[bar], bars.at[bar])) @ poses.rotations[

@@ -1,7 +1,7 @@
 """The answer first: the load that a person would look for, and what is not to be trusted in it.
 
-One task of one person stands for the others: with a load in the hands if there is one, sampled if
-any is, and of these the one that presses L4L5 most.
+One task of one person stands for the others: one with an interval if any has, else with a load in
+the hands if there is one, and of these the one that presses L4L5 most.
 """
 
 from collections.abc import Sequence
@@ -65,12 +65,12 @@ def answer_of(study: TrunkLoads, cohort: Cohort, results: Results) -> Answer | N
     known = intervals.dropna(subset=["low", "high"])["task"] if len(intervals) else ()
     rank = pd.DataFrame(
         {
-            "loaded": good["hand_load_kg"] > 0.0,
             "sampled": good["task"].isin(list(known)),
+            "loaded": good["hand_load_kg"] > 0.0,
             "n": good[COMPRESSION].astype(float),
         }
     )
-    best = good.loc[rank.sort_values(["loaded", "sampled", "n"], kind="stable").index[-1]]
+    best = good.loc[rank.sort_values(["sampled", "loaded", "n"], kind="stable").index[-1]]
     still = relaxed(own, cohort)
     others = own[(own["task"] == still) & (own["task"] != best["task"])]
     rows = others.to_dict("records")

@@ -43,6 +43,7 @@ NOMINAL: Mapping[str, float] = {
     "trunk_mass_ahead": 1.0,
     "hand_anterior_mm": 0.0,
     "pelvis_extension_deg": 0.0,
+    "trunk_extension_deg": 0.0,
     "largest_stress_mpa": 0.0,
     "pressure_kpa": 0.0,
     "height_cm": 0.0,
@@ -115,16 +116,15 @@ def changed_subject(subject: Subject, values: Values) -> Subject:
 
 
 def changed_task(task: Task, values: Values) -> Task:
-    """The task with hands elsewhere, another turn of the pelvis, other strength and pressure."""
+    """The task with hands elsewhere, trunk or pelvis turned, other strength and pressure."""
     hands = task.hands
     ahead = values.get("hand_anterior_mm", 0.0)
     if ahead and hands.kg > 0.0 and hands.at is not None:
         hands = replace(hands, at=hands.at + np.array([ahead / MM_PER_M, 0.0, 0.0]))
-    turned = task.turned
-    pelvis = values.get("pelvis_extension_deg", 0.0)
-    if pelvis and bends(task):
-        turned = turned.copy()
-        turned[:, 0] += between(pelvis, 0.0, "extension") / DEG_PER_RAD
+    pelvis = values.get("pelvis_extension_deg", 0.0) if bends(task) else 0.0
+    trunk = values.get("trunk_extension_deg", 0.0)
+    turned = task.turned.copy()
+    turned[:, 0] += between(pelvis, trunk, "extension") / DEG_PER_RAD
     return replace(
         task,
         hands=hands,
@@ -146,12 +146,17 @@ def standing(
     regressions: Regressions,
     values: Values = NOMINAL,
     wrapping: bool = True,
+    stood: Upright | None = None,
 ) -> Standing:
     """A person at their size, standing upright.
 
+    How someone stands does not depend on what we know about their discs: where values are varied,
+    the person stands as found with none of them varied, and `trunk_extension_deg` varies that.
+
     Parameters
     ----------
-    source : trunk of the reference person. values : what is varied.
+    source : trunk of the reference person. values : what is varied. stood : how the person stands;
+        None, to be found.
     """
     who = changed_subject(subject, values)
     choices = Choices(
@@ -177,7 +182,8 @@ def standing(
         np.ones(len(trunk.muscles)),
         np.ones(len(trunk.muscles)),
     )
-    found = upright(person, np.array(settings.upright_start_deg) / DEG_PER_RAD, REACH_RAD)
+    start = np.array(settings.upright_start_deg) / DEG_PER_RAD
+    found = upright(person, start, REACH_RAD) if stood is None else stood
     return Standing(person.standing(found.turned), found)
 
 

@@ -51,9 +51,10 @@ def rows_of(
     source, who = source_of(settings, cohort).trunk, subject_of(cohort, specimen)
     regressions, how = regressions_of(settings, cohort.folder), how_of(settings)
     tasks = read_tasks(cohort, settings.trunk_angle)
+    stood = standing(settings, source, who, regressions).upright
     for sample in progress.through(list(samples), f"{specimen}: samples"):
         values = samples[sample]
-        person = standing(settings, source, who, regressions, values).person
+        person = standing(settings, source, who, regressions, values, stood=stood).person
         for name in settings.uncertain.tasks:
             task = changed_task(tasks[name], values)
             try:

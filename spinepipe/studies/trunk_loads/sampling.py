@@ -19,6 +19,7 @@ UNITS = {
     "age_years": "years",
     "hand_anterior_mm": "mm",
     "pelvis_extension_deg": "deg",
+    "trunk_extension_deg": "deg",
     "pressure_kpa": "kPa",
     "largest_stress_mpa": "MPa",
 }

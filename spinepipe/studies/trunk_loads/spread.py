@@ -19,6 +19,9 @@ from spinepipe.tables import from_rows, read_frames, write
 LEAST_SAMPLES = 20
 """Below that no interval is given."""
 
+MOST_FAILED = 0.2
+"""Share of the samples above which none is given: what is left would be those that are easy."""
+
 RESOLUTION = 1e-6
 """Outcomes that vary by less are constant."""
 
@@ -52,7 +55,8 @@ def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -
     own = nominal[(nominal["specimen"] == who) & (nominal["task"] == task)].iloc[0]
     for quantity in QUANTITIES:
         values = good[quantity].to_numpy(float)
-        enough = len(values) >= LEAST_SAMPLES
+        lost = len(rows) - len(values)
+        enough = len(values) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(rows)
         low, median, high = np.quantile(values, [0.025, 0.5, 0.975]) if enough else (None,) * 3
         yield {
             "specimen": who,
@@ -63,7 +67,7 @@ def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -
             "median": None if median is None else float(median),
             "high": None if high is None else float(high),
             "n_samples": len(values),
-            "n_failed": len(rows) - len(values),
+            "n_failed": lost,
         }
 
 
@@ -72,7 +76,12 @@ def _drivers(settings: TrunkLoads, who: str, task: str, rows: pd.DataFrame) -> I
     rows = rows.sort_values("sample")
     ok = sound(rows).to_numpy()
     values = np.where(ok[:, None], rows[list(QUANTITIES)].to_numpy(float), 0.0)
-    asked = Settings(bootstraps=500, seed=settings.uncertain.seed, wanted=("S1", "ST"))
+    asked = Settings(
+        bootstraps=500,
+        seed=settings.uncertain.seed,
+        wanted=("S1", "ST"),
+        most_failed=MOST_FAILED,
+    )
     found = indices(design_of(settings), values, ok, asked, RESOLUTION)
     for factor in settings.uncertain.factors:
         of_factor = [one for one in found if one.factor == factor]

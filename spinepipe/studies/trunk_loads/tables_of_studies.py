@@ -152,6 +152,8 @@ RESPONSES = Table(
     ),
 )
 
+_FEW = "fewer than 20 samples that hold, or more than 20 % that do not"
+
 INTERVALS = Table(
     "intervals",
     "How far each answer can be trusted, by the spread of the inputs: one row per person, task and "
@@ -162,9 +164,9 @@ INTERVALS = Table(
         TASK,
         Column("quantity", "text", "as in table tasks", allowed=QUANTITIES),
         Column("nominal", "number", "with every input at its nominal value", null=NO_FORCES),
-        Column("low", "number", "2.5th percentile of the samples", null="too few samples"),
-        Column("median", "number", "median of the samples", null="too few samples"),
-        Column("high", "number", "97.5th percentile of the samples", null="too few samples"),
+        Column("low", "number", "2.5th percentile of the samples", null=_FEW),
+        Column("median", "number", "median of the samples", null=_FEW),
+        Column("high", "number", "97.5th percentile of the samples", null=_FEW),
         Column("n_samples", "integer", "samples that hold", low=0),
         Column("n_failed", "integer", "samples that do not", low=0),
     ),

@@ -3,7 +3,8 @@
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import atanh, sqrt, tanh
+from itertools import product
+from math import atanh, inf, sqrt, tanh
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
+from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
@@ -42,6 +44,7 @@ RANGE = {
     "trunk_mass_ahead": (0.0, 2.0, 0.3, ""),
     "hand_anterior_mm": (-150.0, 150.0, 30.0, "mm"),
     "pelvis_extension_deg": (-10.0, 10.0, 3.0, "deg"),
+    "trunk_extension_deg": (-10.0, 10.0, 3.0, "deg"),
     "height_cm": (-5.0, 5.0, 2.0, "cm"),
     "bmi": (-3.0, 3.0, 1.0, "kg/m2"),
     "age_years": (-10.0, 10.0, 5.0, "years"),
@@ -80,6 +83,7 @@ class Volunteer:
     Attributes
     ----------
     source : trunk of the reference person. tasks : all tasks, by name. beside : measured pressures.
+    stood : how the person stands.
     """
 
     settings: TrunkLoads
@@ -87,6 +91,7 @@ class Volunteer:
     source: Trunk
     tasks: Mapping[str, Task]
     beside: tuple[Beside, ...]
+    stood: Upright
     _known: dict[tuple[float, ...], dict[str, Computed]] = field(default_factory=dict)
 
     @property
@@ -106,13 +111,32 @@ class Volunteer:
             known.update(self._computed(values, missing))
         return {task: known[task] for task in asked}
 
+    def misfit(self, values: Mapping[str, float], wanted: Sequence[Beside]) -> float:
+        """MPa^2, sum of the squares of errors; infinite where there are none."""
+        off = self.errors(values, wanted)
+        return inf if off is None else float(off @ off)
+
+    def errors(self, values: Mapping[str, float], wanted: Sequence[Beside]) -> Array | None:
+        """Errors, MPa; None where a task has no pressure, or is held nominally and is no more.
+
+        Values that leave the muscles without an answer do not agree with anybody's pressures.
+        """
+        found, usual = self.computed(values, wanted), self.computed({}, wanted)
+        off = []
+        for one in wanted:
+            (mpa, ended), (_, usually) = found[one.task], usual[one.task]
+            if mpa is None or ended != usually == Balanced.CONVERGED:
+                return None
+            off.append(mpa - one.mpa)
+        return np.array(off)
+
     def _computed(
         self, values: Mapping[str, float], names: Sequence[str]
     ) -> Iterator[tuple[str, Computed]]:
         settings, how = self.settings, how_of(self.settings)
         who = subject_of(self.cohort, self.specimen)
         regressions = regressions_of(settings, self.cohort.folder)
-        person = standing(settings, self.source, who, regressions, values).person
+        person = standing(settings, self.source, who, regressions, values, stood=self.stood).person
         for name in names:
             task = changed_task(self.tasks[name], values)
             try:
@@ -127,7 +151,10 @@ class Volunteer:
 def volunteer_of(settings: TrunkLoads, cohort: Cohort, source: Trunk) -> Volunteer:
     """The volunteer of a study, before anything is computed."""
     tasks = read_tasks(cohort, settings.trunk_angle)
-    return Volunteer(settings, cohort, source, tasks, beside_tasks(tasks))
+    assert settings.volunteer is not None
+    who = subject_of(cohort, settings.volunteer.specimen)
+    stood = standing(settings, source, who, regressions_of(settings, cohort.folder)).upright
+    return Volunteer(settings, cohort, source, tasks, beside_tasks(tasks), stood)
 
 
 def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
@@ -136,7 +163,7 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     tuned = who.settings.volunteer.tuned
     counted = [one for one in who.beside if one.counted]
     progress.round("fitting all counted tasks")
-    best, bound = fitted(who, tuned, counted, np.array([NOMINAL[name] for name in tuned]))
+    best, bound = fitted_widely(who, tuned, counted)
     tiers = {"untuned": who.computed({}), "tuned": who.computed(_named(tuned, best))}
     tuning = list(_tuning("tuned", "", tuned, best, bound))
     without: dict[str, Computed] = {}
@@ -155,6 +182,22 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     }
 
 
+def fitted_widely(
+    who: Volunteer, names: Sequence[str], counted: Sequence[Beside]
+) -> tuple[Array, Array]:
+    """As `fitted`, from what is nominal and from a step off it in all directions.
+
+    Pressures jump where a muscle comes to its end and others take over: one descent stops there.
+    """
+    nominal = np.array([NOMINAL[name] for name in names])
+    corners = np.array(list(product(*([-RANGE[name][2], RANGE[name][2]] for name in names))))
+    found = [
+        fitted(who, names, counted, start)
+        for start in (nominal, *(nominal + corner for corner in corners if len(names)))
+    ]
+    return min(found, key=lambda one: who.misfit(_named(names, one[0]), counted))
+
+
 def fitted(
     who: Volunteer, names: Sequence[str], counted: Sequence[Beside], start: Array
 ) -> tuple[Array, Array]:
@@ -162,11 +205,7 @@ def fitted(
     low, high, step = (np.array([RANGE[name][k] for name in names]) for k in range(3))
 
     def errors(x: Array) -> Array | None:
-        found = who.computed(_named(names, x), counted)
-        off = [(found[one.task][0], one.mpa) for one in counted]
-        if any(mpa is None for mpa, _ in off):
-            return None
-        return np.array([mpa - wanted for mpa, wanted in off if mpa is not None])
+        return who.errors(_named(names, x), counted)
 
     def point(x: Array) -> tuple[Array, Array] | None:
         here = errors(x)

@@ -22,6 +22,7 @@ FACTORS = {
     "age_years": "age",
     "hand_anterior_mm": "how far ahead the hands are",
     "pelvis_extension_deg": "turn of the pelvis",
+    "trunk_extension_deg": "how far the trunk leans",
     "disc_area": "area of the disc",
     "pcsa": "cross-section of muscles",
     "passive_rotation": "stiffness of joints",
