@@ -26,6 +26,9 @@ LARGEST_HEIGHT_M = 3.0
 
 STANDARD_GRAVITY = 9.80665
 
+_FIRST_ROW = 2
+"""Line of a file below its header."""
+
 
 def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
@@ -44,6 +47,7 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
         yield from _named(document, study, cohort, list(further["tasks"]["task"]))
     if study.geometry == "cohort":
         yield from _without_geometry(document, cohort)
+        yield from _several_trunks(cohort)
     yield from muscle_problems(cohort)
     yield from _regressions(study, cohort)
 
@@ -71,6 +75,23 @@ def _without_geometry(document: Document, cohort: Cohort) -> Iterator[Problem]:
         found = f"cohort, and {cohort.name} has no {name}.csv"
         remedy = f"add {name}.csv, or write geometry: myo_sim"
         yield Problem(*at(document, "geometry"), found, f"a cohort with {name}.csv", remedy)
+
+
+def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
+    """Joints that differ between specimens: one trunk is read, and scaled to every person."""
+    if cohort.joints is None:
+        return
+    of_each = {
+        str(name): rows.drop(columns="specimen").set_index("joint").sort_index()
+        for name, rows in cohort.joints.groupby("specimen", sort=False)
+    }
+    first = next(iter(of_each))
+    for name, own in of_each.items():
+        if not own.equals(of_each[first]):
+            line = _FIRST_ROW + list(cohort.joints["specimen"]).index(name)
+            found, allowed = f"joints of {name} that are not those of {first}", "one trunk"
+            remedy = f"the trunk is scaled to each person: repeat the joints of {first}"
+            yield Problem(f"{cohort.name}/joints.csv", line, "specimen", found, allowed, remedy)
 
 
 def _regressions(study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:

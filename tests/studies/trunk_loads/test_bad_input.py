@@ -386,6 +386,19 @@ def test_muscles_that_make_no_trunk_are_refused_at_the_start(tmp_path: Path) -> 
     assert NAME in problem.remedy
 
 
+def test_one_trunk_is_scaled_to_all(tmp_path: Path) -> None:
+    joints = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+    joints += "".join(
+        f"{who},{level},{5 * (who == 'b')},{40 * k},0,0,0,0\n"
+        for who in "ab"
+        for k, level in enumerate(LEVELS)
+    )
+    (problem,) = told(tmp_path, text("joints.csv", joints), geometry="cohort")
+    assert (problem.file, problem.row, problem.column) == (f"{NAME}/joints.csv", 9, "specimen")
+    assert "joints of b that are not those of a" in problem.found
+    assert "joints of a" in problem.remedy
+
+
 def test_the_generic_male_is_sound() -> None:
     """Ribs, pelvis, rectus sheath, and one left fascicle that lies right, as published."""
     cohort = cohorts.read(need_male(), FORMS)
