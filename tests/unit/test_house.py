@@ -27,7 +27,7 @@ ROOMS = (
         "marks",
         "anatomy",
     ),
-    *("effects", "model", "world", "statics", "calibrate", "muscles"),
+    *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
     *("designs", "statistics", "sensitivity", "cohort", "tables", "comparison"),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),
 )
