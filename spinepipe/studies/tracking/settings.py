@@ -1,0 +1,122 @@
+"""What a study of tracked motions asks."""
+
+from typing import Annotated, Literal, get_args
+
+from pydantic import BaseModel, Field
+
+from spinepipe.studies.parts import FORM, EachOnce
+from spinepipe.studies.study import Study
+
+Approach = Literal[
+    "ik",
+    "ik_constrained_christophy_2012",
+    "ik_constrained_bruno_2015",
+    "ik_constrained_shojaei_2017",
+    "ik_smooth",
+    "ik_springs",
+    "optk_zero",
+    "optk_generic",
+    "optk_generic_lower",
+    "optk_generic_upper",
+    "optk_calibrated",
+    "optk_from_flexion",
+    "optk_from_bending",
+    "optk_from_both",
+]
+
+APPROACHES: tuple[Approach, ...] = get_args(Approach)
+
+CONSTRAINED = "ik_constrained_"
+"""What the names of approaches with ratios begin with; the rest names the set."""
+
+LEARNT: dict[str, str] = {
+    "optk_from_flexion": "flexion_extension",
+    "optk_from_bending": "lateral_bending",
+    "optk_from_both": "both",
+}
+"""From which trials passive elements are, that an approach takes over."""
+
+ForceCost = Literal["squared", "minus_gravity", "level_difference"]
+
+Ratio = Annotated[float, Field(gt=0, le=1e4)]
+
+
+class Scales(BaseModel):
+    """By what each kind of error is divided before it is squared."""
+
+    model_config = FORM
+
+    marker_mm: float = Field(default=5.0, gt=0, le=100, description="of a marker")
+    moment_nm: float = Field(default=10.0, gt=0, le=1e4, description="of a moment of muscles")
+    force_n: float = Field(default=200.0, gt=0, le=1e5, description="of a force of muscles")
+    loads: float = Field(
+        default=1.0, gt=0, le=1e4, description="how much loads count beside markers"
+    )
+    turn_deg_per_s2: float = Field(
+        default=600.0, gt=0, le=1e5, description="of an angular acceleration of a joint"
+    )
+    move_mm_per_s2: float = Field(
+        default=2000.0, gt=0, le=1e6, description="of an acceleration along a joint's axes"
+    )
+    frames: float = Field(
+        default=10.0,
+        gt=0,
+        le=1e4,
+        description="independent frames that a trial is worth: skin slides slowly",
+    )
+    size_sd: float = Field(
+        default=0.7, gt=0, le=5, description="SD of the logarithm of a passive element's A"
+    )
+    shape_sd: float = Field(default=0.35, gt=0, le=5, description="of the logarithm of its B")
+
+
+class Bounds(BaseModel):
+    """How far joints may go."""
+
+    model_config = FORM
+
+    increased_by_percent: float = Field(
+        default=150.0, ge=0, le=1000, description="of the range of motion"
+    )
+    means: Literal["added", "of_the_range"] = Field(
+        default="added",
+        description="what 150 % is: added to the range (2.5 times), or of it (1.5 times)",
+    )
+    translation_mm: float = Field(default=10.0, gt=0, le=100, description="either way")
+
+
+class Profiles(BaseModel):
+    """Whether markers tell stiffness: one region is made stiffer and softer, all else fitted."""
+
+    model_config = FORM
+
+    specimens: EachOnce[str] = Field(default=(), description="persons; none named: the first")
+    ratios: EachOnce[Ratio] = Field(
+        default=(0.2, 0.4, 0.7, 1.0, 1.5, 2.5, 5.0), description="of the generic stiffness"
+    )
+
+
+class Tracking(Study):
+    """Motions of the spine from markers on the skin, by several approaches."""
+
+    kind: Literal["tracking"]
+    approaches: EachOnce[Approach] = Field(default=APPROACHES, description="what is compared")
+    intervals: int = Field(default=100, ge=10, le=2000, description="between nodes of a motion")
+    force_cost: ForceCost = Field(
+        default="squared",
+        description="which loads cost: squared, all that muscles do; minus_gravity, as if bodies "
+        "had no weight; level_difference, by how much it differs from joint to joint",
+    )
+    scales: Scales = Field(default=Scales(), description="what counts as much as what")
+    bounds: Bounds = Field(default=Bounds(), description="ranges of joints")
+    largest_deviation_mm: float = Field(
+        default=40.0, gt=0, le=1000, description="of a marker; beyond it a status says so"
+    )
+    profiles: Profiles = Field(default=Profiles(), description="whether markers tell stiffness")
+    trade_off: EachOnce[Ratio] = Field(
+        default=(0.1, 0.3, 1.0, 3.0, 10.0),
+        description="factors of `scales.loads` that are tried, on the first person",
+    )
+    drawn_approaches: EachOnce[Approach] = Field(
+        default=("ik", "optk_generic"), description="approaches in the animation"
+    )

@@ -1,0 +1,76 @@
+"""Approaches, measures, regions and verdicts in plain words, for figures and findings."""
+
+from collections.abc import Iterable
+
+from spinepipe.report.words import capital, number, plain
+from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
+from spinepipe.studies.tracking.tables_of_studies import MEASURES
+
+IN_WORDS = {
+    "ik": "inverse kinematics",
+    "ik_smooth": "smooth, no dynamics",
+    "ik_springs": "springs, frame by frame",
+    "optk_zero": "dynamics, no passive elements",
+    "optk_generic": "dynamics, generic",
+    "optk_generic_lower": "dynamics, generic lower",
+    "optk_generic_upper": "dynamics, generic upper",
+    "optk_calibrated": "dynamics, calibrated",
+    "optk_from_flexion": "dynamics, from flexion",
+    "optk_from_bending": "dynamics, from bending",
+    "optk_from_both": "dynamics, from both",
+}
+"""Approaches, short enough to stand beside an axis."""
+
+TOLD = {
+    "ik": "inverse kinematics",
+    "ik_smooth": "smooth curves without dynamics",
+    "ik_springs": "inverse kinematics with springs",
+    "optk_zero": "dynamics without passive elements",
+    "optk_generic": "dynamics with generic passive elements",
+    "optk_generic_lower": "dynamics with passive elements at the lower end of the generic range",
+    "optk_generic_upper": "dynamics with passive elements at the upper end of the generic range",
+    "optk_calibrated": "dynamics with passive elements calibrated on the motion itself",
+    "optk_from_flexion": "dynamics with passive elements taken from flexion",
+    "optk_from_bending": "dynamics with passive elements taken from bending",
+    "optk_from_both": "dynamics with passive elements taken from flexion and bending together",
+}
+"""The same inside a sentence."""
+
+VERDICTS = {
+    "told": "markers tell it",
+    "one_sided": "markers tell one end",
+    "not_told": "markers do not tell it",
+}
+"""What a profile says of a stiffness."""
+
+
+def _ratios(approach: str) -> str:
+    """``Christophy 2012`` of the approach with these ratios."""
+    name, _, year = approach.removeprefix(CONSTRAINED).rpartition("_")
+    return capital(f"{plain(name)} {year}".strip())
+
+
+def short_of(approach: str) -> str:
+    """An approach beside an axis."""
+    if approach.startswith(CONSTRAINED):
+        return f"ratios of {_ratios(approach)}"
+    return IN_WORDS.get(approach, plain(approach))
+
+
+def told(approach: str) -> str:
+    """An approach inside a sentence."""
+    if approach.startswith(CONSTRAINED):
+        return f"inverse kinematics with the ratios of {_ratios(approach)}"
+    return TOLD.get(approach, plain(approach))
+
+
+def in_order(approaches: Iterable[str]) -> list[str]:
+    """Approaches in the order of the settings."""
+    there = set(approaches)
+    return [name for name in APPROACHES if name in there]
+
+
+def sized(value: float, measure: str) -> str:
+    """An error with its unit."""
+    unit = MEASURES[measure][0]
+    return f"{number(value)}{'°' if unit == 'deg' else ' mm'}"
