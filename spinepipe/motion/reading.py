@@ -97,6 +97,7 @@ def read_motion(
         raw.places[kept] @ turn.T,
         raw.seen[kept],
         (*raw.repaired, *renamed),
+        1 + int(np.argmax(kept)),
     )
 
 

@@ -20,6 +20,7 @@ class Recorded:
     ----------
     names : (K,). time_s : (F,). places : (F, K, 3) m, zero where not seen. seen : (F, K).
     repaired : what was read otherwise than it stands in the file, one sentence each.
+    first : number of the first frame that was kept, counted from 1 in the file.
     """
 
     names: tuple[str, ...]
@@ -27,6 +28,7 @@ class Recorded:
     places: Array
     seen: NDArray[np.bool_]
     repaired: tuple[str, ...] = ()
+    first: int = 1
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -209,6 +209,7 @@ def test_frames_outside_the_crop_are_left_out(tmp_path: Path) -> None:
     found = read_motion(path, start_s=0.02, end_s=0.06)
     np.testing.assert_allclose(found.time_s, [0.02, 0.04, 0.06])
     np.testing.assert_allclose(1e3 * found.places, places_mm()[1:4], atol=HELD_MM)
+    assert found.first == 2
     assert problem_of(path, start_s=9.0).found == "no frame from 9 s to an end"
 
 

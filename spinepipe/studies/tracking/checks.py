@@ -1,0 +1,174 @@
+"""What a study of tracked motions demands of its cohort: each fault with its place and remedy.
+
+Tables are checked whenever the study is read; files of motion, which take longer, when it starts.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document
+from spinepipe.motion.bounds import bounds
+from spinepipe.motion.joint_tables import STATUSES
+from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.skeleton import BODIES
+from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.places import at, unknown_names
+from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
+from spinepipe.studies.tracking.checks_of_trials import (
+    recording_problems,
+    row_problems,
+    set_problems,
+)
+from spinepipe.studies.tracking.forms import BOUNDS, MARKER_SET, PASSIVE, RATIOS, TRIALS
+from spinepipe.studies.tracking.forms import TRUTH_CENTRES as TRUTH
+from spinepipe.studies.tracking.persons import (
+    of_specimen,
+    own_rows,
+    ratio_sets,
+    skeleton_in,
+    trial_rows,
+)
+from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
+from spinepipe.units import ROTATIONS
+
+NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
+
+SLICES_SHARE = (0.25, 0.60)
+"""Pelvis and slices of the trunk over body mass: 0.42 to 0.45 in the sources; head and arms, which
+are hung on T1, would add 0.16 to 0.17."""
+
+
+def check_tracking(document: Document, study: Tracking, cohort: Cohort) -> Iterator[Problem]:
+    """Everything that is wrong with the tables of a cohort."""
+    yield from _tables(document, cohort)
+    yield from _approaches(document, study, cohort)
+    yield from _own_tables(cohort)
+    names = cohort.specimen_names
+    yield from unknown_names(
+        document, "profiles.specimens", "specimen", study.profiles.specimens, names
+    )
+    further = cohort.further
+    if SUBJECTS.stem in further:
+        yield from subject_problems(cohort, further[SUBJECTS.stem])
+    if TRIALS.stem in further:
+        yield from row_problems(cohort)
+        yield from _truth(cohort)
+    if MARKER_SET.stem in further:
+        yield from set_problems(cohort)
+    if not list(_tables(document, cohort)):
+        yield from _bodies(cohort)
+
+
+def check_recordings(
+    document: Document, study: Tracking, cohort: Cohort, _root: Path
+) -> Iterator[Problem]:
+    """Everything that is wrong with files of motion; none where tables are unsound."""
+    if not list(check_tracking(document, study, cohort)):
+        yield from recording_problems(cohort)
+
+
+def _tables(document: Document, cohort: Cohort) -> Iterator[Problem]:
+    """Files that every study needs, and the chain that the markers are on."""
+    place = at(document, "cohort")
+    for form in NEEDED:
+        if form.stem not in cohort.further:
+            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
+            yield Problem(*place, found, allowed, f"add {form.file}, or name another cohort")
+    if not cohort.has_frames:
+        found, allowed = "a cohort without joints", "a cohort with joints.csv or landmarks.csv"
+        yield Problem(*place, found, allowed, "tell where the joints are")
+    if cohort.vertebrae != BODIES:
+        found = f"{cohort.vertebrae[0]} to {cohort.vertebrae[-1]}, {len(cohort.vertebrae)} in all"
+        allowed = f"all from {BODIES[0]} to {BODIES[-1]}, {len(BODIES)} in all"
+        file = f"{cohort.name}/cohort.yaml"
+        yield Problem(file, None, "vertebrae", found, allowed, "list them all, and their joints")
+
+
+def _approaches(document: Document, study: Tracking, cohort: Cohort) -> Iterator[Problem]:
+    """Approaches whose ratios nobody has, or that learn from trials nobody did."""
+    try:
+        sets = ratio_sets(cohort)
+    except InputError as error:
+        yield from error.problems
+        return
+    trials = cohort.further.get(TRIALS.stem)
+    kinds = set() if trials is None else set(trials["kind"])
+    for index, approach in enumerate(study.approaches):
+        place = at(document, f"approaches.{index}")
+        name = approach.removeprefix(CONSTRAINED)
+        if approach.startswith(CONSTRAINED) and name not in sets:
+            found = f"'{approach}', and no ratios '{name}'"
+            remedy = f"leave it out, or add the set '{name}' to {cohort.name}/{RATIOS.file}"
+            yield Problem(*place, found, f"ratios of {', '.join(sets)}", remedy)
+        kind = LEARNT.get(approach)
+        wanted = ("flexion_extension", "lateral_bending") if kind == "both" else (kind,)
+        for lacking in [one for one in wanted if one is not None and one not in kinds]:
+            if trials is not None:
+                found = f"'{approach}', and no trial of {lacking}"
+                yield Problem(*place, found, one_of(kinds), "leave it out, or add such trials")
+
+
+def _own_tables(cohort: Cohort) -> Iterator[Problem]:
+    """Faults of the passive elements and ranges of motion that the cohort brings."""
+    readers: dict[str, Callable[..., object]] = {
+        PASSIVE.file: passive_elements,
+        BOUNDS.file: bounds,
+    }
+    for file, read in readers.items():
+        rows = own_rows(cohort, file.removesuffix(".csv"))
+        try:
+            read(rows, f"{cohort.name}/{file}")
+        except InputError as error:
+            yield from error.problems
+    for form in (PASSIVE, RATIOS, BOUNDS):
+        table = cohort.further.get(form.stem)
+        told = () if table is None else table["status"].dropna().items()
+        for line, word in told:
+            if word not in STATUSES:
+                place = (f"{cohort.name}/{form.file}", int(str(line)), "status")
+                remedy = did_you_mean(str(word), STATUSES, "or leave it empty")
+                yield Problem(*place, f"'{word}'", one_of(STATUSES), remedy)
+
+
+def _truth(cohort: Cohort) -> Iterator[Problem]:
+    """True places of trials that are none, or turned about some axes only."""
+    rows = cohort.further.get(TRUTH.stem)
+    if rows is None:
+        return
+    file = f"{cohort.name}/{TRUTH.file}"
+    for specimen in cohort.specimen_names:
+        own = of_specimen(rows, specimen)
+        known = [row["trial"] for row in trial_rows(cohort, specimen)]
+        strange = own[~own["trial"].isin(known)].drop_duplicates("trial")
+        for line, name in strange["trial"].items():
+            remedy = did_you_mean(str(name), known, "correct the name")
+            found = f"no trial '{name}' of '{specimen}'"
+            yield Problem(file, int(str(line)), "trial", found, one_of(known), remedy)
+    told = rows[[f"{axis}_deg" for axis in ROTATIONS]].notna().sum(axis=1)
+    for line in rows.index[(told > 0) & (told < len(ROTATIONS))]:
+        found = f"{told[line]} of 3 rotations"
+        yield Problem(file, int(line), None, found, "all three or none", "complete the row")
+
+
+def _bodies(cohort: Cohort) -> Iterator[Problem]:
+    """Slices of the trunk that cannot be those of the person."""
+    file = f"{cohort.name}/bodies.csv"
+    known = set(cohort.further[SUBJECTS.stem]["specimen"])
+    for specimen in [name for name in cohort.specimen_names if name in known]:
+        subject = subject_of(cohort, specimen)
+        if not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
+            continue
+        allowed = (
+            f"{SLICES_SHARE[0]:.0%} to {SLICES_SHARE[1]:.0%} of {subject.mass_kg:g} kg: "
+            "pelvis and slices of the trunk, without head and arms"
+        )
+        try:
+            kg = float(skeleton_in(cohort, specimen, subject).masses.kg.sum())
+        except ValueError as error:
+            yield Problem(file, None, "mass_kg", str(error), allowed, "correct the mass")
+            continue
+        share = kg / subject.mass_kg
+        if not SLICES_SHARE[0] <= share <= SLICES_SHARE[1]:
+            found = f"{kg:.1f} kg of '{specimen}' in all, {share:.0%} of the body's mass"
+            yield Problem(file, None, "mass_kg", found, allowed, "correct the masses")

@@ -1,0 +1,162 @@
+"""Are the trials of a cohort sound: words and times of their rows, and the files they name?"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.motion.hanging import ARMS
+from spinepipe.motion.points import marker_places
+from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
+from spinepipe.motion.recorded import Recorded
+from spinepipe.motion.skeleton import BODIES, MarkerSet
+from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.tracking.checks_of_motion import motion_problems
+from spinepipe.studies.tracking.forms import FLAGS, KINDS, MARKER_SET, STANCE, TRIALS
+from spinepipe.studies.tracking.look import Look
+from spinepipe.studies.tracking.persons import (
+    Row,
+    marker_set,
+    of_specimen,
+    recording,
+    skeleton_in,
+    static_trial,
+    trial_of,
+    trial_rows,
+)
+from spinepipe.units import COORDINATES
+
+LISTED = 4
+"""So many names are written out."""
+
+
+def row_problems(cohort: Cohort) -> Iterator[Problem]:
+    """Words, times and names in `trials.csv`, and trials that somebody lacks."""
+    file = f"{cohort.name}/{TRIALS.file}"
+    for specimen in cohort.specimen_names:
+        rows = trial_rows(cohort, specimen)
+        for row in rows:
+            yield from _words(file, row)
+            yield from _crop(file, row)
+        yield from _needed(file, cohort, specimen, rows)
+
+
+def _words(file: str, row: Row) -> Iterator[Problem]:
+    words: Mapping[str, Sequence[str]] = {"kind": KINDS, "arms": ARMS}
+    if isinstance(row["static"], str):
+        words = {**words, "static": FLAGS}
+    for column, known in words.items():
+        if row[column] not in known:
+            remedy = did_you_mean(str(row[column]), known, "write one of these")
+            found = f"'{row[column]}' of trial {row['trial']}"
+            yield Problem(file, row["line"], column, found, one_of(known), remedy)
+    if Path(row["file"]).suffix.lower() not in READERS:
+        found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
+        yield Problem(file, row["line"], "file", found, allowed, "export it as one of these")
+    if isinstance(row["axes"], str):
+        try:
+            axes_of(row["axes"])
+        except ValueError as error:
+            allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
+            remedy = "name each axis once, a minus where it points the other way"
+            yield Problem(file, row["line"], "axes", str(error), allowed, remedy)
+
+
+def _crop(file: str, row: Row) -> Iterator[Problem]:
+    if row["start_s"] >= row["end_s"]:
+        found = f"{row['start_s']:g} s, and end_s {row['end_s']:g} s"
+        yield Problem(file, row["line"], "start_s", found, "a start before the end", "correct it")
+
+
+def _needed(file: str, cohort: Cohort, specimen: str, rows: Sequence[Row]) -> Iterator[Problem]:
+    if static_trial(cohort, specimen) is None:
+        found = f"no static trial of '{specimen}'"
+        allowed = f"a trial of kind {STANCE}, or one marked static"
+        remedy = "add it: without it nobody's size is known"
+        yield Problem(file, None, "kind", found, allowed, remedy)
+    marked = [row for row in rows if row["static"] == "yes"]
+    for row in marked[1:]:
+        found, allowed = f"a second static trial of '{specimen}'", "one for each person"
+        yield Problem(file, row["line"], "static", found, allowed, "leave one of them")
+    if rows and all(row["kind"] == STANCE for row in rows):
+        found = f"no motion of '{specimen}'"
+        allowed = one_of(kind for kind in KINDS if kind != STANCE)
+        yield Problem(file, None, "kind", found, allowed, "add a trial that moves")
+
+
+def set_problems(cohort: Cohort) -> Iterator[Problem]:
+    """Persons whose markers cannot tell where the pelvis is."""
+    file = f"{cohort.name}/{MARKER_SET.file}"
+    for specimen in cohort.specimen_names:
+        rows = of_specimen(cohort.further["marker_set"], specimen)
+        count = int((rows["vertebra"] == BODIES[0]).sum())
+        if count < 3:
+            found = f"{count} markers of '{specimen}' on {BODIES[0]}"
+            remedy = "add the markers of the pelvis: it moves freely, and all else moves with it"
+            yield Problem(file, None, "vertebra", found, "at least 3", remedy)
+
+
+def recording_problems(cohort: Cohort) -> Iterator[Problem]:
+    """Everything that is wrong with files of motion; tables are sound."""
+    for specimen in cohort.specimen_names:
+        markers = marker_set(cohort, specimen)
+        skeleton = skeleton_in(cohort, specimen, subject_of(cohort, specimen))
+        rest = np.zeros((1, len(BODIES), len(COORDINATES)))
+        neutral = marker_places(skeleton, markers, rest)[0]
+        for row in trial_rows(cohort, specimen):
+            try:
+                read = recording(row, cohort.name, cohort.folder)
+            except InputError as error:
+                yield from error.problems
+                continue
+            yield from _names(cohort, row, markers, read)
+            there = np.array([name in read.names for name in markers.names])
+            if there.any():
+                yield from motion_problems(_look(cohort, row, markers, neutral, there, read))
+
+
+def _look(
+    cohort: Cohort,
+    row: Row,
+    markers: MarkerSet,
+    neutral: Array,
+    there: NDArray[np.bool_],
+    read: Recorded,
+) -> Look:
+    """The trial with the markers that its file has."""
+    kept = np.flatnonzero(there)
+    part = MarkerSet(
+        tuple(markers.names[k] for k in kept),
+        markers.body[kept],
+        markers.at[kept],
+        markers.weight[kept],
+        tuple(markers.cluster[k] for k in kept),
+    )
+    axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
+    return Look(
+        trial_of(row, part, read),
+        part,
+        neutral[kept],
+        axes,
+        f"{cohort.name}/{row['file']}",
+        f"{cohort.name}/{TRIALS.file}",
+        row["line"],
+        read.first,
+    )
+
+
+def _names(cohort: Cohort, row: Row, markers: MarkerSet, read: Recorded) -> Iterator[Problem]:
+    """Markers of the set that the file lacks; further ones in the file are a remark."""
+    spare = [name for name in read.names if name not in markers.names]
+    for name in markers.names:
+        if name not in read.names:
+            allowed = f"all markers of {MARKER_SET.file}; further ones are " + (
+                ", ".join(spare[:LISTED]) + (" ..." if len(spare) > LISTED else "") or "none"
+            )
+            remedy = did_you_mean(name, spare, "rename it in the file, or delete it from the set")
+            file = f"{cohort.name}/{row['file']}"
+            yield Problem(file, None, name, "no such marker", allowed, remedy)
