@@ -48,23 +48,29 @@ def check_tracking(document: Document, study: Tracking, cohort: Cohort) -> Itera
     yield from unknown_names(
         document, "profiles.specimens", "specimen", study.profiles.specimens, names
     )
+    if TRIALS.stem in cohort.further:
+        yield from _truth(cohort)
+    yield from _recorded(cohort)
+    if not list(_tables(document, cohort)):
+        yield from _bodies(cohort)
+
+
+def _recorded(cohort: Cohort) -> Iterator[Problem]:
+    """Persons, trials and markers."""
     further = cohort.further
     if SUBJECTS.stem in further:
         yield from subject_problems(cohort, further[SUBJECTS.stem])
     if TRIALS.stem in further:
         yield from row_problems(cohort)
-        yield from _truth(cohort)
     if MARKER_SET.stem in further:
         yield from set_problems(cohort)
-    if not list(_tables(document, cohort)):
-        yield from _bodies(cohort)
 
 
 def check_recordings(
-    document: Document, study: Tracking, cohort: Cohort, _root: Path
+    document: Document, _study: Tracking, cohort: Cohort, _root: Path
 ) -> Iterator[Problem]:
-    """Everything that is wrong with files of motion; none where tables are unsound."""
-    if not list(check_tracking(document, study, cohort)):
+    """Everything that is wrong with files of motion; nothing where tables cannot be relied on."""
+    if not any((*_tables(document, cohort), *_recorded(cohort))) and not any(_bodies(cohort)):
         yield from recording_problems(cohort)
 
 

@@ -17,8 +17,8 @@ from spinepipe.units import DEG_PER_RAD
 LIKE_THE_SET = (0.4, 2.5)
 """Size of a cloud of markers over that of the set in the neutral pose: a child to a giant."""
 
-UNITS = {1000.0: "m, not mm", 10.0: "cm, not mm", 0.001: "mm, not m", 0.1: "mm, not cm"}
-"""What a unit may be mistaken for, by how large all comes out."""
+MISTAKEN = {1000.0: ("mm", "m"), 10.0: ("mm", "cm"), 0.001: ("m", "mm"), 0.1: ("cm", "mm")}
+"""By how large all comes out: the unit that numbers are in, and the one that the file tells."""
 
 UPRIGHT_DEG = {True: 45.0, False: 75.0}
 """How far a trunk leans at most where a trial begins: of a stance, and of a motion."""
@@ -62,12 +62,12 @@ def _size(look: Look) -> float | None:
 
 
 def _wrong_size(look: Look, size: float) -> Problem:
-    nearest = min(UNITS, key=lambda factor: abs(np.log(size / factor)))
-    near = LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]
+    nearest = min(MISTAKEN, key=lambda factor: abs(np.log(size / factor)))
     remedy = "check names and units of file and set"
-    if near:
-        remedy = f"a unit is wrong: is the file, read as it tells, or the set in {UNITS[nearest]}?"
-    found = f"markers spread {size:.3g} times as far as in marker_set.csv"
+    if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
+        held, told = MISTAKEN[nearest]
+        remedy = f"is it in {held} and says {told}? or is marker_set.csv not in mm?"
+    found = f"markers spread {size:.{0 if size >= 1 else 4}f} times as far as in marker_set.csv"
     allowed = f"{LIKE_THE_SET[0]:g} to {LIKE_THE_SET[1]:g} times"
     return look.in_motion(None, found, allowed, remedy)
 

@@ -220,10 +220,8 @@ def _numbers(row: Row, names: list[str]) -> Array:
 
 
 def _symmetric(six: Array) -> Array:
-    """(3, 3) of xx, yy, zz, xy, xz, yz; all NaN where the first three are not all told."""
-    if np.isnan(six[:3]).any():
-        return np.full((3, 3), np.nan)
-    xx, yy, zz, xy, xz, yz = np.nan_to_num(six)
+    """(3, 3) of xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = six
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
