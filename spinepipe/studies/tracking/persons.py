@@ -2,7 +2,8 @@
 
 Bodies are slices of the trunk, without head and arms; `carrying` hangs those on T1 as a trial has
 them. Where `bodies.csv` tells nothing of a body, its mass is that of Pearsall's slices (pelvis: de
-Leva's lower trunk), where it tells no inertia, that of an elliptic cylinder of the mass.
+Leva's lower trunk), where it tells no inertia, that of an elliptic cylinder of the mass. A cohort
+without `bodies.csv` says `gravity: false`, which here is about the file alone: persons have weight.
 """
 
 from collections.abc import Mapping

@@ -227,6 +227,12 @@ def exchanged(one: str, other: str, begin: int = 0, end: int | None = None) -> S
     return on("flexion_extension", lambda m: m.exchange(one, other, begin, end))
 
 
+def mirrored(motion: Motion) -> None:
+    """All that is left is called right."""
+    for one, other in (("LASI", "RASI"), ("LPSI", "RPSI")):
+        motion.exchange(one, other)
+
+
 def renamed(old: str, new: str) -> Spoil:
     def rename(motion: Motion) -> None:
         motion.names[motion.names.index(old)] = new
@@ -260,6 +266,11 @@ MOTIONS = [
         "for a while",
         exchanged("LPSI", "RPSI", 9, 20),
         *("LPSI and RPSI", "swapped in frames 10 to 20", "exchange"),
+    ),
+    Spoilt(
+        "mirrored",
+        on("flexion_extension", mirrored),
+        *("LASI and RASI", "swapped in frames 1 to 41"),
     ),
     Spoilt("cluster", exchanged("T7_b", "T7_c"), "T7_b and T7_c", "exchanged from frame 1"),
     Spoilt("top", exchanged("L4_a", "L4_c"), "L4_a and L4_c", "exchanged from frame 1"),
