@@ -76,13 +76,18 @@ class Bounds(BaseModel):
     model_config = FORM
 
     increased_by_percent: float = Field(
-        default=150.0, ge=0, le=1000, description="of the range of motion"
+        default=150.0, gt=0, le=1000, description="of the range of motion"
     )
     means: Literal["added", "of_the_range"] = Field(
         default="added",
         description="what 150 % is: added to the range (2.5 times), or of it (1.5 times)",
     )
-    translation_mm: float = Field(default=10.0, gt=0, le=100, description="either way")
+
+    @property
+    def times(self) -> float:
+        """How many times the range a joint may go."""
+        share = self.increased_by_percent / 100.0
+        return 1.0 + share if self.means == "added" else share
 
 
 class Profiles(BaseModel):
@@ -103,7 +108,7 @@ class Tracking(Study):
     approaches: EachOnce[Approach] = Field(default=APPROACHES, description="what is compared")
     intervals: int = Field(default=100, ge=10, le=2000, description="between nodes of a motion")
     force_cost: ForceCost = Field(
-        default="squared",
+        default="level_difference",
         description="which loads cost: squared, all that muscles do; minus_gravity, as if bodies "
         "had no weight; level_difference, by how much it differs from joint to joint",
     )

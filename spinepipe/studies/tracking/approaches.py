@@ -1,0 +1,187 @@
+"""Approaches by name: what each asks of a motion, and the motion that it finds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.motion.asked import SHAPE, Ask, Sizes, Watched, watched
+from spinepipe.motion.passive import PassiveLaw
+from spinepipe.motion.passive_elements import PassiveElements
+from spinepipe.motion.points import COUNT
+from spinepipe.motion.posture import postures
+from spinepipe.motion.ratios import RatioSet
+from spinepipe.motion.skeleton import PELVIS, Trial
+from spinepipe.motion.trajectory import solve
+from spinepipe.status import Status
+from spinepipe.studies.tracking.persons import Person, carrying
+from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Approach, Scales, Tracking
+from spinepipe.units import DEG_PER_RAD, MM_PER_M, TRANSLATIONS
+
+OWN = "optk_calibrated"
+"""The approach that calibrates passive elements on the motion itself."""
+
+_LENGTHS = len(TRANSLATIONS)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A motion as an approach has it.
+
+    Attributes
+    ----------
+    ask, watched : what was asked, and of what. motion : place, velocity and acceleration at nodes,
+        (N + 1, 18, 6) each, m and rad; the last two are zero for a posture that stands.
+    unknowns : how many numbers were searched for. steps : of the search.
+    """
+
+    ask: Ask
+    watched: Watched
+    motion: tuple[Array, Array, Array]
+    status: Status
+    message: str
+    unknowns: int
+    steps: int
+
+    @property
+    def q(self) -> Array:
+        """(N + 1, 18, 6) m and rad."""
+        return self.motion[0]
+
+
+def learns(approach: str) -> bool:
+    """Whether an approach takes over passive elements that were calibrated on trials."""
+    return approach in LEARNT or approach == OWN
+
+
+def source_of(approach: str, kind: str) -> str:
+    """From which trials the passive elements of an approach are, in a trial of a kind."""
+    return LEARNT.get(approach, kind)
+
+
+def sizes_of(scales: Scales) -> Sizes:
+    """The study's scales in SI."""
+    return Sizes(
+        marker_m=scales.marker_mm / MM_PER_M,
+        moment_nm=scales.moment_nm,
+        force_n=scales.force_n,
+        loads=scales.loads,
+        turn_rad_per_s2=scales.turn_deg_per_s2 / DEG_PER_RAD,
+        move_m_per_s2=scales.move_mm_per_s2 / MM_PER_M,
+        size=scales.size_sd,
+        shape=scales.shape_sd,
+        frames=scales.frames,
+    )
+
+
+def seen_in(settings: Tracking, person: Person, trial: Trial) -> Watched:
+    """What is seen of a trial at nodes; one posture, the mean, of a trial that stands."""
+    skeleton = carrying(person, trial)
+    if trial.kind == "stance":
+        return watched(skeleton, person.markers, still(trial), settings.intervals)
+    return watched(skeleton, person.markers, trial, settings.intervals)
+
+
+def still(trial: Trial) -> Trial:
+    """The mean of a trial as its only frame."""
+    count = trial.seen.sum(axis=0)
+    places = np.where(trial.seen[..., None], trial.places, 0.0).sum(axis=0)
+    mean = places / np.maximum(count, 1)[:, None]
+    return replace(trial, time_s=trial.time_s[:1], places=mean[None], seen=(count > 0)[None])
+
+
+def law_of(elements: PassiveElements, approach: str, learnt: PassiveLaw | None) -> PassiveLaw:
+    """Passive elements that an approach starts with or keeps."""
+    if learnt is not None:
+        return learnt
+    ends = {"optk_generic_lower": elements.lower, "optk_generic_upper": elements.upper}
+    return PassiveLaw(elements.a * ends.get(approach, 1.0), elements.b)
+
+
+def asked_of(
+    settings: Tracking, person: Person, approach: Approach, learnt: PassiveLaw | None = None
+) -> Ask:
+    """What an approach asks; learnt : passive elements that it takes over."""
+    sizes = sizes_of(settings.scales)
+    if approach.startswith("ik") and approach != "ik_springs":
+        return Ask(
+            free=_rotations_alone(), loads=False, smooth=approach == "ik_smooth", sizes=sizes
+        )
+    low, high = _ranges(settings, person)
+    return Ask(
+        low=low,
+        high=high,
+        passive=None if approach == "optk_zero" else law_of(person.passive, approach, learnt),
+        loads=approach != "ik_springs",
+        force_cost=settings.force_cost,
+        sizes=sizes,
+    )
+
+
+def _rotations_alone() -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    free = np.ones(SHAPE, dtype=bool)
+    free[PELVIS + 1 :, :_LENGTHS] = False
+    return free
+
+
+def _ranges(settings: Tracking, person: Person) -> tuple[Array, Array]:
+    """(18, 6) m and rad, the ends of how far coordinates may go; those of the pelvis anywhere."""
+    limits = person.limits.widened(settings.bounds.times)
+    low, high = np.full(SHAPE, -np.inf), np.full(SHAPE, np.inf)
+    low[PELVIS + 1 :], high[PELVIS + 1 :] = limits[..., 0], limits[..., 1]
+    return low, high
+
+
+def found_by(
+    approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]
+) -> Found:
+    """The motion that an approach finds."""
+    if approach.startswith(CONSTRAINED):
+        chosen = ratios[approach.removeprefix(CONSTRAINED)]
+        return _frames(ask, seen, _whole(chosen))
+    if approach in ("ik", "ik_springs") or seen.grid.intervals == 0:
+        return _frames(ask, seen)
+    return trajectory(ask, seen)
+
+
+def trajectory(ask: Ask, seen: Watched, start: Array | None = None) -> Found:
+    """The motion over all its time; start : (N + 3, 18, 6) coefficients, else from springs."""
+    begin = first_guess(ask, seen) if start is None else start
+    solved = solve(ask, [seen], [begin])
+    return Found(
+        *(ask, seen, seen.grid.at_nodes(solved.coefficients[0]), solved.status, solved.message),
+        *(int(ask.free.sum()) * seen.grid.coefficients, solved.steps),
+    )
+
+
+def first_guess(ask: Ask, seen: Watched) -> Array:
+    """(N + 3, 18, 6) coefficients through postures of each frame by itself."""
+    simple = replace(ask, loads=False, smooth=False, fitted=np.zeros_like(ask.fitted))
+    return seen.grid.through(postures(simple, seen).q)
+
+
+def _whole(ratios: RatioSet) -> Array:
+    """(108, 9) what the pelvis and three driving rotations make of all coordinates."""
+    found = np.zeros((COUNT, len(SHAPE) + 7))
+    pelvis = SHAPE[1]
+    found[:pelvis, :pelvis] = np.eye(pelvis)
+    found[pelvis:, pelvis:] = ratios.mapping.reshape(-1, 3)
+    return found
+
+
+def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> Found:
+    """Each frame by itself; how fast it went follows from the curve through the frames."""
+    found = postures(ask, seen, ratios)
+    grid = seen.grid
+    rest = np.zeros_like(found.q)
+    motion = grid.at_nodes(grid.through(found.q)) if grid.intervals else (found.q, rest, rest)
+    lost = int((~found.settled).sum())
+    unknowns = int(ask.free.sum()) if ratios is None else ratios.shape[1]
+    return Found(
+        *(ask, seen, motion),
+        Status.NOT_CONVERGED if lost else Status.CONVERGED,
+        f"{lost} of {len(found.q)} frames did not settle" if lost else "",
+        unknowns * len(found.q),
+        found.steps,
+    )
