@@ -15,11 +15,11 @@ from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.skeleton import PELVIS
 from spinepipe.motion.terms import Loads, Markers, beyond
 
-MOST_STEPS = 100
+MOST_STEPS = 200
 SHORTEST = 1e-7
 """rad and m, largest step of the last round, or"""
 
-SMALL = 1e-7
+SMALL = 1e-10
 """share of the cost by which it changed that."""
 
 _RIDGE = 1e-8
