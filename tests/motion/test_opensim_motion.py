@@ -25,12 +25,13 @@ REPLAYED_M = 1e-9
 LOADED = 1e-9
 """Share of the largest load: two programs' round-off over 108 coordinates."""
 
-FITTED_DEG = 0.01
+FITTED_DEG = 1e-3
 ACCURACY = 1e-10
 """OpenSim's, of its own assembly; with its usual 1e-5 it ends up to degrees away."""
 
-SLIDING_M = 2e-3
-"""SD of what markers are off, so that no posture fits them exactly."""
+SLIDING_M = 1e-3
+"""SD of what markers are off, so that no posture fits them exactly: little beside the 60 mm of a
+body's markers, or there is more than one posture that nothing near fits better."""
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +104,7 @@ def test_inverse_kinematics_are_opensims(folder: Path) -> None:
     seen = MarkerSet(seen.names, seen.body, seen.at, weight, seen.cluster)
     times = 0.1 * np.arange(frames)
     q = postures(16, frames, 0.05)
+    q[:, 1:, :3] = 0.0
     places = marker_places(spine(), seen, q) + rng.normal(0.0, SLIDING_M, (frames, len(seen), 3))
     trc(folder / "fitted.trc", times, places, seen)
     expected = peer.inverse_kinematics(
