@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Run, exactly
 from spinepipe.studies.tracking.wang_2021.found import LEARNT, SETS, STANCE, numbers, of_kind
@@ -72,7 +73,7 @@ def claims_of_errors() -> Iterator[Claim]:
     for measure in (CENTRE, ANGLE):
         yield _range(measure)
         yield _as_printed(measure)
-        for better, worse in zip(ORDER, ORDER[1:], strict=False):
+        for better, worse in pairwise(ORDER):
             yield _order(measure, better, worse)
     yield from _without_passive_elements()
 
@@ -121,7 +122,7 @@ def _range(measure: str) -> Claim:
 
 def _as_printed(measure: str) -> Claim:
     values = [printed.error(measure) for printed in ORDER]
-    inorder = all(one < other for one, other in zip(values, values[1:], strict=False))
+    in_order = all(one < other for one, other in pairwise(values))
     return recomputed(
         f"closed_form.{CHECK[measure]}",
         "Results",
@@ -129,7 +130,7 @@ def _as_printed(measure: str) -> Claim:
         YES_NO,
         1.0,
         exactly(1.0),
-        float(inorder),
+        float(in_order),
         f"{CHECK[measure]}: {', '.join(f'{value:g}' for value in values)} {UNIT[measure]}",
     )
 

@@ -113,7 +113,7 @@ def _largest_thoracic(approaches: tuple[str, ...]) -> Value:
     def ours(run: Run) -> Ours:
         approach = first_of(run, "ranges", approaches)
         found = _by_joint(run, FE, approach, "extension", THORACIC)
-        return spanned(found.to_numpy(), approach, float(found.max()))
+        return spanned(np.asarray(found, dtype=np.float64), approach, float(found.max()))
 
     return ours
 
@@ -123,14 +123,14 @@ def _largest_constrained(run: Run) -> Ours:
     rows = rows[rows["approach"].isin(SETS)]
     if rows.empty:
         raise NotComputed("this study has no approach with ratios")
-    largest = rows.loc[rows["range"].idxmax()]
+    largest = rows.iloc[int(rows["range"].to_numpy(float).argmax())]
     return Ours(float(largest["range"]), note=f"{largest['approach']}, {largest['joint']}")
 
 
 def _along(run: Run) -> Ours:
     approach = first_of(run, "ranges", BEST)
     found = _by_joint(run, FE, approach, "superior", LUMBAR_JOINTS)
-    return spanned(found.to_numpy(), approach)
+    return spanned(np.asarray(found, dtype=np.float64), approach)
 
 
 def _sharing() -> Iterator[Claim]:
