@@ -15,11 +15,11 @@ from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.skeleton import PELVIS
 from spinepipe.motion.terms import Loads, Markers, beyond
 
-MOST_STEPS = 100
+MOST_STEPS = 400
 SHORTEST = 1e-7
 """rad and m, largest step of the last round, or"""
 
-SMALL = 1e-7
+SMALL = 1e-10
 """share of the cost by which it changed that."""
 
 _RIDGE = 1e-8
@@ -74,25 +74,27 @@ def _stiff(ask: Ask) -> Ask:
 
 
 def _rounds(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, int, Array]:
-    """Steps of all frames until they are short; each frame has its own damping."""
-    damping = np.full(len(q), 1e-4)
+    """Steps of each frame until they are short; each frame has its own damping."""
+    damping, q = np.full(len(q), 1e-4), q.copy()
     cost, settled = _cost(ask, watched, q), np.zeros(len(q), dtype=bool)
     steps = 0
     while steps < MOST_STEPS and not settled.all():
         steps += 1
-        square, down = _normal(ask, watched, q, whole)
+        left = np.flatnonzero(~settled)
+        seen = replace(watched, places=watched.places[left], weight=watched.weight[left])
+        square, down = _normal(ask, seen, q[left], whole)
         diagonal = np.einsum("fii->fi", square)
         ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)
-        grown = square + (damping[:, None] * diagonal + ridge)[:, :, None] * np.eye(len(whole.T))
+        grown = square + (damping[left, None] * diagonal + ridge)[:, :, None] * np.eye(len(whole.T))
         move = -np.linalg.solve(grown, down[..., None])[..., 0]
-        there = q + (move @ whole.T).reshape(q.shape)
-        found = _cost(ask, watched, there)
-        better = found <= cost
+        there = q[left] + (move @ whole.T).reshape(-1, *SHAPE)
+        found = _cost(ask, seen, there)
+        better = found <= cost[left]
         short = np.abs(move).max(axis=1) < SHORTEST
-        settled = short | (better & (cost - found <= SMALL * cost))
-        q = np.where(better[:, None, None], there, q)
-        cost = np.where(better, found, cost)
-        damping = np.clip(np.where(better, 0.2 * damping, 10.0 * damping), 1e-12, 1e8)
+        settled[left] = short | (better & (cost[left] - found <= SMALL * cost[left]))
+        q[left[better]], cost[left[better]] = there[better], found[better]
+        by = np.where(better, 0.2, 10.0) * damping[left]
+        damping[left] = np.clip(by, 1e-12, 1e8)
     return q, steps, settled
 
 

@@ -30,7 +30,8 @@ MEASURES = {
     "joint_angle_deg": (
         "deg",
         "joint rotations",
-        "angle between a joint's rotation and the true one",
+        "angle between the change of a joint's rotation since the first instant with a truth and "
+        "the true change",
     ),
 }
 """Unit, a few words and what it is, of each measure of error."""
@@ -74,7 +75,8 @@ SHARING = Table(
         Column(
             "share",
             "number",
-            "angle of the joint over that of all lumbar joints, mean over the window",
+            "rotation of the joint over that of all lumbar joints, L5S1 to T12L1, about the axis "
+            "that the motion is about, from the neutral pose; mean over the window",
             null="the lumbar spine turns less than 2 deg in every frame, or there is no frame",
         ),
         Column("frames_used", "integer", "frames in which it turns enough", low=0),
@@ -98,7 +100,8 @@ SIMILARITY = Table(
         Column(
             "cmc",
             "number",
-            "coefficient of multiple correlation of the curves over persons: 1, all are alike",
+            "coefficient of multiple correlation over persons, of the shares of all lumbar joints "
+            "one after the other: 1, all are alike",
             null="it is not defined, see status",
             low=0.0,
             high=1.0,

@@ -1,0 +1,34 @@
+"""Whether clusters of markers are rigid, as they have to be if their markers are on a plate."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from spinepipe.motion.measures import rigidity
+from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.units import MM_PER_M
+
+RIGID_MM = 1.0
+"""More is not rigid: Wang et al. 2021 found 0.27 mm (SD 0.04), and cameras add some tenths."""
+
+
+def cluster_rows(specimen: str, markers: MarkerSet, trial: Trial) -> Iterator[dict[str, Any]]:
+    """Rows of table `clusters` of a trial, by cluster in the order of the set."""
+    for name in dict.fromkeys(cluster for cluster in markers.cluster if cluster):
+        own = np.array([cluster == name for cluster in markers.cluster])
+        found = rigidity(trial.places[:, own], trial.seen[:, own])
+        if found.variability_m is None:
+            status, told = "too_few", None
+        else:
+            told = MM_PER_M * found.variability_m
+            status = "rigid" if told <= RIGID_MM else "not_rigid"
+        yield {
+            "specimen": specimen,
+            "trial": trial.name,
+            "cluster": name,
+            "variability_mm": told,
+            "variability_percent": found.variability_percent,
+            "frames": found.frames,
+            "status": status,
+        }

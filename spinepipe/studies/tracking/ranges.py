@@ -1,0 +1,42 @@
+"""Job: how far every joint moves in every motion."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.motion.skeleton import JOINTS, PELVIS
+from spinepipe.studies.tracking.moved import motions
+from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables_of_studies import RANGES
+from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+
+
+def run(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``ranges.parquet``."""
+    settings, cohort = study_of_kind(Tracking, root, study)
+    rows = list(range_rows(read_frames(tables)["tracked"]))
+    write(from_rows(RANGES, rows), output, provenance("ranges", settings, cohort))
+
+
+def range_rows(tracked: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Rows by motion, joint and coordinate; one frame has no range, and the pelvis is no joint."""
+    for moved in motions(tracked):
+        if len(moved.q) < 2:
+            continue
+        reach = np.ptp(moved.q[:, PELVIS + 1 :], axis=0) * BORDER_PER_SI
+        for joint, of_joint in zip(JOINTS, reach.tolist(), strict=True):
+            for coordinate, value in zip(COORDINATES, of_joint, strict=True):
+                yield {
+                    "specimen": moved.specimen,
+                    "trial": moved.trial,
+                    "approach": moved.approach,
+                    "joint": joint,
+                    "coordinate": coordinate,
+                    "range": value,
+                    "unit": COORDINATE_UNITS[coordinate],
+                }

@@ -1,0 +1,116 @@
+"""Rigidity of clusters, angles of neighbours and likeness of curves, against closed cases."""
+
+import numpy as np
+import pytest
+
+from spinepipe.frames import rotation_zxy
+from spinepipe.motion.measures import rigidity, sagittal_angles, turned_apart
+from spinepipe.statistics.waveforms import Likeness, multiple_correlation
+from spinepipe.studies.tracking.clusters import cluster_rows
+from spinepipe.studies.tracking.tables import CLUSTERS
+from spinepipe.tables import from_rows
+
+
+def test_distances_that_vary() -> None:
+    """One distance that is 30, 31 and 32 mm, twice."""
+    places = np.zeros((6, 2, 3))
+    places[:, 1, 0] = [0.030, 0.031, 0.032] * 2
+    found = rigidity(places, np.ones((6, 2), dtype=bool))
+    sd = np.sqrt(4.0 / 5.0) * 1e-3
+    assert found.variability_m == pytest.approx(sd)
+    assert found.variability_percent == pytest.approx(100.0 * sd / 0.031)
+    assert found.frames == 6
+
+
+def test_a_cluster_that_moves_as_one_is_rigid() -> None:
+    at = np.array([[0.0, 0.03, 0.0], [0.0, 0.0, 0.02], [0.01, 0.0, -0.02]])
+    turns = [rotation_zxy(0.1 * k, 0.2 * k, -0.1 * k) for k in range(5)]
+    places = np.array([at @ turn.T + 0.1 * k for k, turn in enumerate(turns)])
+    found = rigidity(places, np.ones((5, 3), dtype=bool))
+    assert found.variability_m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_frames_that_do_not_see_all_do_not_count() -> None:
+    places = np.zeros((5, 2, 3))
+    places[:, 1, 0] = [0.03, 9.0, 0.03, 0.03, 9.0]
+    seen = np.ones((5, 2), dtype=bool)
+    seen[[1, 4], 1] = False
+    assert rigidity(places, seen).variability_m == pytest.approx(0.0, abs=1e-15)
+    seen[0, 0] = False
+    few = rigidity(places, seen)
+    assert (few.variability_m, few.variability_percent, few.frames) == (None, None, 2)
+
+
+def test_rows_of_clusters(trial_with_clusters) -> None:
+    markers, trial = trial_with_clusters
+    rows = list(cluster_rows("s01", markers, trial))
+    from_rows(CLUSTERS, rows)
+    told = {row["cluster"]: (row["status"], row["frames"]) for row in rows}
+    assert told == {"L4": ("rigid", 4), "L2": ("not_rigid", 4), "T1": ("too_few", 2)}
+
+
+@pytest.fixture
+def trial_with_clusters():
+    """A cluster that is rigid, one whose marker slides by 6 mm, and one that is hardly seen."""
+    from spinepipe.motion.skeleton import MarkerSet, Trial
+
+    names = ("L4_a", "L4_b", "L2_a", "L2_b", "T5", "T1_a", "T1_b")
+    clusters = ("L4", "L4", "L2", "L2", "", "T1", "T1")
+    at = np.zeros((7, 3))
+    at[[1, 3, 6], 0] = 0.03
+    markers = MarkerSet(names, np.array([2, 2, 4, 4, 13, 17, 17]), at, np.ones(7), clusters)
+    places = np.tile(at, (4, 1, 1))
+    places[:, 3, 0] += [0.0, 0.002, 0.004, 0.006]
+    seen = np.ones((4, 7), dtype=bool)
+    seen[2:, 5] = False
+    times = np.arange(4) * 0.1
+    return markers, Trial("bends", "flexion_extension", times, places, seen, "hanging")
+
+
+def test_angles_of_neighbours_are_differences_in_one_plane() -> None:
+    """Bodies turned about z alone, each by so much in ground."""
+    in_ground = np.linspace(-0.4, 0.6, 18)
+    turns = np.array([rotation_zxy(angle, 0.0, 0.0) for angle in in_ground])
+    np.testing.assert_allclose(sagittal_angles(turns), np.diff(in_ground), atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-4, 0.3, 3.0])
+def test_angle_of_one_rotation_to_another(angle: float) -> None:
+    one = rotation_zxy(0.3, -0.2, 0.5)
+    axis = one @ [0.0, 0.0, 1.0]
+    assert turned_apart(one, one @ rotation_zxy(angle, 0.0, 0.0)) == pytest.approx(angle, rel=1e-6)
+    assert np.linalg.norm(axis) == pytest.approx(1.0)
+
+
+def test_likeness_by_hand() -> None:
+    """Curves 0 1 2 and 1 2 3: about their mean curve 1.5 / 3, about their mean 5.5 / 5."""
+    found = multiple_correlation(np.array([[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]))
+    assert found.value == pytest.approx(np.sqrt(1.0 - 0.5 / 1.1))
+    assert (found.curves, found.points, found.status) == (2, 3, Likeness.DONE)
+
+
+def test_likeness_ends() -> None:
+    same = np.tile(np.sin(np.linspace(0.0, 6.0, 20)), (4, 1))
+    assert multiple_correlation(same).value == pytest.approx(1.0)
+    opposite = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    assert multiple_correlation(opposite).status == Likeness.UNDEFINED
+    assert multiple_correlation(np.ones((3, 5))).status == Likeness.UNDEFINED
+    assert multiple_correlation(same[:1]).status == Likeness.TOO_FEW
+    assert multiple_correlation(np.zeros((0, 0))).status == Likeness.TOO_FEW
+
+
+def test_likeness_is_that_of_an_analysis_of_variance() -> None:
+    """One way, points as groups: mean squares by scipy give the same."""
+    from scipy.stats import f_oneway
+
+    rng = np.random.default_rng(3)
+    curves = np.sin(np.linspace(0.0, 3.0, 12)) + rng.normal(0.0, 0.2, (5, 12))
+    f = f_oneway(*curves.T).statistic
+    between, within = 11, 12 * 4
+    expected = np.sqrt(1.0 - (between + within) / (between * f + within))
+    assert multiple_correlation(curves).value == pytest.approx(expected)
+
+
+def test_likeness_needs_numbers() -> None:
+    with pytest.raises(ValueError, match="finite"):
+        multiple_correlation(np.array([[0.0, np.nan], [1.0, 2.0]]))
