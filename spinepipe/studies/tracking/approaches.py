@@ -133,9 +133,7 @@ def _ranges(settings: Tracking, person: Person) -> tuple[Array, Array]:
     return low, high
 
 
-def found_by(
-    approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]
-) -> Found:
+def found_by(approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]) -> Found:
     """The motion that an approach finds."""
     if approach.startswith(CONSTRAINED):
         chosen = ratios[approach.removeprefix(CONSTRAINED)]
@@ -176,7 +174,7 @@ def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> Found:
     grid = seen.grid
     rest = np.zeros_like(found.q)
     motion = grid.at_nodes(grid.through(found.q)) if grid.intervals else (found.q, rest, rest)
-    lost = int((~found.settled).sum())
+    lost = len(found.q) - int(np.count_nonzero(found.settled))
     unknowns = int(ask.free.sum()) if ratios is None else ratios.shape[1]
     return Found(
         *(ask, seen, motion),

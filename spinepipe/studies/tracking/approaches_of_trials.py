@@ -2,7 +2,7 @@
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.persons import trial_rows
+from spinepipe.studies.tracking.moved import kinds_of_trials
 from spinepipe.studies.tracking.settings import LEARNT, Approach, Tracking
 
 OWN: Approach = "optk_calibrated"
@@ -19,7 +19,9 @@ _OF_KIND: dict[str, str] = {kind: name for name, kind in LEARNT.items() if kind 
 
 def kinds_of(cohort: Cohort, specimen: str) -> dict[str, str]:
     """Kind of each trial of a person, by its name."""
-    return {str(row["trial"]): str(row["kind"]) for row in trial_rows(cohort, specimen)}
+    return {
+        trial: kind for (who, trial), kind in kinds_of_trials(cohort).items() if who == specimen
+    }
 
 
 def sources(law: str) -> tuple[str, ...]:
@@ -62,12 +64,3 @@ def _is_there(cohort: Cohort, specimen: str, trial: str, approach: str) -> bool:
     if law is None:
         return True
     return set(sources(law)) <= set(kinds_of(cohort, specimen).values())
-
-
-def calibrations(study: Tracking, cohort: Cohort, specimen: str) -> tuple[str, ...]:
-    """Names of the calibrations that a person's trials ask for, each once."""
-    asked = (
-        calibrated_in(cohort, specimen, trial, approach)
-        for trial, approach in tried(study, cohort, specimen)
-    )
-    return tuple(dict.fromkeys(law for law in asked if law is not None))

@@ -37,15 +37,13 @@ def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
     else:
         assert solved.law is not None
         high = loads_in(solved, solved.law, seen)
-        rows = list(
-            stiffness_rows(solved.law, person.passive, high, solved.status, solved.message)
-        )
+        rows = list(stiffness_rows(solved.law, person.passive, high, solved.status, solved.message))
     known = {"specimen": specimen, "law": law}
     write(from_rows(STIFFNESS, [known | row for row in rows]), output, made_by)
 
 
 def fitting(settings: Tracking, person: Person) -> Ask:
-    """The generic elements of all rotations fitted; those along axes, which no marker tells, stay."""
+    """Elements of all rotations are fitted; those along axes, which no marker tells, stay."""
     ask = asked_of(settings, person, "optk_generic")
     fitted = np.zeros_like(ask.fitted)
     fitted[:, [COORDINATES.index(name) for name in ROTATIONS]] = True

@@ -1,16 +1,32 @@
-"""Whether clusters of markers are rigid, as they have to be if their markers are on a plate."""
+"""Job: whether clusters of markers are rigid, as markers on a plate have to be."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.measures import rigidity
 from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.studies.tracking.marks import marks_of
+from spinepipe.studies.tracking.persons import person_of
+from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables import CLUSTERS
+from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 
 RIGID_MM = 1.0
 """More is not rigid: Wang et al. 2021 found 0.27 mm (SD 0.04), and cameras add some tenths."""
+
+
+def run(root: str, study: str, specimen: str, output: str) -> None:
+    """Write the rows of a person."""
+    settings, cohort = study_of_kind(Tracking, root, study)
+    person = person_of(cohort, specimen, cohort.folder)
+    rows = [row for one in person.trials for row in cluster_rows(specimen, person.markers, one)]
+    made_by = provenance("clusters", settings, cohort, [specimen], marks_of(cohort, specimen))
+    write(from_rows(CLUSTERS, rows), output, made_by)
 
 
 def cluster_rows(specimen: str, markers: MarkerSet, trial: Trial) -> Iterator[dict[str, Any]]:

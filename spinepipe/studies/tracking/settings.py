@@ -96,6 +96,7 @@ class Profiles(BaseModel):
     model_config = FORM
 
     specimens: EachOnce[str] = Field(default=(), description="persons; none named: the first")
+    intervals: int = Field(default=25, ge=10, le=2000, description="between nodes of a motion")
     ratios: EachOnce[Ratio] = Field(
         default=(0.2, 0.4, 0.7, 1.0, 1.5, 2.5, 5.0), description="of the generic stiffness"
     )

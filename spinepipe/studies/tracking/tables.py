@@ -19,6 +19,9 @@ LIMIT = 3.84
 
 TRIAL = Column("trial", "text", "motion, as in trials.csv")
 APPROACH = Column("approach", "text", "how postures were found", allowed=APPROACHES)
+LAW = Column(
+    "law", "text", "passive elements: the approach that takes them over, or the kind of motion"
+)
 FRAME = Column("frame", "integer", "number of the frame in the trial, from 0", low=0)
 TIME = Column("time_s", "number", "time of the frame", "s")
 LEVEL = Column("joint", "text", "joint, upper vertebra first")
@@ -121,21 +124,31 @@ FITS = Table(
     ),
 )
 
+_NO_LAW = "the calibration ended without"
+_UNLOADED = "the side was not loaded, the coordinate is along an axis, or no calibration"
+
 STIFFNESS = Table(
     "stiffness",
-    "Passive elements: one row per person, approach, joint, coordinate and side. A coordinate q is "
-    "resisted by A (exp(B q) - 1), so that stiffness is B (load + A).",
-    ("specimen", "approach", "joint", "coordinate", "side"),
+    "Passive elements: one row per person, calibration, joint, coordinate and side. A coordinate q "
+    "is resisted by A (exp(B q) - 1), so that stiffness is B (load + A).",
+    ("specimen", "law", "joint", "coordinate", "side"),
     (
         SPECIMEN,
-        APPROACH,
+        LAW,
         LEVEL,
         COORDINATE,
         SIDE,
-        Column("a", "number", "size A", "N or N m", low=0.0),
-        Column("b", "number", "shape B", "1/m or 1/rad", low=0.0),
+        Column("a", "number", "size A", "N or N m", null=_NO_LAW, low=0.0),
+        Column("b", "number", "shape B", "1/m or 1/rad", null=_NO_LAW, low=0.0),
         *(
-            Column(name, "number", meaning, "N m/rad", null="no moment acts along an axis", low=0.0)
+            Column(
+                name,
+                "number",
+                meaning,
+                "N m/rad",
+                null=_UNLOADED,
+                low=0.0,
+            )
             for name, meaning in (
                 ("at_low_moment", "stiffness where 0.1 N m resists"),
                 ("at_high_moment", "stiffness where the joint's high moment resists"),
@@ -146,7 +159,7 @@ STIFFNESS = Table(
             "number",
             "largest passive moment of this side in the motions",
             "N m",
-            null="the side was not loaded, or the coordinate is along an axis",
+            null=_UNLOADED,
             low=0.0,
         ),
         *(
@@ -155,7 +168,7 @@ STIFFNESS = Table(
                 "number",
                 f"{meaning} of generic stiffness where the high moment resists",
                 "N m/rad",
-                null="no generic range is known",
+                null=_UNLOADED,
                 low=0.0,
             )
             for end, meaning in (("low", "lower end"), ("high", "upper end"))
@@ -164,15 +177,17 @@ STIFFNESS = Table(
             "inside_generic",
             "flag",
             "whether the stiffness at the high moment is inside that range",
-            null="no generic range is known",
+            null=_UNLOADED,
         ),
         Column(
             "ratio_to_generic",
             "number",
             "stiffness at the high moment over the generic one",
-            null="no generic stiffness is known",
+            null=_UNLOADED,
             low=0.0,
         ),
+        Column("status", "text", "how the calibration ended", allowed=tuple(Status)),
+        MESSAGE,
     ),
 )
 

@@ -8,28 +8,24 @@ import numpy as np
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import read_mark
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import JOINTS, PELVIS
+from spinepipe.motion.skeleton import PELVIS
 from spinepipe.motion.terms import Loads, Markers
 from spinepipe.status import Status
 from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, learns, seen_in
+from spinepipe.studies.tracking.drawn import drawn_rows
 from spinepipe.studies.tracking.laws import law_in
 from spinepipe.studies.tracking.marks import marks_of
+from spinepipe.studies.tracking.moved import IN_ORDER
 from spinepipe.studies.tracking.persons import Person, person_of, ratio_sets
 from spinepipe.studies.tracking.settings import Approach, Tracking
-from spinepipe.studies.tracking.tables import FITS, MARKER_OFF, TRACKED
-from spinepipe.studies.tracking.tables import PELVIS as PELVIS_NAME
+from spinepipe.studies.tracking.tables import DRAWN, FITS, MARKER_OFF, TRACKED
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.tables.schema import length_or_angle
-from spinepipe.units import BORDER_PER_SI, COORDINATES, DEG_PER_RAD, MM_PER_M
+from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, DEG_PER_RAD, MM_PER_M
 
 Row = dict[str, Any]
-
-NAMES = (PELVIS_NAME, *JOINTS)
-"""Of rows of the table, in the order of coordinates."""
-
-COLUMNS = tuple(f"{name}_{length_or_angle(name)}" for name in COORDINATES)
 
 _TURNS = slice(3, 6)
 
@@ -40,23 +36,29 @@ def run(
     specimen: str,
     trial: str,
     approach: Approach,
-    law: str,
     tracked: str,
     fits: str,
+    drawn: str,
+    law: list[str],
 ) -> None:
-    """Write rows of both tables; law : file of passive elements that are taken over, or empty."""
+    """Write a file for each table; law : the calibration that is taken over, if any."""
     settings, cohort = study_of_kind(Tracking, root, study)
     person = person_of(cohort, specimen, cohort.folder)
-    learnt = law_in(read_frame(law), person.passive) if law else None
+    taken = [law_in(read_frame(path), person.passive) for path in law]
+    learnt = taken[0] if taken else None
     known: Row = {"specimen": specimen, "trial": trial, "approach": approach}
     begun = time.process_time()
     found, message = _found(settings, person, trial, approach, learnt, ratio_sets(cohort))
     spent = time.process_time() - begun
-    made_by = provenance("track", settings, cohort, [specimen], marks_of(cohort, specimen))
+    others = [*marks_of(cohort, specimen), *(read_mark(path) for path in law)]
+    made_by = provenance("track", settings, cohort, [specimen], others)
     motion = list(motion_rows(found)) if found else []
     fit = fit_row(settings, found, spent) if found else failed_row(message)
     write(from_rows(TRACKED, [known | row for row in motion]), tracked, made_by)
     write(from_rows(FITS, [known | fit]), fits, made_by)
+    shown = approach in settings.drawn_approaches
+    scenes = drawn_rows(found.watched, found.q) if found and shown else ()
+    write(from_rows(DRAWN, [known | row for row in scenes]), drawn, made_by)
 
 
 def _found(
@@ -86,12 +88,12 @@ def motion_rows(found: Found) -> Iterator[Row]:
     times = found.watched.grid.times_s
     shown = found.q * BORDER_PER_SI
     for frame, now in enumerate(shown):
-        for name, values in zip(NAMES, now.tolist(), strict=True):
+        for name, values in zip(IN_ORDER, now.tolist(), strict=True):
             yield {
                 "frame": frame,
                 "joint": name,
                 "time_s": float(times[frame]),
-                **dict(zip(COLUMNS, values, strict=True)),
+                **dict(zip(COORDINATE_COLUMNS, values, strict=True)),
             }
 
 
@@ -159,5 +161,3 @@ def _squares(residuals: np.ndarray[Any, np.dtype[np.float64]]) -> float:
 
 def _rms(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-

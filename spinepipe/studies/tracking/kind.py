@@ -1,0 +1,175 @@
+"""The kind tracking: motions of the spine from markers on the skin, and what they tell of it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+from spinepipe.cohort import Cohort
+from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study_files import StudyFiles, numbered_blocks
+from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
+from spinepipe.studies.tracking.checks import check_recordings, check_tracking
+from spinepipe.studies.tracking.forms import FORMS
+from spinepipe.studies.tracking.marks import marks_of_motion, marks_of_tracking
+from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
+from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables import (
+    CLUSTERS,
+    DRAWN,
+    FITS,
+    PROFILE_POINTS,
+    PROFILES,
+    STIFFNESS,
+    TRACKED,
+)
+from spinepipe.studies.tracking.tables_of_studies import (
+    ACCURACY,
+    AGAINST_WANG_2021,
+    ERRORS,
+    RANGES,
+    SHARING,
+    SIMILARITY,
+    WEIGHTS,
+)
+
+_ANALYSES = (
+    Job("ranges", "", ("tracked",), ("ranges",)),
+    Job("sharing", "", ("tracked",), ("sharing",)),
+    Job("similarity", "", ("tracked",), ("similarity",)),
+    Job("errors", "", ("tracked",), ("errors",)),
+    Job("accuracy", "", ("errors",), ("accuracy",)),
+    Job(
+        "against_wang_2021",
+        "wang_2021.against",
+        (
+            *("accuracy", "errors", "ranges", "sharing", "similarity", "fits", "stiffness"),
+            "clusters",
+        ),
+        ("against_wang_2021",),
+    ),
+)
+
+_OF_MOTIONS = ("tracked", "fits", "drawn")
+_OF_PROFILES = ("profiles", "profile_points")
+
+
+@dataclass(frozen=True)
+class TrackingFiles(StudyFiles):
+    """The result files of one study of tracked motions.
+
+    Attributes
+    ----------
+    taken : calibration that each motion takes over, by specimen, trial and approach; None for none.
+    """
+
+    joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, "clusters", "weights")
+
+    study: Tracking
+    taken: Mapping[tuple[str, str, str], str | None]
+
+    @classmethod
+    def of(cls, study: Tracking, cohort: Cohort) -> "TrackingFiles":
+        """The files of a study of a cohort."""
+        names = cohort.specimen_names
+        taken: dict[tuple[str, str, str], str | None] = {
+            (name, trial, approach): calibrated_in(cohort, name, trial, approach)
+            for name in names
+            for trial, approach in tried(study, cohort, name)
+        }
+        return cls(study, names, taken)
+
+    @property
+    def laws(self) -> tuple[tuple[str, str], ...]:
+        """(specimen, calibration), each once."""
+        return tuple(dict.fromkeys((key[0], law) for key, law in self.taken.items() if law))
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """The tables that this study has."""
+        laws = ("stiffness",) if self.laws else ()
+        analysed = (name for job in _ANALYSES for name in job.writes)
+        return (*_OF_MOTIONS, *laws, *_OF_PROFILES, "clusters", "weights", *analysed)
+
+    @property
+    def made_of_jobs(self) -> tuple[str, ...]:
+        """The tables that are made of job files."""
+        return tuple(table for table in self.joined if table in self.tables)
+
+    def law_files(self, specimen: str, trial: str, approach: str) -> list[str]:
+        """The calibration that a motion takes over."""
+        law = self.taken[specimen, trial, approach]
+        return [] if law is None else [f"{self._of(specimen)}/law={law}/stiffness.parquet"]
+
+    def job_of(self, table: str, path: str) -> str:
+        """The job that writes a file of which a table is made."""
+        jobs = {"stiffness": "calibrate", "clusters": "clusters", "weights": "weigh"}
+        jobs |= dict.fromkeys(_OF_PROFILES, "profile")
+        return jobs.get(table, "track")
+
+    def blocks(self, table: str) -> list[tuple[str, str]]:
+        """One block per person."""
+        named = self.specimens
+        if table in _OF_PROFILES:
+            named = profiled_persons(self.study, self.specimens)
+        elif table == "weights":
+            named = self.specimens[:1]
+        return numbered_blocks(named, 1)
+
+    def job_files(self, table: str, specimen: str, block: str) -> list[str]:
+        """The job files of which a block is made."""
+        place = self._of(specimen)
+        return [f"{place}/{part}{table}.parquet" for part in self._parts(table, specimen)]
+
+    def _of(self, specimen: str) -> str:
+        return f"{self.folder}/jobs/specimen={specimen}"
+
+    def _parts(self, table: str, specimen: str) -> Iterator[str]:
+        """Folders of a person's job files."""
+        if table in _OF_MOTIONS:
+            for who, trial, approach in self.taken:
+                if who == specimen:
+                    yield f"trial={trial}/approach={approach}/"
+        elif table == "stiffness":
+            yield from (f"law={law}/" for who, law in self.laws if who == specimen)
+        elif table in _OF_PROFILES:
+            for region, coordinate in product(REGIONS, PROFILED):
+                yield f"region={region}/coordinate={coordinate}/"
+        else:
+            yield ""
+
+
+_COUNTED = ignoring("approaches", "profiles", "trade_off", "drawn_approaches")
+
+KIND = Kind(
+    settings=Tracking,
+    files=TrackingFiles,
+    checks=(check_tracking,),
+    checks_at_start=(check_recordings,),
+    tables=(
+        *(TRACKED, FITS, STIFFNESS, PROFILES, PROFILE_POINTS, CLUSTERS, DRAWN),
+        *(RANGES, SHARING, SIMILARITY, ERRORS, ACCURACY, WEIGHTS, AGAINST_WANG_2021),
+    ),
+    jobs=(
+        Job("calibrate", ignores=_COUNTED, also=marks_of_motion),
+        Job(
+            "track",
+            many=True,
+            ignores=ignoring("approaches", "profiles", "trade_off"),
+            also=marks_of_tracking,
+        ),
+        Job(
+            "profile",
+            ignores=ignoring("approaches", "trade_off", "drawn_approaches", "intervals"),
+            also=marks_of_motion,
+        ),
+        Job(
+            "weigh",
+            ignores=ignoring("approaches", "profiles", "drawn_approaches"),
+            also=marks_of_motion,
+        ),
+        Job("clusters", header_alone=False, ignores=_COUNTED, also=marks_of_motion),
+        *_ANALYSES,
+    ),
+    forms=(SUBJECTS, *FORMS),
+)

@@ -1,0 +1,155 @@
+"""Job: whether a person's markers tell the stiffness of a region.
+
+Passive elements of the region are held at so many times the generic size, all else is fitted anew:
+motions, all other elements, and how the region's own bend. What the fits cost beside the best of
+them is a profile likelihood (Raue 2009). The prior of what is held does not count, else it would
+close what markers leave open.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.motion.asked import Ask, Watched
+from spinepipe.motion.skeleton import JOINTS
+from spinepipe.motion.trajectory import solve
+from spinepipe.studies.tracking.approaches import first_guess, seen_in
+from spinepipe.studies.tracking.approaches_of_trials import BOTH
+from spinepipe.studies.tracking.calibrate import fitting
+from spinepipe.studies.tracking.marks import marks_of
+from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables import LIMIT, PROFILE_POINTS, PROFILES
+from spinepipe.tables import from_rows, write
+from spinepipe.units import COORDINATES
+
+REGIONS = {
+    "lumbar": slice(JOINTS.index("L5S1"), JOINTS.index("T12L1") + 1),
+    "lower_thoracic": slice(JOINTS.index("T11T12"), JOINTS.index("T6T7") + 1),
+    "upper_thoracic": slice(JOINTS.index("T5T6"), JOINTS.index("T1T2") + 1),
+}
+"""Joints whose elements are held together."""
+
+PROFILED = ("extension", "right_bending")
+
+Row = dict[str, Any]
+
+
+def run(
+    root: str,
+    study: str,
+    specimen: str,
+    region: str,
+    coordinate: str,
+    profiles: str,
+    profile_points: str,
+) -> None:
+    """Write the rows of a region and coordinate, a file for each table."""
+    settings, cohort = study_of_kind(Tracking, root, study)
+    person = person_of(cohort, specimen, cohort.folder)
+    made_by = provenance("profile", settings, cohort, [specimen], marks_of(cohort, specimen))
+    known: Row = {"specimen": specimen, "region": region, "coordinate": coordinate}
+    ratios = np.array(sorted(settings.profiles.ratios))
+    costs, message = _costs(settings, person, region, coordinate, ratios)
+    points = [known | row for row in point_rows(ratios, costs)]
+    write(from_rows(PROFILE_POINTS, points), profile_points, made_by)
+    write(from_rows(PROFILES, [known | verdict(ratios, costs, message)]), profiles, made_by)
+
+
+def _costs(
+    settings: Tracking, person: Person, region: str, coordinate: str, ratios: Array
+) -> tuple[Array, str]:
+    """(R,) least cost with each ratio, infinite where the fit did not settle."""
+    coarse = settings.model_copy(update={"intervals": settings.profiles.intervals})
+    ask = fitting(coarse, person)
+    try:
+        seen = [seen_in(coarse, person, one) for one in person.trials if one.kind in BOTH]
+        return profiled(ask, seen, held_in(ask, region, coordinate), ratios), ""
+    except (ValueError, np.linalg.LinAlgError) as why:
+        return np.full(len(ratios), np.inf), str(why)
+
+
+def held_in(ask: Ask, region: str, coordinate: str) -> Array:
+    """(P,) which parameters are held: the sizes of a region's elements."""
+    wanted = np.zeros_like(ask.fitted)
+    wanted[REGIONS[region], COORDINATES.index(coordinate)] = True
+    sizes = wanted[ask.fitted]
+    return np.concatenate([sizes, np.zeros_like(sizes)])
+
+
+def profiled(ask: Ask, seen: Sequence[Watched], held: Array, ratios: Array) -> Array:
+    """(R,) least costs; each fit begins where that of the ratio next to it, nearer to 1, ended."""
+    found = np.full(len(ratios), np.inf)
+    middle = int(np.argmin(np.abs(np.log(ratios))))
+    begin = [first_guess(ask, one) for one in seen]
+    for order in (range(middle, len(ratios)), range(middle, -1, -1)):
+        starts, parameters = begin, np.zeros(ask.parameters)
+        for k in order:
+            parameters = np.where(held, np.log(ratios[k]), parameters)
+            solved = solve(ask, seen, starts, parameters, held)
+            if not solved.status.usable:
+                break
+            starts, parameters = list(solved.coefficients), solved.parameters
+            prior = float(np.sum((parameters[held] / ask.sizes.size) ** 2))
+            found[k] = min(found[k], solved.costs.total - prior)
+    return found
+
+
+def point_rows(ratios: Array, costs: Array) -> list[Row]:
+    """What each ratio costs over the best."""
+    best = float(costs.min())
+    return [
+        {
+            "point": k,
+            "ratio": float(ratio),
+            "cost_over_best": float(cost) - best if np.isfinite(cost) else None,
+        }
+        for k, (ratio, cost) in enumerate(zip(ratios, costs, strict=True))
+    ]
+
+
+def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
+    """Which ratios are not excluded; an end is open where no ratio beyond it is."""
+    settled = np.isfinite(costs)
+    if not settled.any():
+        text = message or "no fit settled"
+        return _told(None, None, None, text)
+    at, over = np.log(ratios[settled]), costs[settled] - costs[settled].min()
+    best = int(np.argmin(over))
+    low, high = _crossing(at, over, best, -1), _crossing(at, over, best, 1)
+    lost = int((~settled).sum())
+    text = f"{lost} of {len(ratios)} fits did not settle" if lost else ""
+    return _told(float(np.exp(at[best])), low, high, text)
+
+
+def _crossing(at: Array, over: Array, best: int, way: int) -> float | None:
+    """The outermost ratio on a side at which the cost rises past the limit, straight in logs."""
+    inside = np.flatnonzero(over <= LIMIT)
+    edge = int(inside.max() if way > 0 else inside.min())
+    beyond = edge + way
+    if not 0 <= beyond < len(at):
+        return None
+    share = (LIMIT - over[edge]) / (over[beyond] - over[edge])
+    return float(np.exp(at[edge] + share * (at[beyond] - at[edge])))
+
+
+def _told(best: float | None, low: float | None, high: float | None, message: str) -> Row:
+    closed = (low is not None) + (high is not None)
+    return {
+        "best_ratio": best,
+        "low": low,
+        "high": high,
+        "open_below": low is None,
+        "open_above": high is None,
+        "verdict": ("not_told", "one_sided", "told")[closed],
+        "message": message,
+    }
+
+
+def profiled_persons(settings: Tracking, names: Sequence[str]) -> tuple[str, ...]:
+    """Persons whose markers are asked."""
+    return settings.profiles.specimens or tuple(names[:1])
