@@ -1,4 +1,4 @@
-"""How joints resist: drawn curves, or the control's exponentials. Moments over angles, as tables."""
+"""How joints resist: drawn curves, or the control's exponentials; moments over angles."""
 
 import numpy as np
 from numpy.typing import NDArray

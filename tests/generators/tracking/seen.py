@@ -29,8 +29,8 @@ class Errors:
     Attributes
     ----------
     placed_mm : markers on the body against where they are told to be. slides_mm : least and most
-        that skin slides over a vertebra at the whole flexion. noise_mm : of a frame. length : share by
-        which told lengths are off. tilt_deg : told tilts of joints. mass : told masses.
+        that skin slides over a vertebra at the whole flexion. noise_mm : of a frame. length : share
+        by which told lengths are off. tilt_deg : told tilts of joints. mass : told masses.
     """
 
     placed_mm: float = 3.0
