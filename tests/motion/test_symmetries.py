@@ -5,16 +5,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from moving_spine import everywhere, law, markers, spine
+from moving_spine import law, markers, spine
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.asked import Ask, Watched, watched
+from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, Trial
 from spinepipe.motion.trajectory import solve
 
 FRAMES, STEP_S = 101, 0.04
-ASK = Ask(passive=law())
+COSTS: tuple[ForceCost, ...] = ("minus_gravity", "level_difference")
+"""Squared loads have several least sums, see `test_squared_loads_fall_into_several_hollows`."""
 MIRROR = np.array([1.0, 1.0, -1.0])
 SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
 
@@ -45,12 +46,12 @@ def at_nodes(places: np.ndarray, on: MarkerSet, intervals: int) -> Watched:
     return watched(spine(), on, trial, intervals)
 
 
-def joints(trial: Watched, pelvis: np.ndarray, begin: float = 0.0) -> np.ndarray:
+def joints(cost: ForceCost, trial: Watched, pelvis: np.ndarray, begin: float = 0.0) -> np.ndarray:
     """(N + 1, 17, 6) from joints that are all at an angle, the pelvis where it is said to be."""
     q = np.zeros((trial.grid.intervals + 1, 18, 6))
     q[:, 0] = pelvis
     q[:, 1:, 3:] = begin
-    found = solve(ASK, [trial], [trial.grid.through(q)])
+    found = solve(Ask(passive=law(), force_cost=cost), [trial], [trial.grid.through(q)])
     return trial.grid.at_nodes(found.coefficients[0])[0][:, 1:]
 
 
@@ -59,38 +60,44 @@ def degrees_apart(first: np.ndarray, second: np.ndarray) -> float:
 
 
 @cache
-def plain(intervals: int) -> np.ndarray:
-    return joints(at_nodes(seen(), markers(), intervals), np.zeros(6))
+def plain(cost: ForceCost, intervals: int) -> np.ndarray:
+    return joints(cost, at_nodes(seen(), markers(), intervals), np.zeros(6))
 
 
-def test_where_the_laboratory_stands_changes_nothing() -> None:
+@pytest.mark.parametrize("cost", COSTS)
+def test_where_the_laboratory_stands_changes_nothing(cost: ForceCost) -> None:
     """Turned about the vertical and shifted: gravity pulls along the same axis."""
     turn = Rotation.from_euler("y", 35.0, degrees=True)
     shift = np.array([0.4, 0.1, -0.7])
     there = turn.apply(seen().reshape(-1, 3)).reshape(seen().shape) + shift
     pelvis = np.concatenate([shift, [0.0, 0.0, np.deg2rad(35.0)]])
-    found = joints(at_nodes(there, markers(), 20), pelvis)
-    assert degrees_apart(found, plain(20)) < 0.05
-    np.testing.assert_allclose(found[..., :3], plain(20)[..., :3], atol=1e-4)
+    found = joints(cost, at_nodes(there, markers(), 20), pelvis)
+    assert degrees_apart(found, plain(cost, 20)) < 0.05
+    np.testing.assert_allclose(found[..., :3], plain(cost, 20)[..., :3], atol=1e-4)
 
 
-def test_a_mirrored_trial_is_moved_in_the_mirror() -> None:
+@pytest.mark.parametrize("cost", COSTS)
+def test_a_mirrored_trial_is_moved_in_the_mirror(cost: ForceCost) -> None:
     on = markers()
     other = MarkerSet(on.names, on.body, on.at * MIRROR, on.weight, on.cluster)
-    found = joints(at_nodes(seen() * MIRROR, other, 20), np.zeros(6))
-    assert degrees_apart(found, plain(20) * SIGNS) < 1e-3
+    found = joints(cost, at_nodes(seen() * MIRROR, other, 20), np.zeros(6))
+    assert degrees_apart(found, plain(cost, 20) * SIGNS) < 1e-3
 
 
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("begin", [-0.05, 0.04])
-def test_where_the_search_begins_changes_nothing(begin: float) -> None:
-    found = joints(at_nodes(seen(), markers(), 20), np.zeros(6), begin)
-    assert degrees_apart(found, plain(20)) < 0.1
+def test_where_the_search_begins_changes_nothing(cost: ForceCost, begin: float) -> None:
+    found = joints(cost, at_nodes(seen(), markers(), 20), np.zeros(6), begin)
+    assert degrees_apart(found, plain(cost, 20)) < 0.1
 
 
 @pytest.mark.slow
-def test_more_nodes_change_little(record_property: Callable[[str, object], None]) -> None:
+@pytest.mark.parametrize("cost", COSTS)
+def test_more_nodes_change_little(
+    cost: ForceCost, record_property: Callable[[str, object], None]
+) -> None:
     """And make nothing vibrate: accelerations stay about as large as those of the truth."""
-    few, more, most = plain(25), plain(50), plain(100)
+    few, more, most = (plain(cost, n) for n in (25, 50, 100))
     assert degrees_apart(few, more[::2]) < 0.3
     assert degrees_apart(more, most[::2]) < 0.3
     sizes = [_rms(found, (FRAMES - 1) * STEP_S) for found in (few, more, most)]
@@ -105,9 +112,11 @@ def _rms(q: np.ndarray, long_s: float) -> float:
     return float(np.sqrt(np.mean(bent**2)))
 
 
-def test_everything_that_is_seen_settles_what_is_sought() -> None:
-    """With three markers on every body no start is told from another."""
-    places = marker_places(spine(), everywhere(), moved())
-    trial = at_nodes(places, everywhere(), 10)
-    first, second = (joints(trial, np.zeros(6), begin) for begin in (0.0, 0.05))
-    assert degrees_apart(first, second) < 0.05
+def test_squared_loads_fall_into_several_hollows() -> None:
+    """A known failure: weight buckles a soft spine either way, and where the search begins decides.
+
+    If this test fails, squared loads have become as good as the others, and docs are to say so.
+    """
+    trial = at_nodes(seen(), markers(), 10)
+    first, second = (joints("squared", trial, np.zeros(6), begin) for begin in (0.0, -0.05))
+    assert degrees_apart(first, second) > 1.0
