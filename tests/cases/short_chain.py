@@ -1,6 +1,7 @@
 """Two joints that turn, on a pelvis that stands still: small enough for CasADi and IPOPT."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -71,7 +72,9 @@ def by_ipopt(cost: ForceCost, folder: Path) -> Reference:
     """The same, by collocation in a process of its own."""
     given, result = folder / "asked.json", folder / "solved.json"
     given.write_text(json.dumps(_written(trial(), ask(cost))))
-    subprocess.run([sys.executable, str(SCRIPT), str(given), str(result)], check=True)
+    # OpenSim, if it was imported, has told children to load its own CasADi
+    own = {key: value for key, value in os.environ.items() if key != "LD_LIBRARY_PATH"}
+    subprocess.run([sys.executable, str(SCRIPT), str(given), str(result)], check=True, env=own)
     found = json.loads(result.read_text())
     return Reference(found["cost"], np.array(found["turns"]).reshape(-1, 2, 3), found["cpu_s"])
 
