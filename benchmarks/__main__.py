@@ -23,6 +23,7 @@ from benchmarks import (
     sensitivity,
     study,
     summary,
+    tracking,
     trunk,
 )
 from benchmarks.memory import processes
@@ -45,6 +46,7 @@ def main() -> None:
         "memory": memory_part,
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
+        "tracking": tracking_part,
         "trunk": trunk_part,
         "summary": lambda: summary.write(RESULTS),
     }
@@ -348,6 +350,43 @@ def trunk_part() -> None:
         "beside": asdict(beside),
     }
     _write("trunk", lines, {"machine": about, **data})
+
+
+def tracking_part() -> None:
+    """Tracked motions of 17 joints, and two joints beside CasADi and IPOPT."""
+    about = _about()
+    lines = _head("Motions from markers", about)
+    wholes, peak_mib = tracking.wholes(), tracking.memory_mib()
+    lines += [
+        "",
+        f"17 joints, {tracking.INTERVALS} intervals, loads `{tracking.COST}`. Goals: 5 s for one "
+        "trial, 20 s and 1 GB for both with all rotations' A and B fitted.",
+        "",
+        "| what | ended | steps | CPU s |",
+        "|---|---|---|---|",
+        *(f"| {row.what} | {row.status} | {row.steps} | {row.seconds:.1f} |" for row in wholes),
+        "",
+        f"Largest memory of a process that calibrates both: {peak_mib:.0f} MiB.",
+        "",
+        "Two joints, 20 intervals, the same problem by CasADi's collocation and IPOPT; here "
+        "the other 15 joints are carried along, locked.",
+        "",
+        "| loads | spinepipe s | IPOPT s | ratio | cost | IPOPT's |",
+        "|---|---|---|---|---|---|",
+    ]
+    beside = tracking.beside_ipopt()
+    lines += [
+        f"| {row.force_cost} | {row.ours_s:.3f} | {row.peer_s:.3f} | {row.ratio:.2f} "
+        f"| {row.ours:.5g} | {row.peer:.5g} |"
+        for row in beside
+    ]
+    print(*lines[8:], sep="\n", flush=True)
+    data = {
+        "wholes": [asdict(row) for row in wholes],
+        "peak_mib": peak_mib,
+        "beside": [{**asdict(row), "ratio": row.ratio} for row in beside],
+    }
+    _write("tracking", lines, {"machine": about, **data})
 
 
 def lost_fits_parts() -> None:

@@ -20,14 +20,14 @@ from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.muscles.upright import Upright
 from spinepipe.studies.study import COHORTS
-from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
+from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.persons import (
     NOMINAL,
     changed_task,
     regressions_of,
     source_of,
     standing,
-    subject_of,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.settings import TrunkLoads

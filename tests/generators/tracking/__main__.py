@@ -13,9 +13,15 @@ def main() -> None:
     parser.add_argument("--generator", choices=("torques", "muscles"), default="torques")
     parser.add_argument("--subjects", type=int, default=10)
     parser.add_argument("--plain", action="store_true", help="the control: exponentials, no errors")
+    parser.add_argument("--rate", type=float, default=50.0, help="frames a second")
+    parser.add_argument("--long", type=float, default=4.0, help="seconds that a bend takes")
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
-    cohort(Wanted(asked.seed, asked.generator, asked.subjects, asked.plain), asked.out)
+    wanted = Wanted(
+        *(asked.seed, asked.generator, asked.subjects, asked.plain, asked.rate, asked.long)
+    )
+    cohort(wanted, asked.out)
 
 
-main()
+if __name__ == "__main__":
+    main()

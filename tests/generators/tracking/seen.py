@@ -1,12 +1,14 @@
 """What is seen of a motion: markers on skin that slides, and what is told of the person."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tests.generators.tracking.laws import Array
 from tests.generators.tracking.moved import Motion
-from tests.generators.tracking.person import BODIES, Array, Person
+from tests.generators.tracking.person import BODIES, Person
 
 CLUSTERS = ("T1", "T3", "T7", "T11", "L2", "L4")
 SINGLES = ("T5", "T9", "T12", "L3")
@@ -26,20 +28,20 @@ class Errors:
 
     Attributes
     ----------
-    placed_mm : markers on the body against where they are told to be. slides_mm : farthest that
-        skin slides over a vertebra at the whole bend. noise_mm : of a frame. length : share by
-        which told lengths are off. tilt_deg : told tilts of joints. mass : told masses.
+    placed_mm : markers on the body against where they are told to be. slides_mm : least and most
+        that skin slides over a vertebra at the whole flexion. noise_mm : of a frame. length : share
+        by which told lengths are off. tilt_deg : told tilts of joints. mass : told masses.
     """
 
     placed_mm: float = 3.0
-    slides_mm: float = 14.0
+    slides_mm: tuple[float, float] = (10.0, 20.0)
     noise_mm: float = 0.35
     length: float = 0.025
     tilt_deg: float = 1.5
     mass: float = 0.06
 
 
-EXACT = Errors(0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
+EXACT = Errors(0.0, (0.0, 0.0), 0.2, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class Worn:
 
     Attributes
     ----------
-    slides : (K, 3) m at the whole bend, in the body's axes.
+    slides : (K, 3) m at the whole flexion, in the body's axes.
     """
 
     names: tuple[str, ...]
@@ -62,31 +64,38 @@ class Worn:
 def worn(person: Person, rng: np.random.Generator, errors: Errors) -> Worn:
     """The protocol of Wang 2021: 22 markers on the spine, five on the pelvis."""
     scale = person.height_m / 1.75
-    names, body, at, cluster, slides = [], [], [], [], []
+    names, body, at, slides = [], [], [], []
     for name in (*CLUSTERS, *SINGLES):
-        k = BODIES.index(name)
-        ahead = scale * np.array([-62.0 - 10.0 * (name[0] == "L"), -8.0, 0.0])
-        middle = person.steps[k, 1] * 500.0 if k < 17 else 9.0
-        slide = rng.uniform(0.5, 1.0) * errors.slides_mm * np.array([0.15, -1.0, 0.0])
-        arms = ARMS_MM if name in CLUSTERS else ((0.0, 0.0, 0.0),)
-        for number, arm in enumerate(arms):
-            names.append(f"{name}_{'abc'[number]}" if name in CLUSTERS else name)
-            body.append(k)
-            at.append(ahead + [0.0, middle, 0.0] + np.array(arm))
-            cluster.append(name if name in CLUSTERS else "")
+        slide = rng.uniform(*errors.slides_mm) * np.array([0.15, -1.0, 0.0])
+        for marker, place in _on_a_vertebra(person, name):
+            names.append(marker)
+            body.append(BODIES.index(name))
+            at.append(place)
             slides.append(slide)
-    for name, place in PELVIS_MM.items():
+    for name, place_mm in PELVIS_MM.items():
         names.append(name)
         body.append(0)
-        at.append(scale * np.array(place))
-        cluster.append("")
-        slides.append(rng.uniform(0.0, 0.4) * errors.slides_mm * np.array([0.3, -1.0, 0.0]))
-    told = 1e-3 * np.array(at)
-    off = {k: rng.normal(0.0, 1e-3 * errors.placed_mm, 3) for k in dict.fromkeys(body)}
-    on = np.array([off[k] if k else rng.normal(0.0, 1e-3 * errors.placed_mm, 3) for k in body])
-    return Worn(
-        *(tuple(names), np.array(body), told + on, told, 1e-3 * np.array(slides), tuple(cluster))
-    )
+        at.append(1e-3 * scale * np.array(place_mm))
+        slides.append(rng.uniform(0.0, 0.3) * errors.slides_mm[1] * np.array([0.3, -1.0, 0.0]))
+    spread = 1e-3 * errors.placed_mm
+    together = {k: rng.normal(0.0, spread, 3) for k in dict.fromkeys(body)}
+    off = np.array([together[k] if k else rng.normal(0.0, spread, 3) for k in body])
+    told = np.array(at)
+    cluster = tuple(name[:-2] if name[:-2] in CLUSTERS else "" for name in names)
+    return Worn(tuple(names), np.array(body), told + off, told, 1e-3 * np.array(slides), cluster)
+
+
+def _on_a_vertebra(person: Person, name: str) -> Iterator[tuple[str, Array]]:
+    """Markers and where they are told to be, m: three arms of a cluster, or one."""
+    k, scale = BODIES.index(name), person.height_m / 1.75
+    behind = scale * (-62.0 - 10.0 * (name[0] == "L"))
+    middle = 500.0 * person.steps[k, 1] if k < 17 else 9.0
+    place = np.array([behind, middle - 8.0 * scale, 0.0])
+    if name not in CLUSTERS:
+        yield name, 1e-3 * place
+        return
+    for letter, arm in zip("abc", ARMS_MM, strict=True):
+        yield f"{name}_{letter}", 1e-3 * (place + np.array(arm))
 
 
 def seen(motion: Motion, markers: Worn, rng: np.random.Generator, errors: Errors) -> Array:
