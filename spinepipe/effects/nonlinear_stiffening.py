@@ -98,9 +98,9 @@ class NonlinearStiffening(CarriedShare):
         return magnitude(q, ROUNDED_M if self.coordinate in TRANSLATIONS else ROUNDED_RAD)
 
 
-def _exponential(v: Array) -> tuple[Array, Array]:
-    """``(exp(v) - 1) / v - 1`` and its derivative by v."""
-    at, beyond = np.minimum(v, STEEPEST_EXPONENT), np.maximum(v - STEEPEST_EXPONENT, 0.0)
+def exponential_rise(v: Array, steepest: float = STEEPEST_EXPONENT) -> tuple[Array, Array]:
+    """``(exp(v) - 1) / v - 1`` and its derivative by v; the exponential goes on straight."""
+    at, beyond = np.minimum(v, steepest), np.maximum(v - steepest, 0.0)
     rise, slope = np.expm1(at) + beyond * np.exp(at), np.exp(at)
     near = np.abs(v) < _NEAR_ZERO
     safe = np.where(near, 1.0, v)
@@ -126,7 +126,7 @@ def _cubic(v: Array) -> tuple[Array, Array]:
 
 
 _SHARES: dict[str, Callable[[Array], tuple[Array, Array]]] = {
-    "exponential": _exponential,
+    "exponential": exponential_rise,
     "tangent": _tangent,
     "cubic": _cubic,
 }

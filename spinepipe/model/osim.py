@@ -4,20 +4,19 @@ All body frames lie on ground in the neutral pose, so centres of mass, inertias 
 stand in the file as the model has them.
 """
 
-import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from math import atan2, cos, hypot, sin
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.files import appearing
 from spinepipe.frames import Pose
+from spinepipe.model import osim_parts as parts
+from spinepipe.model.osim_parts import NAME, listed, numbers, told
 from spinepipe.model.spine import Body, LoadCase, RefusedModel, SpineModel
-from spinepipe.units import COORDINATES
 
 BUSHING_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(3, 3) columns: x, y, z of a bushing's frames in joint axes, which are the joint's z, x, y.
@@ -32,19 +31,6 @@ BUSHING_TRANSLATIONS = (2, 0, 1)
 TOKEN_MASS_KG = 1e-3
 TOKEN_INERTIA_KG_M2 = 1e-6 * np.eye(3)
 """OpenSim cannot move a body without mass or inertia; at rest neither of these loads a joint."""
-
-NAME = re.compile(r"[A-Za-z0-9_.-]+")
-"""OpenSim separates paths by / and reads lists of names by spaces."""
-
-AXES = (
-    ("rotation1", "extension", "0 0 1"),
-    ("rotation2", "right_bending", "1 0 0"),
-    ("rotation3", "left_rotation", "0 1 0"),
-    ("translation1", "anterior", "1 0 0"),
-    ("translation2", "superior", "0 1 0"),
-    ("translation3", "right", "0 0 1"),
-)
-"""OpenSim's transform axes: rotations first, each about an axis the one before it has moved."""
 
 
 def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
@@ -66,23 +52,22 @@ def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
     """
     stiffness = _stiffness(model, loads)
     _check_names(model)
-    document = Element("OpenSimDocument", Version="40000")
+    document = parts.document()
     root = SubElement(document, "Model", name=model.specimen)
-    _text(root, "credits", _credits(model))
-    _text(root, "gravity", _numbers(model.gravity))
-    bodies, joints, forces = (_set(root, kind) for kind in ("Body", "Joint", "Force"))
+    told(root, "credits", _credits(model))
+    told(root, "gravity", numbers(model.gravity))
+    bodies, joints, forces = (listed(root, kind) for kind in ("Body", "Joint", "Force"))
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
     for j, (lower, upper) in enumerate(pairwise(paths)):
         bodies.append(_body(model.bodies[j]))
-        joints.append(_joint(model.joints[j], model.frames[j], lower, upper))
+        frame = model.frames[j]
+        joints.append(parts.joint(model.joints[j], (lower, frame), (upper, frame)))
         law = _bushing(f"{model.joints[j]}_bushing", model.frames[j], lower, upper)
         _resist(law, "stiffness", stiffness[j])
         _resist(law, "damping", model.damping[j])
         forces.append(law)
     forces.extend([] if loads is None else _prescribed_forces(loads, paths[1:]))
-    indent(document)
-    text = tostring(document, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+    return parts.written(document)
 
 
 def write_osim(model: SpineModel, path: str | Path, loads: LoadCase | None = None) -> None:
@@ -135,63 +120,22 @@ def _credits(model: SpineModel) -> str:
 
 def _body(body: Body) -> Element:
     inertia = body.inertia if body.inertia.any() else TOKEN_INERTIA_KG_M2
-    element = Element("Body", name=body.name)
-    _text(element, "mass", repr(float(body.mass or TOKEN_MASS_KG)))
-    _text(element, "mass_center", _numbers(body.com))
-    _text(element, "inertia", _numbers(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]))
-    return element
-
-
-def _joint(name: str, frame: Pose, lower: str, upper: str) -> Element:
-    element = Element("CustomJoint", name=name)
-    _text(element, "socket_parent_frame", "lower")
-    _text(element, "socket_child_frame", "upper")
-    coordinates = SubElement(element, "coordinates")
-    for coordinate in COORDINATES:
-        SubElement(coordinates, "Coordinate", name=f"{name}_{coordinate}")
-    element.append(_offset_frames(frame, lower, upper))
-    transform = SubElement(element, "SpatialTransform")
-    for axis, coordinate, direction in AXES:
-        motion = SubElement(transform, "TransformAxis", name=axis)
-        _text(motion, "coordinates", f"{name}_{coordinate}")
-        _text(motion, "axis", direction)
-        _text(SubElement(motion, "LinearFunction", name="function"), "coefficients", "1 0")
-    return element
+    return parts.body(body.name, body.mass or TOKEN_MASS_KG, body.com, inertia)
 
 
 def _bushing(name: str, frame: Pose, lower: str, upper: str) -> Element:
     element = Element("BushingForce", name=name)
-    _text(element, "socket_frame1", "lower")
-    _text(element, "socket_frame2", "upper")
+    told(element, "socket_frame1", "lower")
+    told(element, "socket_frame2", "upper")
     turned = Pose(frame.rotation @ BUSHING_AXES, frame.origin)
-    element.append(_offset_frames(turned, lower, upper))
+    element.append(parts.offset_frames((lower, turned), (upper, turned)))
     return element
 
 
 def _resist(bushing: Element, kind: str, values: Array) -> None:
     """Stiffness or damping (6,) of a bushing, in the order of its own axes."""
-    _text(bushing, f"rotational_{kind}", _numbers(values[3:]))
-    _text(bushing, f"translational_{kind}", _numbers(values[list(BUSHING_TRANSLATIONS)]))
-
-
-def _offset_frames(frame: Pose, lower: str, upper: str) -> Element:
-    """The same frame on both bodies: both lie on ground when neutral."""
-    frames = Element("frames")
-    for name, body in (("lower", lower), ("upper", upper)):
-        offset = SubElement(frames, "PhysicalOffsetFrame", name=name)
-        _text(offset, "socket_parent", body)
-        _text(offset, "translation", _numbers(frame.origin))
-        _text(offset, "orientation", _numbers(_xyz_angles(frame.rotation)))
-    return frames
-
-
-def _xyz_angles(rotation: Array) -> tuple[float, float, float]:
-    """Angles in rad with ``R = Rx(a) Ry(b) Rz(c)``; c from ``Rx(-a) R`` stays exact at b = 90°."""
-    (_, _, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
-    a = atan2(-yz, zz)
-    b = atan2(xz, hypot(yz, zz))
-    c = atan2(cos(a) * yx + sin(a) * zx, cos(a) * yy + sin(a) * zy)
-    return a, b, c
+    told(bushing, f"rotational_{kind}", numbers(values[3:]))
+    told(bushing, f"translational_{kind}", numbers(values[list(BUSHING_TRANSLATIONS)]))
 
 
 def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
@@ -206,9 +150,9 @@ def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
     elements = []
     for number, ((body, point), history) in enumerate(wrenches.items()):
         element = Element("PrescribedForce", name=f"load_{number}")
-        _text(element, "socket_frame", paths[body])
-        _text(element, "pointIsGlobal", "false")
-        _text(element, "forceIsGlobal", "true")
+        told(element, "socket_frame", paths[body])
+        told(element, "pointIsGlobal", "false")
+        told(element, "forceIsGlobal", "true")
         _functions(element, "forceFunctions", [_function(times, f) for f in history.T[:3]])
         _functions(element, "pointFunctions", [_function((), (p,)) for p in point])
         _functions(element, "torqueFunctions", [_function(times, m) for m in history.T[3:]])
@@ -232,23 +176,9 @@ def _function(times: Sequence[float], values: Sequence[float] | Array) -> Elemen
     """A constant, or lines through the values: level outside, as OpenSim extends the end pieces."""
     if len(values) == 1:
         element = Element("Constant")
-        _text(element, "value", repr(float(values[0])))
+        told(element, "value", repr(float(values[0])))
         return element
     element = Element("PiecewiseLinearFunction")
-    _text(element, "x", _numbers([times[0] - 1.0, *times, times[-1] + 1.0]))
-    _text(element, "y", _numbers([values[0], *values, values[-1]]))
+    told(element, "x", numbers([times[0] - 1.0, *times, times[-1] + 1.0]))
+    told(element, "y", numbers([values[0], *values, values[-1]]))
     return element
-
-
-def _set(model: Element, kind: str) -> Element:
-    """The list of objects in one of the model's sets."""
-    named = SubElement(model, f"{kind}Set", name=f"{kind.lower()}set")
-    return SubElement(named, "objects")
-
-
-def _text(parent: Element, tag: str, text: str) -> None:
-    SubElement(parent, tag).text = text
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)

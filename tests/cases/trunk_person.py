@@ -12,8 +12,9 @@ from spinepipe.muscles.settle import Held, How, held
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
-from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
-from spinepipe.studies.trunk_loads.persons import regressions_of, source_of, standing, subject_of
+from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.trunk_loads.forms import TASKS
+from spinepipe.studies.trunk_loads.persons import regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 

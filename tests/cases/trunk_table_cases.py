@@ -13,7 +13,8 @@ from trunk_cases import made_up_trunk
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY
-from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
+from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
 from spinepipe.studies.trunk_loads.tables import (

@@ -10,7 +10,8 @@ from spinepipe.muscles.pose import BodyPoses, rotation_of_vector
 from spinepipe.muscles.settle import Held, held
 from spinepipe.muscles.stability import _joints, smallest_eigenvalue, stiffness
 from spinepipe.muscles.trunk import LEVELS
-from spinepipe.studies.trunk_loads.persons import regressions_of, source_of, standing, subject_of
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.persons import regressions_of, source_of, standing
 
 GAIN = 5.0
 

@@ -18,14 +18,9 @@ from spinepipe.muscles.folder import Tables, source_of_folder
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
-from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
-from spinepipe.studies.trunk_loads.persons import (
-    how_of,
-    regressions_of,
-    source_of,
-    standing,
-    subject_of,
-)
+from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.trunk_loads.forms import TASKS
+from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, Volunteer
 from spinepipe.studies.trunk_loads.tune import rows_of, volunteer_of
 

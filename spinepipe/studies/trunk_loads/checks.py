@@ -10,21 +10,13 @@ from spinepipe.cohort.text import Document
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names
+from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
-from spinepipe.studies.trunk_loads.forms import SEXES, SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.geometry_forms import MUSCLE_PARAMETERS, MUSCLES
 from spinepipe.studies.trunk_loads.persons import regressions_of, source_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-
-HEIGHT_CM = (120.0, 220.0)
-MASS_KG = (30.0, 300.0)
-BMI = (14.0, 55.0)
-
-LARGEST_HEIGHT_M = 3.0
-"""A height that is no more than this is in metres."""
-
-STANDARD_GRAVITY = 9.80665
 
 _FIRST_ROW = 2
 """Line of a file below its header."""
@@ -39,7 +31,7 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
             remedy = f"add {form.file}, or name another cohort"
             yield Problem(*at(document, "cohort"), found, allowed, remedy)
     if "subjects" in further:
-        yield from _subjects(cohort, further["subjects"])
+        yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
         tallest = _tallest(further.get("subjects"))
         file = f"{cohort.name}/{TASKS.file}"
@@ -100,48 +92,6 @@ def _regressions(study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
         regressions_of(study, cohort.folder)
     except InputError as error:
         yield from error.problems
-
-
-def _subjects(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:
-    """One row for each specimen (the reader sees to it that it is one), and bodies that exist."""
-    file = f"{cohort.name}/{SUBJECTS.file}"
-    known = set(rows["specimen"])
-    for name in cohort.specimen_names:
-        if name not in known:
-            found = f"no row of '{name}'"
-            remedy = "add sex, age, height and mass, or delete it from specimens.csv"
-            yield Problem(file, None, "specimen", found, "every specimen of specimens.csv", remedy)
-    for line, row in rows.iterrows():
-        place = (file, int(str(line)))
-        if row["sex"] not in SEXES:
-            remedy = did_you_mean(str(row["sex"]).lower(), SEXES, "write male or female")
-            yield Problem(*place, "sex", f"'{row['sex']}'", one_of(SEXES), remedy)
-        yield from _size(place, str(row["specimen"]), row["height_cm"], row["mass_kg"])
-
-
-def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[Problem]:
-    """Height and mass each by itself; only where both can be, the two together."""
-    if not HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
-        remedy = "correct it"
-        if cm <= LARGEST_HEIGHT_M:
-            remedy = f"is it in m? write {100.0 * cm:g}"
-        elif HEIGHT_CM[0] <= cm / 10.0 <= HEIGHT_CM[1]:
-            remedy = f"is it in mm? write {cm / 10.0:g}"
-        yield Problem(*place, "height_cm", f"{who} is {cm:g} cm tall", _range(HEIGHT_CM), remedy)
-    if not MASS_KG[0] <= kg <= MASS_KG[1]:
-        remedy = "correct it"
-        if kg > MASS_KG[1]:
-            remedy = f"is it the weight in N? write {kg / STANDARD_GRAVITY:.1f}"
-        yield Problem(*place, "mass_kg", f"{who} weighs {kg:g} kg", _range(MASS_KG), remedy)
-    elif HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
-        bmi = kg / (cm / 100.0) ** 2
-        if not BMI[0] <= bmi <= BMI[1]:
-            found = f"{who} has a BMI of {bmi:.1f} ({kg:g} kg, {cm:g} cm)"
-            yield Problem(*place, "mass_kg", found, _range(BMI), "correct height or mass")
-
-
-def _range(pair: tuple[float, float]) -> str:
-    return f"{pair[0]:g} to {pair[1]:g}"
 
 
 def _tallest(subjects: pd.DataFrame | None) -> float | None:

@@ -1,4 +1,4 @@
-"""What a user writes down: `subjects.csv`, who they are, and `tasks.csv`, what they hold.
+"""What a user writes down of what persons hold: `tasks.csv`.
 
 Rotations are those of bodies in ground, extension, right bending and left rotation positive, so a
 bend forwards by 50 deg is -50. They are counted from the subject's upright posture or from the
@@ -13,7 +13,6 @@ from spinepipe.muscles.task import Tone
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.units import ROTATIONS, TRANSLATIONS
 
-SEXES = ("male", "female")
 UPRIGHT, SOURCE = "upright", "source"
 FORCE, MOMENT = "force", "moment"
 
@@ -51,20 +50,6 @@ def _turns(what: str, meaning: str) -> tuple[Column, ...]:
 HANDS = tuple(f"hands_{way}_mm" for way in TRANSLATIONS)
 PUSH_N = tuple(f"push_{way}_n" for way in TRANSLATIONS)
 PUSH_NM = tuple(f"push_{axis}_nm" for axis in ROTATIONS)
-
-SUBJECTS = TableForm(
-    "subjects",
-    "specimen",
-    (
-        Column("specimen", "person, as listed in specimens.csv", "text", required=True),
-        Column("sex", "male or female", "text", required=True),
-        Column("age_years", "age", required=True, low=0, high=130),
-        Column("height_cm", "standing height", required=True, low=0, open_low=True),
-        Column("mass_kg", "body mass", required=True, low=0, open_low=True),
-    ),
-    keys=("specimen",),
-    places=True,
-)
 
 TASKS = TableForm(
     "tasks",

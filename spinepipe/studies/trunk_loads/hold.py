@@ -20,13 +20,13 @@ from spinepipe.muscles.task import Task
 from spinepipe.muscles.tone import least_stable
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.progress import Progress
+from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.persons import (
     Standing,
     how_of,
     regressions_of,
     source_of,
     standing,
-    subject_of,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import (

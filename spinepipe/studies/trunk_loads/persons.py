@@ -97,14 +97,6 @@ def regressions_of(settings: TrunkLoads, folder: Path) -> Regressions:
     return read_regressions(folder / settings.regressions, file)
 
 
-def subject_of(cohort: Cohort, specimen: str) -> Subject:
-    """A person of `subjects.csv`."""
-    rows = cohort.further["subjects"]
-    row = rows[rows["specimen"] == specimen].iloc[0]
-    height = float(row["height_cm"]) / CM_PER_M
-    return Subject(row["sex"], float(row["age_years"]), height, float(row["mass_kg"]))
-
-
 def changed_subject(subject: Subject, values: Values) -> Subject:
     """The person with another height, age and body mass index."""
     height = subject.height_m + values.get("height_cm", 0.0) / CM_PER_M

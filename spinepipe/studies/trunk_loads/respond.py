@@ -8,13 +8,13 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.settle import held
 from spinepipe.progress import Progress
+from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.persons import (
     changed_task,
     how_of,
     regressions_of,
     source_of,
     standing,
-    subject_of,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row

@@ -11,13 +11,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.settle import Held, How, acted_on, held
 from spinepipe.muscles.task import Task
-from spinepipe.studies.trunk_loads.persons import (
-    how_of,
-    regressions_of,
-    source_of,
-    standing,
-    subject_of,
-)
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads

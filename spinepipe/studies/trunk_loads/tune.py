@@ -19,6 +19,7 @@ from spinepipe.muscles.trunk import Trunk
 from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
+from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
 from spinepipe.studies.trunk_loads.persons import (
     NOMINAL,
@@ -27,7 +28,6 @@ from spinepipe.studies.trunk_loads.persons import (
     regressions_of,
     source_of,
     standing,
-    subject_of,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row

@@ -15,9 +15,10 @@ from spinepipe.cohort.text import Document
 from spinepipe.muscles import myo_sim
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
-from spinepipe.studies.trunk_loads.forms import SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.geometry_forms import GEOMETRY_FORMS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 

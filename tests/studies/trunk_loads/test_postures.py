@@ -9,8 +9,9 @@ import pytest
 from spinepipe import cohort as cohorts
 from spinepipe.cohort.text import Document
 from spinepipe.muscles.task import Task
+from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_trunk
-from spinepipe.studies.trunk_loads.forms import HANDS, PUSH_N, PUSH_NM, SUBJECTS, TASKS
+from spinepipe.studies.trunk_loads.forms import HANDS, PUSH_N, PUSH_NM, TASKS
 from spinepipe.studies.trunk_loads.postures import between, read_tasks, rhythm, shares, task_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import ROTATIONS

@@ -17,14 +17,9 @@ from spinepipe.muscles.folder import Tables, source_of_folder
 from spinepipe.muscles.settle import held
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
+from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads import hold, respond, simplify, spread, tune
-from spinepipe.studies.trunk_loads.persons import (
-    how_of,
-    regressions_of,
-    source_of,
-    standing,
-    subject_of,
-)
+from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.sampling import design_of
 from spinepipe.studies.trunk_loads.settings import Uncertain, Volunteer

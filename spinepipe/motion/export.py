@@ -1,0 +1,84 @@
+"""A tracked spine as an OpenSim model, and its motion, so that OpenSim replays it.
+
+Bodies, joints and coordinates are ours: the pelvis moves in ground, and each vertebra in the joint
+below it, by three translations and by rotations Z, X', Y''. Passive elements are left out: they are
+two-sided exponentials, for which OpenSim has no force.
+"""
+
+from itertools import pairwise
+from pathlib import Path
+from xml.etree.ElementTree import SubElement
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.files import appearing
+from spinepipe.frames import Pose
+from spinepipe.model import STANDARD_GRAVITY, RefusedModel
+from spinepipe.model import osim_parts as parts
+from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Skeleton
+from spinepipe.units import COORDINATES, DEG_PER_RAD, TRANSLATIONS
+
+PELVIS_JOINT = "pelvis"
+"""What moves the pelvis in ground."""
+
+COLUMNS = tuple(f"{joint}_{name}" for joint in (PELVIS_JOINT, *JOINTS) for name in COORDINATES)
+"""Coordinates of the model, as a posture has them."""
+
+_PER_SI = np.array([1.0 if name in TRANSLATIONS else DEG_PER_RAD for name in COORDINATES])
+_HERE = Pose(np.eye(3), np.zeros(3))
+
+
+def write_osim(path: str | Path, skeleton: Skeleton, markers: MarkerSet, name: str) -> None:
+    """Write the model of a skeleton; the file appears whole or not at all.
+
+    Raises
+    ------
+    RefusedModel
+        Of names that OpenSim cannot take.
+    """
+    text = osim(skeleton, markers, name)
+    with appearing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_mot(path: str | Path, name: str, time_s: Array, q: Array) -> None:
+    """Write postures (F, 18, 6) m and rad at times (F,), in m and deg; the file appears whole."""
+    text = mot(name, time_s, q)
+    with appearing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
+    """OpenSim document of a skeleton and its markers. Raises what `write_osim` raises."""
+    for one in (name, *markers.names):
+        if not parts.NAME.fullmatch(one):
+            raise RefusedModel(
+                f"{name}: OpenSim cannot take the name {one!r}; use letters, digits, _ . and - only"
+            )
+    document = parts.document()
+    model = SubElement(document, "Model", name=name)
+    parts.told(model, "credits", "Written by spinepipe. Units: m, kg, s, N, rad.")
+    parts.told(model, "gravity", parts.numbers(STANDARD_GRAVITY))
+    bodies, joints, listed = (parts.listed(model, kind) for kind in ("Body", "Joint", "Marker"))
+    masses = skeleton.masses
+    for k, body in enumerate(BODIES):
+        about = masses.about_com[k]
+        bodies.append(parts.body(body, float(masses.kg[k]), masses.com[k], about))
+    paths = ("/ground", *(f"/bodyset/{body}" for body in BODIES))
+    steps = (_HERE, *skeleton.steps)
+    named = zip((PELVIS_JOINT, *JOINTS), pairwise(paths), steps, strict=True)
+    for joint, (lower, upper), step in named:
+        joints.append(parts.joint(joint, (lower, step), (upper, _HERE)))
+    for marker, on, at in zip(markers.names, markers.body, markers.at, strict=True):
+        listed.append(parts.marker(marker, paths[on + 1], at))
+    return parts.written(document)
+
+
+def mot(name: str, time_s: Array, q: Array) -> str:
+    """OpenSim's motion file of postures (F, 18, 6) m and rad at times (F,) s: m and deg."""
+    rows = np.column_stack([time_s, (q * _PER_SI).reshape(len(q), -1)])
+    head = (name, "version=1", f"nRows={len(rows)}", f"nColumns={rows.shape[1]}", "inDegrees=yes")
+    lines = [*head, "endheader", "\t".join(("time", *COLUMNS))]
+    lines += ["\t".join(f"{value:.15g}" for value in row) for row in rows.tolist()]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,137 @@
+"""Each frame by itself: inverse kinematics, with and without ratios, springs or loads.
+
+Levenberg-Marquardt on all frames at once. What no marker tells about stays where it was, since
+steps are as short as can be (a small damping); ratios between joints are a linear map of fewer
+numbers to all coordinates (Christophy 2012, Bruno 2015).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.motion.asked import SHAPE, Ask, Watched
+from spinepipe.motion.points import COUNT, marker_places
+from spinepipe.motion.skeleton import PELVIS
+from spinepipe.motion.terms import Loads, Markers, beyond
+
+MOST_STEPS = 400
+SHORTEST = 1e-7
+"""rad and m, largest step of the last round, or"""
+
+SMALL = 1e-10
+"""share of the cost by which it changed that."""
+
+_RIDGE = 1e-8
+"""Of the largest diagonal: what is not seen does not move."""
+
+
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """Postures of frames.
+
+    Attributes
+    ----------
+    q : (F, 18, 6) m and rad. settled : (F,) whether steps became short. steps : rounds.
+    """
+
+    q: Array
+    settled: Array
+    steps: int
+
+
+def postures(ask: Ask, watched: Watched, ratios: Array | None = None) -> Postures:
+    """Postures of all nodes of a trial.
+
+    Parameters
+    ----------
+    ratios : (108, n) what each of fewer numbers makes of all coordinates; None for the free
+        coordinates themselves.
+    """
+    whole = np.eye(COUNT)[:, ask.free.reshape(-1)] if ratios is None else ratios
+    frames = len(watched.places)
+    q = np.zeros((frames, *SHAPE))
+    q[:, PELVIS, :3] = _first_place(watched)
+    q, _, _ = _rounds(_stiff(ask), watched, q, np.eye(COUNT)[:, :6])
+    q, steps, settled = _rounds(ask, watched, q, whole)
+    return Postures(q, settled, steps)
+
+
+def _first_place(watched: Watched) -> Array:
+    """(F, 3) m, where the pelvis is if it and all above it stand as in the neutral posture."""
+    seen = watched.weight > 0.0
+    neutral = marker_places(watched.skeleton, watched.markers, np.zeros((1, *SHAPE)))[0]
+    on_pelvis = np.asarray(watched.markers.body) == PELVIS
+    count = seen & on_pelvis
+    count = np.where(count.any(axis=1)[:, None], count, seen)
+    apart = (watched.places - neutral) * count[..., None]
+    found: Array = apart.sum(axis=1) / np.maximum(count.sum(axis=1), 1)[:, None]
+    return found
+
+
+def _stiff(ask: Ask) -> Ask:
+    return replace(ask, loads=False, passive=None)
+
+
+def _rounds(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, int, Array]:
+    """Steps of each frame until they are short; each frame has its own damping."""
+    damping, q = np.full(len(q), 1e-4), q.copy()
+    cost, settled = _cost(ask, watched, q), np.zeros(len(q), dtype=bool)
+    steps = 0
+    while steps < MOST_STEPS and not settled.all():
+        steps += 1
+        left = np.flatnonzero(~settled)
+        seen = replace(watched, places=watched.places[left], weight=watched.weight[left])
+        square, down = _normal(ask, seen, q[left], whole)
+        diagonal = np.einsum("fii->fi", square)
+        ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)
+        grown = square + (damping[left, None] * diagonal + ridge)[:, :, None] * np.eye(len(whole.T))
+        move = -np.linalg.solve(grown, down[..., None])[..., 0]
+        there = q[left] + (move @ whole.T).reshape(-1, *SHAPE)
+        found = _cost(ask, seen, there)
+        better = found <= cost[left]
+        short = np.abs(move).max(axis=1) < SHORTEST
+        settled[left] = short | (better & (cost[left] - found <= SMALL * cost[left]))
+        q[left[better]], cost[left[better]] = there[better], found[better]
+        by = np.where(better, 0.2, 10.0) * damping[left]
+        damping[left] = np.clip(by, 1e-12, 1e8)
+    return q, steps, settled
+
+
+def _cost(ask: Ask, watched: Watched, q: Array) -> Array:
+    """(F,) of postures at rest."""
+    found = np.sum(Markers(watched, ask).residuals(q) ** 2, axis=1)
+    found += np.sum(beyond(ask, q)[0] ** 2, axis=(1, 2))
+    if ask.loads:
+        rest = np.zeros_like(q)
+        off = Loads.of(watched, ask).residuals(ask.passive, (q, rest, rest))
+        return np.asarray(found + np.sum(off**2, axis=1))
+    if ask.passive is not None:
+        found += np.sum(_stretched(ask, q)[0] ** 2, axis=1)
+    return np.asarray(found)
+
+
+def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, Array]:
+    """(F, n, n) and (F, n)."""
+    off, slopes = Markers(watched, ask).with_slopes(q)
+    rows = [(off, slopes @ whole)]
+    if ask.loads:
+        rest = np.zeros_like(q)
+        load, by_motion, _ = Loads.of(watched, ask).with_slopes(ask.passive, (q, rest, rest))
+        rows.append((load, by_motion[:, 0] @ whole))
+    elif ask.passive is not None:
+        stretched, steep = _stretched(ask, q)
+        rows.append((stretched, steep[..., None] * whole[PELVIS + 6 :]))
+    over, beyond_slope = (one.reshape(len(q), COUNT) for one in beyond(ask, q))
+    rows.append((over, beyond_slope[..., None] * whole))
+    square = sum(np.swapaxes(slope, 1, 2) @ slope for _, slope in rows)
+    down = sum(np.einsum("frn,fr->fn", slope, one) for one, slope in rows)
+    return np.asarray(square), np.asarray(down)
+
+
+def _stretched(ask: Ask, q: Array) -> tuple[Array, Array]:
+    """(F, 102) loads of passive elements over their size, as springs at rest, and their slopes."""
+    assert ask.passive is not None
+    force, stiffness, _ = ask.passive.with_slopes(q[:, 1:])
+    size = ask.sizes.of_loads
+    return (force / size).reshape(len(q), -1), (stiffness / size).reshape(len(q), -1)

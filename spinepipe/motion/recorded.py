@@ -1,0 +1,60 @@
+"""Markers as a file of motion has them, before anything is known of the person."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.effects.contract import Array
+from spinepipe.problems import InputError, Problem
+
+M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Units in which motion is written."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Markers over time.
+
+    Attributes
+    ----------
+    names : (K,). time_s : (F,). places : (F, K, 3) m, zero where not seen. seen : (F, K).
+    repaired : what was read otherwise than it stands in the file, one sentence each.
+    first : number of the first frame that was kept, counted from 1 in the file.
+    """
+
+    names: tuple[str, ...]
+    time_s: Array
+    places: Array
+    seen: NDArray[np.bool_]
+    repaired: tuple[str, ...] = ()
+    first: int = 1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+
+def recorded(
+    names: tuple[str, ...], time_s: Array, raw: Array, repaired: tuple[str, ...] = ()
+) -> Recorded:
+    """From raw places (F, K, 3) m, NaN or all zero where a marker is not seen."""
+    seen = np.isfinite(raw).all(axis=-1) & (raw != 0.0).any(axis=-1)
+    return Recorded(names, time_s, np.where(seen[..., None], raw, 0.0), seen, repaired)
+
+
+def unit_of(file: str, row: int | None, column: str, text: str) -> float:
+    """What one unit of a file is in m.
+
+    Raises
+    ------
+    InputError
+        Where it is none of `M_PER`.
+    """
+    known = text.strip().lower()
+    if known not in M_PER:
+        allowed = ", ".join(M_PER)
+        raise InputError([Problem(file, row, column, repr(text), allowed, "correct the unit")])
+    return M_PER[known]

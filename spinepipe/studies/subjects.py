@@ -1,0 +1,85 @@
+"""Who takes part: `subjects.csv`, for every kind that asks for sex, age, height and mass."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.muscles.subject import CM_PER_M, Subject
+from spinepipe.problems import Problem, did_you_mean, one_of
+
+SEXES = ("male", "female")
+
+HEIGHT_CM = (120.0, 220.0)
+MASS_KG = (30.0, 300.0)
+BMI = (14.0, 55.0)
+
+LARGEST_HEIGHT_M = 3.0
+"""A height that is no more than this is in metres."""
+
+STANDARD_GRAVITY = 9.80665
+
+SUBJECTS = TableForm(
+    "subjects",
+    "specimen",
+    (
+        Column("specimen", "person, as listed in specimens.csv", "text", required=True),
+        Column("sex", "male or female", "text", required=True),
+        Column("age_years", "age", required=True, low=0, high=130),
+        Column("height_cm", "standing height", required=True, low=0, open_low=True),
+        Column("mass_kg", "body mass", required=True, low=0, open_low=True),
+    ),
+    keys=("specimen",),
+    places=True,
+)
+
+
+def subject_of(cohort: Cohort, specimen: str) -> Subject:
+    """A person of `subjects.csv`."""
+    rows = cohort.further["subjects"]
+    row = rows[rows["specimen"] == specimen].iloc[0]
+    height = float(row["height_cm"]) / CM_PER_M
+    return Subject(row["sex"], float(row["age_years"]), height, float(row["mass_kg"]))
+
+
+def subject_problems(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:
+    """One row for each specimen (the reader sees to it that it is one), and bodies that exist."""
+    file = f"{cohort.name}/{SUBJECTS.file}"
+    known = set(rows["specimen"])
+    for name in cohort.specimen_names:
+        if name not in known:
+            found = f"no row of '{name}'"
+            remedy = "add sex, age, height and mass, or delete it from specimens.csv"
+            yield Problem(file, None, "specimen", found, "every specimen of specimens.csv", remedy)
+    for line, row in rows.iterrows():
+        place = (file, int(str(line)))
+        if row["sex"] not in SEXES:
+            remedy = did_you_mean(str(row["sex"]).lower(), SEXES, "write male or female")
+            yield Problem(*place, "sex", f"'{row['sex']}'", one_of(SEXES), remedy)
+        yield from _size(place, str(row["specimen"]), row["height_cm"], row["mass_kg"])
+
+
+def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[Problem]:
+    """Height and mass each by itself; only where both can be, the two together."""
+    if not HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
+        remedy = "correct it"
+        if cm <= LARGEST_HEIGHT_M:
+            remedy = f"is it in m? write {100.0 * cm:g}"
+        elif HEIGHT_CM[0] <= cm / 10.0 <= HEIGHT_CM[1]:
+            remedy = f"is it in mm? write {cm / 10.0:g}"
+        yield Problem(*place, "height_cm", f"{who} is {cm:g} cm tall", _range(HEIGHT_CM), remedy)
+    if not MASS_KG[0] <= kg <= MASS_KG[1]:
+        remedy = "correct it"
+        if kg > MASS_KG[1]:
+            remedy = f"is it the weight in N? write {kg / STANDARD_GRAVITY:.1f}"
+        yield Problem(*place, "mass_kg", f"{who} weighs {kg:g} kg", _range(MASS_KG), remedy)
+    elif HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
+        bmi = kg / (cm / 100.0) ** 2
+        if not BMI[0] <= bmi <= BMI[1]:
+            found = f"{who} has a BMI of {bmi:.1f} ({kg:g} kg, {cm:g} cm)"
+            yield Problem(*place, "mass_kg", found, _range(BMI), "correct height or mass")
+
+
+def _range(pair: tuple[float, float]) -> str:
+    return f"{pair[0]:g} to {pair[1]:g}"

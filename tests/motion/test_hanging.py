@@ -1,0 +1,193 @@
+"""Head and arms on T1: sums of points, de Leva's numbers again, arms where tasks have them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinepipe.decomposition import eigh
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose, rotation_zxy
+from spinepipe.motion.hanging import ARMS, T1, carried_parts, elbow_between, hung
+from spinepipe.motion.rigid import Part, joined, seen_from
+from spinepipe.motion.skeleton import Masses, Skeleton, body_poses, skeleton_of
+from spinepipe.muscles.subject import Subject
+
+MAN = Subject("male", 30.0, 1.741, 73.0)
+WOMAN = Subject("female", 30.0, 1.735, 61.9)
+"""Persons of the height and mass of de Leva's means."""
+
+ANYWHERE = np.array([-0.05, 1.4, 0.0])
+
+
+def made_up() -> Skeleton:
+    """A curved chain whose vertebrae are small tilted bodies."""
+    rng = np.random.default_rng(2)
+    joints = [
+        Pose(
+            rotation_zxy(*(0.3 * np.sin(0.4 * k), 0.02, -0.01)), np.array([-0.01 * k, 0.03 * k, 0])
+        )
+        for k in range(17)
+    ]
+    arms = rng.normal(0.0, 0.1, (18, 3, 3))
+    about = 1e-3 * np.eye(3) + 1e-2 * arms @ arms.transpose(0, 2, 1)
+    masses = Masses(rng.uniform(0.5, 2.0, 18), rng.normal(0.0, 0.02, (18, 3)), about)
+    return skeleton_of(joints, masses)
+
+
+def cloud(part: Part) -> tuple[Array, Array]:
+    """Six equal points with the part's mass, centre and inertia: kg (6,) and places (6, 3)."""
+    sizes, axes = eigh(part.about_com)
+    squares = 0.5 * sizes.sum() - sizes  # second moments of mass along the principal axes
+    arms = np.sqrt(3.0 * squares / part.kg)
+    points = [
+        part.com + s * arm * axis for arm, axis in zip(arms, axes.T, strict=True) for s in (1, -1)
+    ]
+    return np.full(6, part.kg / 6.0), np.array(points)
+
+
+def moments(kg: Array, points: Array) -> tuple[float, Array, Array]:
+    """Mass, centre and inertia of points, by plain sums."""
+    total = float(kg.sum())
+    centre = np.array(
+        [sum(m * p[i] for m, p in zip(kg, points, strict=True)) / total for i in range(3)]
+    )
+    about = np.zeros((3, 3))
+    for m, point in zip(kg, points, strict=True):
+        x, y, z = point - centre
+        about += m * np.array(
+            [
+                [y * y + z * z, -x * y, -x * z],
+                [-x * y, x * x + z * z, -y * z],
+                [-x * z, -y * z, x * x + y * y],
+            ]
+        )
+    return total, centre, about
+
+
+@pytest.mark.parametrize("arms", ARMS)
+@pytest.mark.parametrize("person", [MAN, WOMAN], ids=lambda person: person.sex)
+def test_t1_carries_the_sum_of_all_its_points(person: Subject, arms: str) -> None:
+    """Every part as six points in ground, summed there, seen from T1's tilted frame."""
+    skeleton = made_up()
+    turns, places = body_poses(skeleton, np.zeros((18, 6)))
+    given = skeleton.masses
+    own = Part("T1", given.kg[T1], given.com[T1], given.about_com[T1])
+    own = seen_from(own, turns[T1].T, -turns[T1].T @ places[T1])
+    clouds = [cloud(part) for part in (own, *carried_parts(arms, person, places[T1]))]
+    kg, centre, about = moments(*(np.concatenate(one) for one in zip(*clouds, strict=True)))
+    found = hung(skeleton, arms, person)
+    assert found.kg[T1] == pytest.approx(kg, rel=1e-13)
+    np.testing.assert_allclose(found.com[T1], turns[T1].T @ (centre - places[T1]), atol=1e-13)
+    # some kg m2, summed from squares of distances of up to a metre
+    np.testing.assert_allclose(found.about_com[T1], turns[T1].T @ about @ turns[T1], atol=1e-12)
+
+
+def test_other_bodies_carry_what_they_carried() -> None:
+    skeleton = made_up()
+    found = hung(skeleton, "hanging", MAN)
+    np.testing.assert_array_equal(found.kg[:T1], skeleton.masses.kg[:T1])
+    np.testing.assert_array_equal(found.com[:T1], skeleton.masses.com[:T1])
+    np.testing.assert_array_equal(found.about_com[:T1], skeleton.masses.about_com[:T1])
+
+
+def test_what_hangs_on_t1_weighs_what_de_leva_says() -> None:
+    for person, percent in (
+        (MAN, 6.94 + 2 * (2.71 + 1.62 + 0.61)),
+        (WOMAN, 6.68 + 2 * (2.55 + 1.38 + 0.56)),
+    ):
+        parts = carried_parts("crossed", person, ANYWHERE)
+        assert sum(part.kg for part in parts) == pytest.approx(percent / 100.0 * person.mass_kg)
+
+
+def test_inertias_are_those_of_de_leva_s_lengths_and_radii() -> None:
+    parts = {part.name: part for part in carried_parts("hanging", MAN, ANYWHERE)}
+    head = 0.0694 * 73.0 * (0.2429 * np.array([0.303, 0.261, 0.315])) ** 2
+    np.testing.assert_allclose(parts["head"].about_com, np.diag(head), rtol=1e-14)
+    kg, across = 0.0271 * 73.0, (0.285**2 + 0.269**2) / 2
+    upper = kg * 0.2817**2 * np.array([across, 0.158**2, across])
+    np.testing.assert_allclose(parts["left_upper_arm"].about_com, np.diag(upper), rtol=1e-14)
+    woman = {part.name: part for part in carried_parts("hanging", WOMAN, ANYWHERE)}
+    kg, across = 0.0056 * 61.9, (0.244**2 + 0.208**2) / 2
+    hand = kg * 0.1701**2 * np.array([across, 0.154**2, across])
+    np.testing.assert_allclose(woman["right_hand"].about_com, np.diag(hand), rtol=1e-14)
+
+
+def test_hanging_arms_hang() -> None:
+    parts = {part.name: part for part in carried_parts("hanging", MAN, ANYWHERE)}
+    shoulder = ANYWHERE + 1.741 / 1.730 * np.array([0.0325, -0.012, 0.17])
+    below = {
+        "right_upper_arm": 0.5772 * 0.2817,
+        "right_forearm": 0.2817 + 0.4574 * 0.2689,
+        "right_hand": 0.2817 + 0.2689 + 0.3624 * 0.1879,
+    }
+    for name, depth in below.items():
+        np.testing.assert_allclose(parts[name].com, shoulder - [0.0, depth, 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("arms", ARMS)
+def test_arms_are_mirrored(arms: str) -> None:
+    parts = {part.name: part for part in carried_parts(arms, WOMAN, ANYWHERE)}
+    flip = np.diag([1.0, 1.0, -1.0])
+    for segment in ("upper_arm", "forearm", "hand"):
+        right, left = parts[f"right_{segment}"], parts[f"left_{segment}"]
+        np.testing.assert_allclose(left.com, flip @ right.com, atol=1e-14)
+        np.testing.assert_allclose(left.about_com, flip @ right.about_com @ flip, atol=1e-15)
+    whole = joined("all", list(parts.values()))
+    assert whole.com[2] == pytest.approx(0.0, abs=1e-14)
+
+
+def test_hands_are_where_the_task_has_them() -> None:
+    where = {
+        arms: {part.name: part.com for part in carried_parts(arms, MAN, ANYWHERE)} for arms in ARMS
+    }
+    behind, crossed, hanging = (where[arms] for arms in ("behind_head", "crossed", "hanging"))
+    tall = 1.741 / 1.730
+    np.testing.assert_allclose(
+        behind["right_hand"], behind["head"] + tall * np.array([-0.1, 0.0, 0.03]), atol=1e-14
+    )
+    assert behind["right_upper_arm"][2] > hanging["right_upper_arm"][2]
+    assert behind["right_forearm"][1] > hanging["right_forearm"][1]
+    assert crossed["right_hand"][2] < 0.0 < crossed["right_upper_arm"][2]
+    assert crossed["right_hand"][0] > ANYWHERE[0]
+    assert crossed["right_upper_arm"][1] < ANYWHERE[1]
+
+
+def test_raised_arms_raise_the_centre_and_hanging_ones_lower_it() -> None:
+    centres = [joined("all", carried_parts(arms, MAN, ANYWHERE)).com[1] for arms in ARMS]
+    hanging, behind, crossed = centres
+    assert hanging < crossed < behind
+
+
+@pytest.mark.parametrize("arms", ARMS)
+def test_size_scales_places_by_height_and_inertia_by_mass_and_its_square(arms: str) -> None:
+    small, large = (joined("all", carried_parts(arms, p, np.zeros(3))) for p in (MAN, TALLER))
+    np.testing.assert_allclose(large.com, 1.2 * small.com, atol=1e-14)
+    np.testing.assert_allclose(
+        large.about_com, 1.5 * 1.44 * small.about_com, rtol=1e-12, atol=1e-14
+    )
+
+
+TALLER = replace(MAN, height_m=1.2 * MAN.height_m, mass_kg=1.5 * MAN.mass_kg)
+
+
+def test_the_elbow_is_at_both_lengths_on_the_side_asked_for() -> None:
+    shoulder, hand = np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.1, 0.2])
+    towards = np.array([0.0, 0.0, 1.0])
+    elbow = elbow_between(shoulder, hand, 0.28, 0.33, towards)
+    assert np.linalg.norm(elbow - shoulder) == pytest.approx(0.28, rel=1e-14)
+    assert np.linalg.norm(elbow - hand) == pytest.approx(0.33, rel=1e-14)
+    along = (hand - shoulder) / np.linalg.norm(hand - shoulder)
+    off = elbow - shoulder - ((elbow - shoulder) @ along) * along
+    assert off @ towards > 0.0
+    assert np.linalg.norm(np.cross(off, towards - (towards @ along) * along)) < 1e-14
+
+
+def test_an_arm_that_does_not_reach_is_refused() -> None:
+    with pytest.raises(ValueError, match="900 mm apart"):
+        elbow_between(np.zeros(3), np.array([0.9, 0.0, 0.0]), 0.3, 0.3, np.ones(3))
+
+
+def test_unknown_arms_are_refused() -> None:
+    with pytest.raises(ValueError, match="behind_head"):
+        hung(made_up(), "waving", MAN)  # type: ignore[arg-type]

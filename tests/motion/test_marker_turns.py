@@ -1,0 +1,46 @@
+"""Turns of groups of markers against scipy's; groups that tell none."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from spinepipe.motion.marker_turns import angles, turns
+
+RNG = np.random.default_rng(11)
+MIDDLE = np.array([3.0, 2.0, 1.0])
+MODEL = RNG.normal(size=(5, 3))
+
+
+def test_turns_are_those_of_scipy_also_where_markers_are_lost() -> None:
+    """Noise of a tenth of the group's size; rounding of both is all that may differ."""
+    true = Rotation.random(20, rng=3)
+    places = np.array([turn.apply(MODEL) for turn in true]) + RNG.normal(0.0, 0.1, (20, 5, 3))
+    seen = np.ones((20, 5), dtype=bool)
+    seen[::2, 1] = seen[::3, 4] = False
+    found, told = turns(MODEL, np.where(seen[..., None], places + MIDDLE, 0.0), seen)
+    assert told.all()
+    for frame in range(20):
+        there = seen[frame]
+        clouds = (places[frame, there], MODEL[there])
+        centred = (cloud - cloud.mean(axis=0) for cloud in clouds)
+        wanted = Rotation.align_vectors(*centred)[0].as_matrix()
+        np.testing.assert_allclose(found[frame], wanted, atol=1e-10)
+
+
+def test_too_few_markers_and_markers_in_a_line_tell_no_turn() -> None:
+    line = np.outer(np.arange(5.0), [1.0, 2.0, 3.0])
+    whole, few = np.ones((1, 5), dtype=bool), np.array([[True, True, False, False, False]])
+    for model, seen in ((line, whole), (MODEL, few), (MODEL, ~whole)):
+        found, told = turns(model, model[None], seen)
+        assert not told.any()
+        np.testing.assert_array_equal(found, np.eye(3)[None])
+
+
+def test_a_mirrored_group_is_met_by_a_rotation() -> None:
+    found, _ = turns(MODEL, MODEL[None] * [1.0, 1.0, -1.0], np.ones((1, 5), dtype=bool))
+    assert np.isclose(np.linalg.det(found[0]), 1.0)
+
+
+def test_angles_are_those_of_turns_about_z_then_x_then_y() -> None:
+    wanted = RNG.uniform(-1.4, 1.4, (10, 3))
+    found = angles(Rotation.from_euler("ZXY", wanted).as_matrix())
+    np.testing.assert_allclose(found, wanted, atol=1e-12)

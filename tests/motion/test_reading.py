@@ -1,0 +1,253 @@
+"""Files of motion read as those who write them mean it: OpenSim's and ezc3d's own, and by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ezc3d import c3d
+
+from spinepipe.effects.contract import Array
+from spinepipe.motion.reading import axes_of, read_motion
+from spinepipe.motion.recorded import Recorded
+from spinepipe.problems import InputError, Problem
+
+opensim = pytest.importorskip("opensim")
+
+NAMES = ("LPSI", "RPSI", "T1")
+RATE = 50.0
+ORIGINAL = ("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames")
+HELD_MM = 5e-4
+"""Half of the last digit that is written by hand here."""
+
+
+def places_mm(frames: int = 5) -> Array:
+    """(F, 3, 3) mm of three markers, drawn."""
+    return np.random.default_rng(7).uniform(-500.0, 500.0, (frames, len(NAMES), 3))
+
+
+def trc(places: Array, *, units: str = "mm", rate: float = RATE, blank: str = "\t") -> list[str]:
+    """Lines of a `.trc` as a laboratory writes it; NaN is an empty cell."""
+    count, frames = places.shape[1], len(places)
+    lines = [
+        blank.join(("PathFileType", "4", "(X/Y/Z)", "m.trc")),
+        blank.join((*("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"), *ORIGINAL)),
+        blank.join(map(str, (rate, rate, frames, count, units, rate, 1, frames))),
+        blank.join(("Frame#", "Time", *((blank * 3).join(NAMES[:count]).split(blank)))),
+        blank.join(f"{axis}{k + 1}" for k in range(count) for axis in "XYZ"),
+        "",
+    ]
+    for k, frame in enumerate(places):
+        cells = ["" if np.isnan(value) else f"{value:.3f}" for value in frame.ravel()]
+        lines.append(blank.join([str(k + 1), f"{k / RATE:.4f}", *cells]))
+    return lines
+
+
+def write(path: Path, lines: list[str]) -> Path:
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def problem_of(path: Path, axes: str = "x y z", start_s: float | None = None) -> Problem:
+    """The one thing that is wrong with a file."""
+    with pytest.raises(InputError) as caught:
+        read_motion(path, axes, start_s)
+    (problem,) = caught.value.problems
+    return problem
+
+
+def assert_same(found: Recorded, wanted_mm: Array, within_mm: float = HELD_MM) -> None:
+    assert found.names == NAMES
+    assert found.seen.all()
+    np.testing.assert_allclose(1e3 * found.places, wanted_mm, rtol=0.0, atol=within_mm)
+
+
+def test_a_trc_that_opensim_writes_is_read_back(tmp_path: Path) -> None:
+    wanted = places_mm()
+    table = opensim.TimeSeriesTableVec3()
+    table.setColumnLabels(NAMES)
+    for k, frame in enumerate(wanted):
+        row = opensim.RowVectorVec3([opensim.Vec3(*point) for point in frame.tolist()])
+        table.appendRow(k / RATE, row)
+    table.addTableMetaDataString("DataRate", f"{RATE:g}")
+    table.addTableMetaDataString("Units", "mm")
+    opensim.TRCFileAdapter().write(table, str(tmp_path / "o.trc"))
+    found = read_motion(tmp_path / "o.trc")
+    assert_same(found, wanted)
+    np.testing.assert_allclose(found.time_s, np.arange(5) / RATE, atol=1e-12)
+
+
+def test_opensim_reads_the_same_numbers_from_a_trc(tmp_path: Path) -> None:
+    path = write(tmp_path / "m.trc", trc(places_mm()))
+    table = opensim.TimeSeriesTableVec3(str(path))
+    theirs = [
+        [
+            [point[i] for i in range(3)]
+            for point in map(table.getRowAtIndex(k).getElt, [0] * 3, range(3))
+        ]
+        for k in range(table.getNumRows())
+    ]
+    found = read_motion(path)
+    np.testing.assert_allclose(1e3 * found.places, theirs, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.time_s, table.getIndependentColumn(), atol=1e-12)
+
+
+def write_c3d(path: Path, places: Array, units: str = "mm", names: tuple[str, ...] = NAMES) -> Path:
+    """As ezc3d writes it; NaN is a residual of -1 with the place that was last seen."""
+    content = c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [RATE]
+    content["parameters"]["POINT"]["LABELS"]["value"] = list(names)
+    content["parameters"]["POINT"]["UNITS"]["value"] = [units]
+    points = np.ones((4, places.shape[1], len(places)))
+    lost = np.isnan(places).any(axis=-1)
+    points[:3] = np.where(lost[..., None], 123.0, places).transpose(2, 1, 0)
+    content["data"]["points"] = points
+    content["data"]["meta_points"]["residuals"] = np.where(lost.T, -1.0, 0.0)[None]
+    content.write(str(path))
+    return path
+
+
+def test_a_c3d_that_ezc3d_writes_is_read_back(tmp_path: Path) -> None:
+    """It holds single precision."""
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm()))
+    assert_same(found, places_mm(), 1e-4)
+    np.testing.assert_allclose(np.diff(found.time_s), 1.0 / RATE, atol=1e-9)
+
+
+def test_a_residual_of_minus_one_and_noughts_are_gaps(tmp_path: Path) -> None:
+    places = places_mm()
+    places[1, 2] = np.nan
+    places[3, 0] = 0.0
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places))
+    assert {(int(f), int(k)) for f, k in np.argwhere(~found.seen)} == {(1, 2), (3, 0)}
+    assert not found.places[~found.seen].any()
+
+
+@pytest.mark.parametrize(("units", "per_mm"), [("mm", 1.0), ("cm", 0.1), ("m", 0.001)])
+def test_units_of_the_file_count(tmp_path: Path, units: str, per_mm: float) -> None:
+    in_units = per_mm * places_mm()
+    within = 0.51e-3 / per_mm
+    assert_same(
+        read_motion(write(tmp_path / "m.trc", trc(in_units, units=units))), places_mm(), within
+    )
+    assert_same(read_motion(write_c3d(tmp_path / "m.c3d", in_units, units)), places_mm(), 1e-4)
+    header = ",".join(["time_s", *(f"{n}_{a}_{units}" for n in NAMES for a in "xyz")])
+    rows = [
+        ",".join(map(repr, [k / RATE, *frame]))
+        for k, frame in enumerate(in_units.reshape(5, -1).tolist())
+    ]
+    assert_same(read_motion(write(tmp_path / "m.csv", [header, *rows])), places_mm(), 1e-9)
+
+
+def test_an_unknown_unit_is_named(tmp_path: Path) -> None:
+    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm(), units="inch")))
+    assert (problem.row, problem.column, problem.found) == (3, "Units", "'inch'")
+
+
+@pytest.mark.parametrize("blank", ["\t", "  "])
+def test_tabs_and_spaces_part_cells(tmp_path: Path, blank: str) -> None:
+    assert_same(read_motion(write(tmp_path / "m.trc", trc(places_mm(), blank=blank))), places_mm())
+
+
+def test_empty_cells_and_noughts_of_a_trc_are_gaps(tmp_path: Path) -> None:
+    places = places_mm()
+    places[0, 1], places[4, 2] = 0.0, np.nan
+    found = read_motion(write(tmp_path / "m.trc", trc(places)))
+    assert {(int(f), int(k)) for f, k in np.argwhere(~found.seen)} == {(0, 1), (4, 2)}
+
+
+def test_an_empty_cell_between_spaces_cannot_be_told(tmp_path: Path) -> None:
+    places = places_mm()
+    places[2, 1] = np.nan
+    problem = problem_of(write(tmp_path / "m.trc", trc(places, blank="  ")))
+    assert (problem.row, problem.found) == (9, "8 cells in frame 3")
+
+
+def test_a_cell_that_is_no_number_is_named_with_frame_and_marker(tmp_path: Path) -> None:
+    lines = trc(places_mm())
+    cells = lines[8].split("\t")
+    cells[6] = "1,5"
+    lines[8] = "\t".join(cells)
+    problem = problem_of(write(tmp_path / "m.trc", lines))
+    assert (problem.row, problem.column, problem.found) == (9, "RPSI", "'1,5'")
+
+
+def test_a_rate_that_contradicts_the_times_is_refused(tmp_path: Path) -> None:
+    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm(), rate=100.0)))
+    assert problem.column == "DataRate"
+
+
+def test_a_file_cut_short_is_refused(tmp_path: Path) -> None:
+    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm())[:-1]))
+    assert (problem.column, problem.found) == ("NumFrames", "4 frames")
+
+
+def test_times_come_from_the_rate_where_the_column_is_empty(tmp_path: Path) -> None:
+    lines = trc(places_mm())
+    for k in range(6, len(lines)):
+        cells = lines[k].split("\t")
+        lines[k] = "\t".join([cells[0], "", *cells[2:]])
+    found = read_motion(write(tmp_path / "m.trc", lines))
+    np.testing.assert_allclose(found.time_s, np.arange(5) / RATE)
+    assert found.repaired == ("times are from DataRate, the column has none",)
+
+
+def test_a_laboratory_with_z_up_is_turned(tmp_path: Path) -> None:
+    """Its x is forwards, y to the left, z up; a point 1 forwards, 2 left, 3 up."""
+    places = np.tile([1.0, 2.0, 3.0], (2, 1, 1))
+    found = read_motion(write(tmp_path / "m.trc", trc(places)), "x z -y")
+    np.testing.assert_allclose(1e3 * found.places[0, 0], [1.0, 3.0, -2.0])
+
+
+@pytest.mark.parametrize("text", ["x z", "x x y", "x y -z", "a b c", ""])
+def test_axes_that_are_none_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"once|left"):
+        axes_of(text)
+
+
+def test_frames_outside_the_crop_are_left_out(tmp_path: Path) -> None:
+    path = write(tmp_path / "m.trc", trc(places_mm()))
+    found = read_motion(path, start_s=0.02, end_s=0.06)
+    np.testing.assert_allclose(found.time_s, [0.02, 0.04, 0.06])
+    np.testing.assert_allclose(1e3 * found.places, places_mm()[1:4], atol=HELD_MM)
+    assert found.first == 2
+    assert problem_of(path, start_s=9.0).found == "no frame from 9 s to an end"
+
+
+def test_subjects_are_cut_off_names_where_each_stays_one(tmp_path: Path) -> None:
+    full = ("Anna:LPSI", "Anna:RPSI", "T1")
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), names=full))
+    assert found.names == NAMES
+    assert found.repaired == ("names of markers without 'Anna:'",)
+    two = ("Anna:T1", "Ben:T1", "Ben:LPSI")
+    found = read_motion(write_c3d(tmp_path / "n.c3d", places_mm(), names=two))
+    assert found.names == ("Anna:T1", "Ben:T1", "LPSI")
+
+
+def test_a_marker_that_comes_twice_is_refused(tmp_path: Path) -> None:
+    path = write_c3d(tmp_path / "m.c3d", places_mm(), names=("T1", "T1", "L3"))
+    assert problem_of(path).found == "T1 more than once"
+
+
+def test_what_is_no_file_of_motion_is_named(tmp_path: Path) -> None:
+    assert problem_of(tmp_path / "no.trc").found == "no such file"
+    assert problem_of(write(tmp_path / "m.txt", ["x"])).found == "a file '.txt'"
+    assert problem_of(write(tmp_path / "m.c3d", ["x"])).allowed == "a .c3d"
+    assert problem_of(write(tmp_path / "m.trc", ["x"])).row == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "says"),
+    [
+        ("time,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3", "no such column"),
+        ("time_s,T1_x_mm,T1_y_mm", "0,1,2", "only x, y"),
+        ("time_s,T1_x,T1_y_mm,T1_z_mm", "0,1,2,3", "no marker"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_m", "0,1,2,3", "columns in m, mm"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2", "3 cells"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,b,3", "'b'"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3\n0,1,2,3", "0 s"),
+    ],
+)
+def test_a_csv_that_cannot_be_read_is_named(
+    tmp_path: Path, header: str, row: str, says: str
+) -> None:
+    assert problem_of(write(tmp_path / "m.csv", [header, row])).found == says

@@ -1,0 +1,185 @@
+"""Motions that cost least: what is seen is found, costs fall together with their slopes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_spine import everywhere, law, markers, postures, spine
+
+from spinepipe.motion.asked import Ask, Sizes, watched
+from spinepipe.motion.banded import Band, Factor, bordered_step
+from spinepipe.motion.points import COUNT, marker_places
+from spinepipe.motion.posture import postures as fitted_postures
+from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.motion.spline import Grid
+from spinepipe.motion.trajectory import Trajectory, _State, solve
+from spinepipe.status import Status
+
+NODES = 6
+
+
+def trial_of(q: np.ndarray, seen: MarkerSet, step_s: float = 0.2) -> Trial:
+    places = marker_places(spine(), seen, q)
+    return Trial(
+        "made",
+        "flexion_extension",
+        step_s * np.arange(len(q)),
+        places,
+        np.ones(places.shape[:2], dtype=bool),
+        "hanging",
+    )
+
+
+def bent(frames: int) -> np.ndarray:
+    """Forwards and back, most in the lumbar joints."""
+    q = np.zeros((frames, 18, 6))
+    by = np.sin(np.linspace(0.0, np.pi, frames)) ** 2
+    q[:, 1:7, 3] = -0.08 * by[:, None]
+    q[:, 7:, 3] = -0.015 * by[:, None]
+    q[:, 0, 3] = -0.1 * by
+    return q
+
+
+def test_a_spline_goes_through_its_nodes() -> None:
+    grid = Grid(1.0, 0.1, NODES)
+    places = np.random.default_rng(0).normal(size=(NODES + 1, 2))
+    curve = grid.through(places)
+    at, velocity, acceleration = grid.at_nodes(curve)
+    np.testing.assert_allclose(at, places, atol=1e-12)
+    np.testing.assert_allclose(acceleration[[0, -1]], 0.0, atol=1e-9)
+    spline = grid.curve(curve)
+    np.testing.assert_allclose(spline(grid.times_s), places, atol=1e-12)
+    np.testing.assert_allclose(spline(grid.times_s, 1), velocity, atol=1e-10)
+    np.testing.assert_allclose(spline(grid.times_s[1:-1], 2), acceleration[1:-1], atol=1e-8)
+
+
+def test_a_bordered_band_is_solved_as_the_whole_matrix_is() -> None:
+    rng = np.random.default_rng(1)
+    band, nodes, shared = Band(4, 3), 2, 3
+    size = 4 * COUNT
+    whole = np.zeros((size + shared, size + shared))
+    right = np.zeros(size + shared)
+    for node in range(nodes):
+        rows, own = rng.normal(size=(400, 3 * COUNT)), rng.normal(size=(400, shared))
+        off = rng.normal(size=400)
+        band.add(node, rows.T @ rows, rows.T @ off, rows.T @ own)
+        at = [*range(node * COUNT, (node + 3) * COUNT), *range(size, size + shared)]
+        both = np.hstack([rows, own])
+        whole[np.ix_(at, at)] += both.T @ both
+        right[at] += both.T @ off
+    factor = Factor.of(band, 0.0, np.full(size, 1e-3))
+    square = whole[size:, size:]
+    (step,), params = bordered_step([band], [factor], square, right[size:])
+    whole[range(size), range(size)] += 1e-3
+    expected = -np.linalg.solve(whole, right)
+    np.testing.assert_allclose(np.concatenate([step, params]), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("force_cost", ["squared", "minus_gravity", "level_difference"])
+def test_slopes_of_the_cost_are_differences(force_cost: str) -> None:
+    """Half the gradient, by coefficients and by logarithms of sizes and shapes."""
+    fitted = np.zeros((17, 6), dtype=bool)
+    fitted[:2, 3:] = True
+    low, high = np.full((18, 6), -1e-3), np.full((18, 6), 1e-3)
+    ask = Ask(low=low, high=high, passive=law(), force_cost=force_cost, fitted=fitted)  # type: ignore[arg-type]
+    seen = watched(spine(), markers(), trial_of(bent(NODES + 1), markers()), NODES)
+    rng = np.random.default_rng(2)
+    state = _State(
+        (rng.normal(0.0, 1e-3, (seen.grid.coefficients, 18, 6)),),
+        rng.normal(0.0, 0.2, ask.parameters),
+    )
+    problem = Trajectory(ask, (seen,))
+    asked = problem.normal(state)
+    for k in rng.choice(asked.bands[0].slope.size, 12, replace=False):
+        step = np.zeros(asked.bands[0].slope.size)
+        step[k] = 1e-5
+        none = np.zeros(ask.parameters)
+        apart = problem.costs(state.moved([step], none)).total
+        apart -= problem.costs(state.moved([-step], none)).total
+        assert asked.bands[0].slope[k] == pytest.approx(apart / 4e-5, rel=1e-3, abs=0.1)
+    for k in range(ask.parameters):
+        step = np.zeros(ask.parameters)
+        step[k] = 1e-5
+        still = [np.zeros(asked.bands[0].slope.size)]
+        apart = problem.costs(state.moved(still, step)).total
+        apart -= problem.costs(state.moved(still, -step)).total
+        assert asked.slope[k] == pytest.approx(apart / 4e-5, rel=1e-3, abs=1e-6)
+
+
+def test_what_markers_show_is_found_when_nothing_else_costs() -> None:
+    q = bent(9)
+    seen = watched(spine(), everywhere(), trial_of(q, everywhere()), 8)
+    ask = Ask(loads=False, smooth=False)
+    found = fitted_postures(ask, seen)
+    assert found.settled.all()
+    np.testing.assert_allclose(found.q, q, atol=1e-6)
+    solved = solve(ask, [seen], [seen.grid.through(np.zeros_like(q))])
+    assert solved.status is Status.CONVERGED
+    np.testing.assert_allclose(seen.grid.at_nodes(solved.coefficients[0])[0], q, atol=1e-4)
+
+
+def test_true_elements_beat_wrong_ones() -> None:
+    """Held still by passive elements alone: the truth costs less than stiffer or softer ones."""
+    free = Ask(passive=law(), sizes=Sizes(marker_m=1e-4, loads=1.0))
+    still = np.zeros((1, 18, 6))
+    rest = Trial(
+        "s",
+        "stance",
+        np.zeros(1),
+        marker_places(spine(), markers(), still),
+        np.ones((1, len(markers())), dtype=bool),
+        "hanging",
+    )
+    nothing = watched(spine(), markers(), rest, 0)
+    # a posture in which the true elements carry all weight: no markers, loads alone
+    unseen = replace(nothing, weight=np.zeros_like(nothing.weight))
+    hung = fitted_postures(free, unseen)
+    truth = Trial(
+        "t",
+        "stance",
+        np.zeros(1),
+        marker_places(spine(), markers(), hung.q),
+        np.ones((1, len(markers())), dtype=bool),
+        "hanging",
+    )
+    seen = watched(spine(), markers(), truth, 0)
+    apart = {
+        stiffer: np.abs(
+            np.rad2deg(fitted_postures(replace(free, passive=law(stiffer)), seen).q - hung.q)
+        )[:, 1:, 3:].max()
+        for stiffer in (1.0, 0.3, 3.0)
+    }
+    assert apart[1.0] < 0.05
+    assert apart[0.3] > 2.0 * apart[1.0]
+    assert apart[3.0] > 2.0 * apart[1.0]
+
+
+def test_nodes_lie_between_frames_and_gaps_count_nothing() -> None:
+    q = bent(41)
+    made = trial_of(q, markers(), 0.01)
+    hidden = made.seen.copy()
+    hidden[:, 3] = False
+    hidden[::2, 5] = False
+    seen = watched(spine(), markers(), replace(made, seen=hidden), 10)
+    assert not seen.weight[:, 3].any()
+    assert seen.weight[:, 5].all()
+    assert np.isfinite(seen.places).all()
+    whole = watched(spine(), markers(), made, 10)
+    np.testing.assert_allclose(whole.places, made.places[::4], atol=1e-12)
+    np.testing.assert_allclose(seen.places[:, 5], made.places[::4, 5], atol=2e-3)
+
+
+def test_mirrored_markers_mirror_the_motion() -> None:
+    flip = np.array([1.0, 1.0, -1.0])
+    q = postures(3, 5, 0.03)
+    seen = everywhere()
+    made = trial_of(q, seen)
+    mirrored = replace(seen, at=seen.at * flip)
+    other = replace(made, places=made.places * flip)
+    ask = Ask(passive=law())
+    first, second = (
+        fitted_postures(ask, watched(spine(), m, t, 4)).q
+        for m, t in ((seen, made), (mirrored, other))
+    )
+    signs = np.array([1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
+    np.testing.assert_allclose(second, first * signs, atol=2e-5)
