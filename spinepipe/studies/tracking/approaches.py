@@ -17,7 +17,7 @@ from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
 from spinepipe.studies.tracking.persons import Person, carrying
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Approach, Scales, Tracking
-from spinepipe.units import DEG_PER_RAD, MM_PER_M, TRANSLATIONS
+from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
 
 OWN = "optk_calibrated"
 """The approach that calibrates passive elements on the motion itself."""
@@ -117,6 +117,14 @@ def asked_of(
         force_cost=settings.force_cost,
         sizes=sizes,
     )
+
+
+def fitting(settings: Tracking, person: Person) -> Ask:
+    """Elements of all rotations are fitted; those along axes, which no marker tells, stay."""
+    ask = asked_of(settings, person, "optk_generic")
+    fitted = np.zeros_like(ask.fitted)
+    fitted[:, [COORDINATES.index(name) for name in ROTATIONS]] = True
+    return replace(ask, fitted=fitted)
 
 
 def _rotations_alone() -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:

@@ -1,25 +1,23 @@
 """Job: passive elements of one person, from motions of one kind or of two kinds together."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.asked import Ask, Watched
+from spinepipe.motion.asked import Watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.trajectory import Solved, solve
-from spinepipe.studies.tracking.approaches import asked_of, first_guess, seen_in
+from spinepipe.studies.tracking.approaches import first_guess, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
 from spinepipe.studies.tracking.laws import highest, stiffness_rows, without
 from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import STIFFNESS
 from spinepipe.tables import from_rows, write
-from spinepipe.units import COORDINATES, ROTATIONS
 
 
 def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
@@ -40,14 +38,6 @@ def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
         rows = list(stiffness_rows(solved.law, person.passive, high, solved.status, solved.message))
     known = {"specimen": specimen, "law": law}
     write(from_rows(STIFFNESS, [known | row for row in rows]), output, made_by)
-
-
-def fitting(settings: Tracking, person: Person) -> Ask:
-    """Elements of all rotations are fitted; those along axes, which no marker tells, stay."""
-    ask = asked_of(settings, person, "optk_generic")
-    fitted = np.zeros_like(ask.fitted)
-    fitted[:, [COORDINATES.index(name) for name in ROTATIONS]] = True
-    return replace(ask, fitted=fitted)
 
 
 def loads_in(solved: Solved, law: PassiveLaw, seen: Sequence[Watched]) -> Array:

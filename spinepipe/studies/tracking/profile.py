@@ -17,9 +17,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.asked import Ask, Watched
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
-from spinepipe.studies.tracking.approaches import first_guess, seen_in
+from spinepipe.studies.tracking.approaches import first_guess, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import BOTH
-from spinepipe.studies.tracking.calibrate import fitting
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.persons import Person, person_of
 from spinepipe.studies.tracking.settings import Tracking

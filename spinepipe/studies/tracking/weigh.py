@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,13 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import Trial
 from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, seen_in
-from spinepipe.studies.tracking.errors import bones_of, errors_of
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.moved import Moved
+from spinepipe.studies.tracking.off_truth import bones_of, errors_of
 from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables_of_studies import WEIGHTS
-from spinepipe.studies.tracking.track import failed_row, fit_row
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.tables import from_rows, write
 
@@ -27,8 +26,6 @@ APPROACH: Approach = "optk_generic"
 
 MEASURED = ("centre_mm", "angle_deg")
 """Measures of error, each a column."""
-
-Row = dict[str, Any]
 
 
 def run(root: str, study: str, specimen: str, output: str) -> None:

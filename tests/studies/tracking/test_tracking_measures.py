@@ -10,8 +10,9 @@ from moving_spine import spine
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES, JOINTS, body_poses
 from spinepipe.studies.tracking.accuracy import accuracy_rows
-from spinepipe.studies.tracking.errors import Bones, error_rows
+from spinepipe.studies.tracking.errors import error_rows
 from spinepipe.studies.tracking.moved import IN_ORDER, motions
+from spinepipe.studies.tracking.off_truth import Bones
 from spinepipe.studies.tracking.ranges import range_rows
 from spinepipe.studies.tracking.sharing import sharing_rows
 from spinepipe.studies.tracking.similarity import similarity_rows
