@@ -10,8 +10,7 @@ from spinepipe.studies.study import Study
 Approach = Literal[
     "ik",
     "ik_constrained_christophy_2012",
-    "ik_constrained_bruno_2015",
-    "ik_constrained_shojaei_2017",
+    "ik_constrained_white_panjabi_1990",
     "ik_smooth",
     "ik_springs",
     "optk_zero",
