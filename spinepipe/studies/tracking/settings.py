@@ -1,16 +1,21 @@
 """What a study of tracked motions asks."""
 
-from typing import Annotated, Literal, get_args
+import re
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, WithJsonSchema
 
+from spinepipe.problems import did_you_mean, one_of
 from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
-Approach = Literal[
+CONSTRAINED = "ik_constrained_"
+"""What the names of approaches with ratios begin with; the rest names the set."""
+
+APPROACHES = (
     "ik",
-    "ik_constrained_christophy_2012",
-    "ik_constrained_white_panjabi_1990",
+    f"{CONSTRAINED}christophy_2012",
+    f"{CONSTRAINED}white_panjabi_1990",
     "ik_smooth",
     "ik_springs",
     "optk_zero",
@@ -21,12 +26,29 @@ Approach = Literal[
     "optk_from_flexion",
     "optk_from_bending",
     "optk_from_both",
+)
+"""Approaches that every cohort can be asked for; one with ratios of its own has others besides."""
+
+_WITH_RATIOS = f"{CONSTRAINED}[a-z0-9_]+"
+
+
+def _known(name: str) -> str:
+    """The name as it is, if it is one of an approach."""
+    if name in APPROACHES or re.fullmatch(_WITH_RATIOS, name):
+        return name
+    listed = f"{one_of(APPROACHES)}, or {CONSTRAINED} and the name of a set in ratios.csv"
+    meant = did_you_mean(name, APPROACHES, "")
+    raise ValueError(f"{listed}; {meant}" if meant else listed)
+
+
+_PATTERN = "|".join((_WITH_RATIOS, *(a for a in APPROACHES if not a.startswith(CONSTRAINED))))
+
+Approach = Annotated[
+    str,
+    AfterValidator(_known),
+    WithJsonSchema({"type": "string", "pattern": f"^({_PATTERN})$"}),
 ]
-
-APPROACHES: tuple[Approach, ...] = get_args(Approach)
-
-CONSTRAINED = "ik_constrained_"
-"""What the names of approaches with ratios begin with; the rest names the set."""
+"""Name of an approach; whether the ratios are there is for the checks to say."""
 
 LEARNT: dict[str, str] = {
     "optk_from_flexion": "flexion_extension",

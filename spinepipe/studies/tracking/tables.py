@@ -1,7 +1,7 @@
 """Tables of studies of kind tracking: one person, one motion, one approach."""
 
 from spinepipe.status import Status
-from spinepipe.studies.tracking.settings import APPROACHES
+from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
 from spinepipe.tables.schema import MESSAGE, SPECIMEN, Column, Table, length_or_angle
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -18,7 +18,11 @@ LIMIT = 3.84
 """Rise of a sum of squares, each over its variance, up to which a value is not excluded (95 %)."""
 
 TRIAL = Column("trial", "text", "motion, as in trials.csv")
-APPROACH = Column("approach", "text", "how postures were found", allowed=APPROACHES)
+APPROACH = Column(
+    "approach",
+    "text",
+    f"how postures were found: {', '.join(APPROACHES)}, or {CONSTRAINED} and a set of the cohort's",
+)
 LAW = Column(
     "law", "text", "passive elements: the approach that takes them over, or the kind of motion"
 )

@@ -65,9 +65,12 @@ def told(approach: str) -> str:
 
 
 def in_order(approaches: Iterable[str]) -> list[str]:
-    """Approaches in the order of the settings."""
-    there = set(approaches)
-    return [name for name in APPROACHES if name in there]
+    """Approaches in the order of the settings; a cohort's own ratios follow the others."""
+    place = {name: k for k, name in enumerate(APPROACHES)}
+    last = max(k for k, name in enumerate(APPROACHES) if name.startswith(CONSTRAINED))
+    return sorted(
+        set(approaches), key=lambda name: (place.get(name, last), name not in place, name)
+    )
 
 
 def sized(value: float, measure: str) -> str:

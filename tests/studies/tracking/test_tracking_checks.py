@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cohort_cases import Change, Files, add, both, cell, line, swap, text, without
+from pydantic import ValidationError
 from tracked_cohort import BODIES, NAME, RATE, Motion, Spoil, write
 
 from spinepipe import cohort as cohorts
@@ -189,6 +190,13 @@ def test_ratios_that_nobody_has_are_refused_unless_the_cohort_has_them(tmp_path:
     rows = "".join(f"bruno_2015,{joint},extension,0.5,mine\n" for joint in ("L4L5", "L5S1"))
     (tmp_path / "own").mkdir()
     assert told(tmp_path / "own", text("ratios.csv", RATIOS + rows), approaches=wanted) == []
+
+
+@pytest.mark.parametrize("name", ["ik_smoth", "ik_constrained_", "ik_constrained_My-set"])
+def test_approaches_that_are_none_are_refused(name: str) -> None:
+    with pytest.raises(ValidationError, match="ik_constrained_ and the name of a set") as error:
+        asked(approaches=["ik", name])
+    assert ("did you mean 'ik_smooth'" in str(error.value)) == (name == "ik_smoth")
 
 
 def test_approaches_that_learn_from_trials_nobody_did_are_refused(tmp_path: Path) -> None:
