@@ -15,7 +15,7 @@ from spinepipe.studies.tracking.wang_2021.found import COHORT
 from spinepipe.studies.tracking.wang_2021.motions import claims_of_motions
 from spinepipe.studies.tracking.wang_2021.own_numbers import claims_of_own_numbers
 from spinepipe.studies.tracking.wang_2021.set_up import claims_of_set_up
-from spinepipe.studies.tracking.wang_2021.stiffness import claims_of_stiffness
+from spinepipe.studies.tracking.wang_2021.stiffness import claims_of_stiffness, generic_rows
 from spinepipe.tables import from_rows, read_frames, write
 
 CLAIMS = (
@@ -32,6 +32,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_wang_2021.parquet``; what needs an absent table is not computed."""
     settings, cohort = study_of_kind(Tracking, root, study)
     facts = {name: cohort.further[name] for name in COHORT if name in cohort.further}
+    facts["generic"] = generic_rows(cohort)
     rows = judged(CLAIMS, Run({**read_frames(tables), **facts}, asked_of(settings)))
     origin = provenance("against_wang_2021", settings, cohort)
     write(from_rows(AGAINST_WANG_2021, rows), output, origin)

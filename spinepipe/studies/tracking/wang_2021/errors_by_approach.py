@@ -4,8 +4,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
+import pandas as pd
+
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Run, exactly
-from spinepipe.studies.tracking.wang_2021.found import LEARNT, SETS, STANCE, numbers, of_kind
+from spinepipe.studies.tracking.settings import CONSTRAINED
+from spinepipe.studies.tracking.wang_2021.found import (
+    LEARNT,
+    SETS,
+    STANCE,
+    numbers,
+    of_kind,
+    over_persons,
+)
 from spinepipe.studies.tracking.wang_2021.paper import (
     YES_NO,
     Value,
@@ -55,7 +65,7 @@ ORDER = (BOTH, HIGHEST, GENERIC, IK, ZERO, CONS)
 """From the smallest error to the largest, centres and angles alike."""
 
 CHECK = {CENTRE: "W8", ANGLE: "W9"}
-_NO_SET = "of three sets of ratios; which is the paper's, it does not say"
+_ITS_SETS = "those of Christophy 2012, Bruno 2015 and Shojaei 2017, and it does not say whose error"
 
 
 def claims_of_errors() -> Iterator[Claim]:
@@ -81,24 +91,36 @@ def claims_of_errors() -> Iterator[Claim]:
 def error_of(run: Run, printed: Printed, measure: str) -> tuple[float, str]:
     """Our error of what stands for an approach, and whose it is.
 
-    Means over persons and stances; the best or the worst where several stand for it.
+    Means over persons and stances; the best or the worst where several stand for it. Where the run
+    has none of the paper's sets of ratios, others stand for them.
     """
     rows = of_kind(run, "accuracy", STANCE, measure=measure)
     there = {
-        name: float(numbers(own, "mean").mean())
+        str(name): float(numbers(own, "mean").mean())
         for name, own in rows.groupby("approach", observed=True)
-        if name in printed.ours
     }
-    if not there:
+    named = [name for name in there if name in printed.ours]
+    if printed is CONS and not named:
+        named = [name for name in there if name.startswith(CONSTRAINED)]
+    if not named:
         raise NotComputed(f"this run has no {printed.words} in stance with a truth")
-    chosen = (min if printed.least else max)(there, key=lambda name: there[name])
-    return there[chosen], str(chosen)
+    chosen = (min if printed.least else max)(named, key=lambda name: there[name])
+    return there[chosen], chosen
+
+
+def note_of_ratios(name: str) -> str:
+    """How a set of ratios stands to the paper's; nothing of an approach without."""
+    if not name.startswith(CONSTRAINED):
+        return ""
+    ratios = name.removeprefix(CONSTRAINED)
+    which = "one of" if name in SETS else "another than"
+    return f"the ratios {ratios} are {which} the paper's three, {_ITS_SETS} it prints"
 
 
 def _ours(printed: Printed, measure: str) -> Value:
     def ours(run: Run) -> Ours:
         value, name = error_of(run, printed, measure)
-        return Ours(value, note=f"{name}, {_NO_SET}" if printed is CONS else name)
+        return Ours(value, note="; ".join(part for part in (name, note_of_ratios(name)) if part))
 
     return ours
 
@@ -151,9 +173,27 @@ def _smaller(measure: str, better: Printed, worse: Printed) -> Callable[[Run], t
         one, other = (error_of(run, printed, measure) for printed in (better, worse))
         unit = UNIT[measure]
         told = f"ours: {one[0]:.3g} {unit} ({one[1]}) and {other[0]:.3g} {unit} ({other[1]})"
-        return one[0] < other[0], told
+        notes = (told, *(note_of_ratios(name) for name in (one[1], other[1])))
+        told = "; ".join(note for note in notes if note)
+        return one[0] < other[0], _by_person(run, measure, (one[1], other[1]), told)
 
     return found
+
+
+def _by_person(run: Run, measure: str, approaches: tuple[str, str], told: str) -> str:
+    """By how much the errors of two approaches differ within persons."""
+    one, other = approaches
+    if one == other:
+        raise NotComputed(f"the same approach stands for both; {told}")
+    first, second = (_errors(run, measure, name) for name in approaches)
+    return over_persons((first - second).dropna(), told, UNIT[measure])
+
+
+def _errors(run: Run, measure: str, approach: str) -> "pd.Series[float]":
+    """Mean error of each person in stance, over stances and levels."""
+    rows = of_kind(run, "errors", STANCE, measure=measure, approach=approach)
+    means: pd.Series[float] = rows.groupby("specimen", observed=True)["mean"].mean()
+    return means
 
 
 def _without_passive_elements() -> Iterator[Claim]:

@@ -2,7 +2,7 @@
 
 Its persons and X-rays are not published. What is single numbers of theirs, without a spread, is not
 comparable with ours, and is shown without a verdict; what holds of approaches whoever was tracked,
-orders and ranges that it prints, is compared.
+orders and ranges that it prints, is compared. An order that persons here do not tell has none.
 """
 
 from collections.abc import Callable
@@ -107,10 +107,25 @@ def not_comparable(
         note = f"; {found.note}" if found.note else ""
         raise NotComputed(
             f"not comparable: {OTHER_PERSONS}, and no uncertainty is printed; ours here is "
-            f"{found.value:.3g} {unit}{note}"
+            f"{f'{found.value:.3g} {unit}'.strip()}{note}"
         )
 
     return Claim(key, where, quantity, unit, paper, _shown(paper), told, "")
+
+
+def beside(
+    key: str, where: str, quantity: str, unit: str, window: Range, ours: Value, why: str
+) -> Claim:
+    """A range of the paper's own persons that concludes nothing of others: ours is told with it."""
+
+    def told(run: Run) -> Ours:
+        found = ours(run)
+        ends = "" if found.low is None else f" ({found.low:.3g} to {found.high:.3g})"
+        note = f"; {found.note}" if found.note else ""
+        value = f"{found.value:.3g} {unit}{ends}"
+        raise NotComputed(f"not comparable: {why}; ours here is {value}{note}")
+
+    return Claim(key, where, quantity, unit, None, window, told, "")
 
 
 def yes_no(

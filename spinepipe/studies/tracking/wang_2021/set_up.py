@@ -33,7 +33,7 @@ FREE = {
 }
 """Coordinates of a joint that move, and approaches that have them."""
 
-_SCALED = "here a person's own slices of the trunk are taken, none are scaled from one model"
+_SCALED = "here each cohort brings its persons' skeletons; there is no one generic man"
 
 
 def claims_of_set_up() -> Iterator[Claim]:
