@@ -6,7 +6,7 @@ from itertools import product
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.study_files import StudyFiles, numbered_blocks
+from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
@@ -64,6 +64,45 @@ class TrackingFiles(StudyFiles):
     """
 
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, "clusters", "weights")
+    drawings = (
+        Figure(
+            "error_by_level",
+            "How far vertebrae are from the truth",
+            "figures.error_by_level:error_by_level_figure",
+            ("errors",),
+        ),
+        Figure(
+            "kinematics",
+            "How lumbar joints turn",
+            "figures.kinematics:kinematics_figure",
+            ("tracked",),
+        ),
+        Figure(
+            "motion_sharing",
+            "How lumbar joints share a motion",
+            "figures.motion_sharing:motion_sharing_figure",
+            ("sharing",),
+        ),
+        Figure(
+            "stiffness_profiles",
+            "Whether markers tell stiffness",
+            "figures.stiffness_profiles:stiffness_profiles_figure",
+            ("profile_points", "profiles"),
+        ),
+        Figure(
+            "stiffness_by_level",
+            "What calibration makes of stiffness",
+            "figures.stiffness_by_level:stiffness_by_level_figure",
+            ("stiffness",),
+            ("profiles",),
+        ),
+        Figure(
+            "trade_off",
+            "Markers against loads",
+            "figures.trade_off:trade_off_figure",
+            ("weights",),
+        ),
+    )
 
     study: Tracking
     taken: Mapping[tuple[str, str, str], str | None]
