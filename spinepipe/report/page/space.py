@@ -22,7 +22,8 @@ class Space:
     ----------
     title : above it. chooser : what the menu chooses. shows : what a reader who cannot see it is
         told.
-    scenes : a plotly figure, as plain data, of each choice; `meta` of a trace is its group.
+    scenes : a plotly figure, as plain data, of each choice; `meta` of a trace is its group. One
+        that moves has `frames` besides: of each its `name`, and `x`, `y` and `z` of all traces.
     groups : what can be switched on and off, in words.
     still : a drawing (SVG) for paper and for readers without scripts; `still_shows` what it has.
     caption : below it.
@@ -36,6 +37,11 @@ class Space:
     still: bytes = b""
     still_shows: str = ""
     caption: str = ""
+
+    @property
+    def moves(self) -> bool:
+        """Whether some scene has frames."""
+        return any(scene.get("frames") for scene in self.scenes.values())
 
 
 def segment(
