@@ -1,6 +1,7 @@
 """The mark of a result file: one digest of all that it hangs on, kept inside the file itself.
 
-Parquet files hold it in their metadata, JSON files as their last key, all others at their end.
+Parquet files hold it in their metadata, JSON files as their last key, OpenSim's motions in their
+header, all others at their end.
 """
 
 import re
@@ -15,7 +16,12 @@ KEY = "result_digest"
 """Name of the mark in every file."""
 
 _LENGTH = 64
-_TEXTS = {".svg": "<!-- {} -->\n", ".html": "<!-- {} -->\n", ".yaml": "# {}\n"}
+_TEXTS = {
+    ".svg": "<!-- {} -->\n",
+    ".html": "<!-- {} -->\n",
+    ".osim": "<!-- {} -->\n",
+    ".yaml": "# {}\n",
+}
 """Kinds of text that end with the mark, and how a remark is written in them."""
 
 _TAIL_BYTES = 256
@@ -26,6 +32,11 @@ _AT_END = re.compile(
     re.DOTALL,
 )
 """The mark, and what a whole file has after it: nothing, the end of JSON or the end of a PNG."""
+
+_MOTION = ".mot"
+_HEAD_END = b"endheader\n"
+_HEAD_BYTES = 1024
+_IN_HEAD = re.compile(rb"^" + KEY.encode() + rb"=([0-9a-f]{64})\n", re.MULTILINE)
 
 _PARQUET = b"PAR1"
 _PARQUET_END_BYTES = 8
@@ -50,8 +61,11 @@ def marked(content: str | bytes, suffix: str, digest: str) -> bytes:
     assert len(digest) == _LENGTH
     if suffix == ".png":
         return _marked_png(raw, digest)
+    if suffix == _MOTION:
+        return raw.replace(_HEAD_END, f"{KEY}={digest}\n".encode() + _HEAD_END, 1)
     if suffix not in _TEXTS:
-        raise ValueError(f"a file {suffix} carries no mark: .json, .png, {', '.join(_TEXTS)}")
+        able = ".json", ".png", _MOTION, *_TEXTS
+        raise ValueError(f"a file {suffix} carries no mark: {', '.join(able)}")
     return raw + _TEXTS[suffix].format(f"{KEY}: {digest}").encode()
 
 
@@ -86,6 +100,8 @@ def read_mark(path: str | Path) -> str:
     with open(path, "rb") as file:
         if str(path).endswith(".parquet"):
             found = _IN_FOOTER.search(_footer(file))
+        elif str(path).endswith(_MOTION):
+            found = _IN_HEAD.search(file.read(_HEAD_BYTES))
         else:
             found = _AT_END.search(_tail(file, _TAIL_BYTES))
     return found[1].decode() if found else ""

@@ -5,6 +5,7 @@ from importlib import import_module
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_names, unknown
+from spinepipe.files import appearing
 from spinepipe.problems import InputError, Problem, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
@@ -40,12 +41,10 @@ def run(options: argparse.Namespace) -> int:
     specimen = specimen_of(cohort, options.specimen)
     results = options.root / "results" / study.study
     module, _, function = exports.partition(":")
-    model_of = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
-    model, words = model_of(study, cohort, specimen, options.pose, results)
-    from spinepipe.model.osim import write_osim
-
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    write_osim(model, options.output)
+    exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
+    document, words = exported(study, cohort, specimen, options.pose, results)
+    with appearing(options.output) as temporary:
+        temporary.write_text(document, encoding="utf-8")
     print(f"{options.output}: specimen {specimen}, {words}")
     return 0
 

@@ -5,7 +5,8 @@ below it, by three translations and by rotations Z, X', Y''. Passive elements ar
 two-sided exponentials, for which OpenSim has no force.
 """
 
-from itertools import pairwise
+from collections.abc import Sequence
+from itertools import chain, count, pairwise
 from pathlib import Path
 from xml.etree.ElementTree import SubElement
 
@@ -27,6 +28,21 @@ COLUMNS = tuple(f"{joint}_{name}" for joint in (PELVIS_JOINT, *JOINTS) for name 
 
 _PER_SI = np.array([1.0 if name in TRANSLATIONS else DEG_PER_RAD for name in COORDINATES])
 _HERE = Pose(np.eye(3), np.zeros(3))
+
+
+def usable(names: Sequence[str]) -> tuple[str, ...]:
+    """Names that OpenSim can take; in others _ stands for what it cannot take, and a number."""
+    taken = {name for name in names if parts.NAME.fullmatch(name)}
+    found = []
+    for name in names:
+        one = name
+        if one not in taken:
+            plain = "".join(c if parts.NAME.fullmatch(c) else "_" for c in name) or "_"
+            numbered = (f"{plain}_{k}" for k in count(2))
+            one = next(new for new in chain((plain,), numbered) if new not in taken)
+            taken.add(one)
+        found.append(one)
+    return tuple(found)
 
 
 def write_osim(path: str | Path, skeleton: Skeleton, markers: MarkerSet, name: str) -> None:

@@ -199,6 +199,19 @@ def _on_plates(markers: MarkerSet) -> Array:
     return found
 
 
+def by_body(factors: Array) -> Array:
+    """(18,) how many times as large bodies are, of factors (3,) of `SEGMENTS`."""
+    return np.array([factors[segment_of(k)] for k in range(len(BODIES))])
+
+
+def steps_of(skeleton: Skeleton, factors: Array) -> tuple[Pose, ...]:
+    """(17,) steps from joint to joint as large as the factors (3,) say."""
+    size = by_body(factors)
+    return tuple(
+        Pose(step.rotation, size[k] * step.origin) for k, step in enumerate(skeleton.steps)
+    )
+
+
 def scaled(
     skeleton: Skeleton, markers: MarkerSet, factors: Array, mass_kg: float
 ) -> tuple[Skeleton, MarkerSet]:
@@ -208,10 +221,7 @@ def scaled(
     ----------
     mass_kg : of all that the skeleton's bodies carry, pelvis to T1.
     """
-    size = np.array([factors[segment_of(k)] for k in range(len(BODIES))])
-    steps = tuple(
-        Pose(step.rotation, size[k] * step.origin) for k, step in enumerate(skeleton.steps)
-    )
+    size = by_body(factors)
     given = skeleton.masses
     heavier = mass_kg / float(given.kg.sum())
     masses = Masses(
@@ -222,4 +232,4 @@ def scaled(
     plates = _on_plates(markers)
     at = size[markers.body, None] * (markers.at - plates) + plates
     grown = MarkerSet(markers.names, markers.body, at, markers.weight, markers.cluster)
-    return Skeleton(steps, masses), grown
+    return Skeleton(steps_of(skeleton, factors), masses), grown

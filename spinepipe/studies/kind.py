@@ -84,7 +84,9 @@ class Kind:
     jobs : what computes them.
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
-    exports : ``file:function`` of what makes a model of a specimen for other programs.
+    exports : ``file:function`` of what makes OpenSim's document of a specimen; called with study,
+        cohort, specimen, number of a joint pose or None, and the folder of the results, it returns
+        the document, and in words what it is.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     """
 

@@ -6,7 +6,7 @@ import pytest
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.measures import rigidity, sagittal_angles, turned_apart
 from spinepipe.statistics.waveforms import Likeness, multiple_correlation
-from spinepipe.studies.tracking.clusters import cluster_rows
+from spinepipe.studies.tracking.examine import cluster_rows
 from spinepipe.studies.tracking.tables import CLUSTERS
 from spinepipe.tables import from_rows
 

@@ -65,14 +65,46 @@ rule weigh_loads:
         run_job(rule, "weigh", wildcards, input, output, log)
 
 
-rule rigid_clusters:
+# Clusters, size and what is remarkable of a person's recordings.
+rule examine_recordings:
     output:
-        output=f"{PERSON}/clusters.parquet",
+        clusters=f"{PERSON}/clusters.parquet",
+        remarks=f"{PERSON}/remarks.parquet",
+        sizes=f"{PERSON}/sizes.parquet",
     log:
-        f"{LOGS}/rigid_clusters/specimen={{specimen}}.log",
+        f"{LOGS}/examine_recordings/specimen={{specimen}}.log",
     resources:
         tmpdir=TMPDIR,
     params:
-        digest=digest("clusters"),
+        digest=digest("examine"),
     run:
-        run_job(rule, "clusters", wildcards, input, output, log)
+        run_job(rule, "examine", wildcards, input, output, log)
+
+
+# What OpenSim replays.
+rule export_skeleton:
+    output:
+        output=f"{TRACKED}/opensim/{{specimen}}.osim",
+    log:
+        f"{LOGS}/export_skeleton/specimen={{specimen}}.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("skeleton"),
+    run:
+        run_job(rule, "skeleton", wildcards, input, output, log)
+
+
+rule export_motion:
+    input:
+        tracked=f"{RESULTS}/jobs/specimen={{specimen}}/trial={{trial}}/approach={{approach}}/tracked.parquet",
+    output:
+        output=f"{TRACKED}/opensim/{{specimen}}/{{trial}}/{{approach,[a-z_0-9]+}}.mot",
+    log:
+        f"{LOGS}/export_motion/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("motion"),
+    run:
+        run_job(rule, "motion", wildcards, input, output, log)

@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model import SpineModel
+from spinepipe.model.osim import osim
 from spinepipe.problems import InputError, Problem
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
@@ -21,10 +21,10 @@ from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def model_of(
+def exported(
     study: JointPoseSensitivity, cohort: Cohort, specimen: str, pose: int | None, results: Path
-) -> tuple[SpineModel, str]:
-    """The model, and in words which frames and which stiffness it has.
+) -> tuple[str, str]:
+    """OpenSim's document of the model, and in words which frames and which stiffness it has.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def model_of(
         if calibrated is not None:
             stiffness, origin = calibrated, "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
-    return model, f"joint pose {name}, stiffness: {origin}"
+    return osim(model), f"joint pose {name}, stiffness: {origin}"
 
 
 def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:

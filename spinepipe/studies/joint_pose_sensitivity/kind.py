@@ -363,5 +363,5 @@ KIND = Kind(
     jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
     ignored_by_figures=("block",),
     makes_models="start_model",
-    exports="export:model_of",
+    exports="export:exported",
 )

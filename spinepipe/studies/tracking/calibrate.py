@@ -23,7 +23,7 @@ from spinepipe.tables import from_rows, write
 def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
     """Write rows of `stiffness`; law : name of the calibration."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    person = person_of(cohort, specimen, cohort.folder)
+    person = person_of(cohort, specimen, cohort.folder, settings.scaling)
     names = trials_of_law(cohort, specimen, law)
     seen = [seen_in(settings, person, one) for one in person.trials if one.name in names]
     made_by = provenance("calibrate", settings, cohort, [specimen], marks_of(cohort, specimen))

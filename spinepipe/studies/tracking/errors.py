@@ -12,6 +12,7 @@ from spinepipe.studies.tracking.forms import STANCE
 from spinepipe.studies.tracking.moved import Moved, kinds_of_trials, motions
 from spinepipe.studies.tracking.off_truth import Bones, Off, bones_of, errors_of
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.sizes import factors_in
 from spinepipe.studies.tracking.tables_of_studies import ERRORS
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.tables import from_rows, read_frames, write
@@ -21,9 +22,13 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``errors.parquet``; it is empty where no truth is known."""
     settings, cohort = study_of_kind(Tracking, root, study)
     known = list(truths(dict(cohort.further)))
-    bones = {name: bones_of(cohort, name) for name in {truth.specimen for truth in known}}
-    tracked = read_frames(tables)["tracked"]
-    rows = list(error_rows(tracked, known, bones, kinds_of_trials(cohort)))
+    found = read_frames(tables)
+    scaled = settings.scaling == "markers"
+    bones = {
+        name: bones_of(cohort, name, factors_in(found["sizes"], name) if scaled else None)
+        for name in {truth.specimen for truth in known}
+    }
+    rows = list(error_rows(found["tracked"], known, bones, kinds_of_trials(cohort)))
     write(from_rows(ERRORS, rows), output, provenance("errors", settings, cohort))
 
 

@@ -6,12 +6,17 @@ from itertools import product
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.forms import FORMS
-from spinepipe.studies.tracking.marks import marks_of_motion, marks_of_tracking
+from spinepipe.studies.tracking.marks import (
+    marks_of_export,
+    marks_of_motion,
+    marks_of_tracking,
+)
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import (
@@ -20,6 +25,8 @@ from spinepipe.studies.tracking.tables import (
     FITS,
     PROFILE_POINTS,
     PROFILES,
+    REMARKS,
+    SIZES,
     STIFFNESS,
     TRACKED,
 )
@@ -37,7 +44,7 @@ _ANALYSES = (
     Job("ranges", "", ("tracked",), ("ranges",)),
     Job("sharing", "", ("tracked",), ("sharing",)),
     Job("similarity", "", ("tracked",), ("similarity",)),
-    Job("errors", "", ("tracked",), ("errors",)),
+    Job("errors", "", ("tracked", "sizes"), ("errors",)),
     Job("accuracy", "", ("errors",), ("accuracy",)),
     Job(
         "against_wang_2021",
@@ -52,6 +59,7 @@ _ANALYSES = (
 
 _OF_MOTIONS = ("tracked", "fits", "drawn")
 _OF_PROFILES = ("profiles", "profile_points")
+_OF_RECORDINGS = ("clusters", "remarks", "sizes")
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,7 @@ class TrackingFiles(StudyFiles):
     taken : calibration that each motion takes over, by specimen, trial and approach; None for none.
     """
 
-    joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, "clusters", "weights")
+    joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
         Figure(
             "error_by_level",
@@ -128,7 +136,7 @@ class TrackingFiles(StudyFiles):
         """The tables that this study has."""
         laws = ("stiffness",) if self.laws else ()
         analysed = (name for job in _ANALYSES for name in job.writes)
-        return (*_OF_MOTIONS, *laws, *_OF_PROFILES, "clusters", "weights", *analysed)
+        return (*_OF_MOTIONS, *laws, *_OF_PROFILES, *_OF_RECORDINGS, "weights", *analysed)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -142,8 +150,9 @@ class TrackingFiles(StudyFiles):
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        jobs = {"stiffness": "calibrate", "clusters": "clusters", "weights": "weigh"}
+        jobs = {"stiffness": "calibrate", "weights": "weigh"}
         jobs |= dict.fromkeys(_OF_PROFILES, "profile")
+        jobs |= dict.fromkeys(_OF_RECORDINGS, "examine")
         return jobs.get(table, "track")
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
@@ -159,6 +168,12 @@ class TrackingFiles(StudyFiles):
         """The job files of which a block is made."""
         place = self._of(specimen)
         return [f"{place}/{part}{table}.parquet" for part in self._parts(table, specimen)]
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Skeletons and motions as OpenSim reads them."""
+        skeletons = (f"opensim/{name}.osim" for name in self.specimens)
+        return (*skeletons, *(f"opensim/{'/'.join(key)}.mot" for key in self.taken))
 
     def _of(self, specimen: str) -> str:
         return f"{self.folder}/jobs/specimen={specimen}"
@@ -179,6 +194,11 @@ class TrackingFiles(StudyFiles):
 
 
 _COUNTED = ignoring("approaches", "profiles", "trade_off", "drawn_approaches")
+_ASKED = tuple(
+    name for name in Tracking.model_fields if name not in {*Study.model_fields, "kind", "scaling"}
+)
+"""Settings that decide how motions are found, not who was recorded."""
+
 
 KIND = Kind(
     settings=Tracking,
@@ -186,7 +206,7 @@ KIND = Kind(
     checks=(check_tracking,),
     checks_at_start=(check_recordings,),
     tables=(
-        *(TRACKED, FITS, STIFFNESS, PROFILES, PROFILE_POINTS, CLUSTERS, DRAWN),
+        *(TRACKED, FITS, STIFFNESS, PROFILES, PROFILE_POINTS, CLUSTERS, REMARKS, SIZES, DRAWN),
         *(RANGES, SHARING, SIMILARITY, ERRORS, ACCURACY, WEIGHTS, AGAINST_WANG_2021),
     ),
     jobs=(
@@ -207,8 +227,17 @@ KIND = Kind(
             ignores=ignoring("approaches", "profiles", "drawn_approaches"),
             also=marks_of_motion,
         ),
-        Job("clusters", header_alone=False, ignores=_COUNTED, also=marks_of_motion),
+        Job("examine", ignores=ignoring(*_ASKED, "scaling"), also=marks_of_motion),
+        Job("skeleton", "opensim:skeleton", ignores=ignoring(*_ASKED), also=marks_of_motion),
+        Job(
+            "motion",
+            "opensim:motion",
+            many=True,
+            ignores=ignoring(*_ASKED, "scaling"),
+            also=marks_of_export,
+        ),
         *_ANALYSES,
     ),
+    exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),
 )

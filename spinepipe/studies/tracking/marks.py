@@ -26,3 +26,8 @@ def marks_of_tracking(expected: Any, place: Mapping[str, str]) -> list[str]:
     if law is None:
         return found
     return [*found, expected.of_job("calibrate", {"specimen": place["specimen"], "law": law})]
+
+
+def marks_of_export(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of the tracked motion that is written for another program."""
+    return [expected.of_job("track", place)]

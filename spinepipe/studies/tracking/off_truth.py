@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.motion.measures import between_neighbours, sagittal_angles, turned_apart
+from spinepipe.motion.scaling import by_body, steps_of
 from spinepipe.motion.skeleton import BODIES, JOINTS, PELVIS, Skeleton, body_poses
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.moved import Moved
@@ -44,10 +45,14 @@ class Off:
     told: NDArray[np.bool_]
 
 
-def bones_of(cohort: Cohort, specimen: str) -> Bones:
-    """A person's skeleton and centres."""
+def bones_of(cohort: Cohort, specimen: str, factors: Array | None = None) -> Bones:
+    """A person's skeleton and centres; factors : (3,) by which its parts were made larger."""
     skeleton = skeleton_in(cohort, specimen, subject_of(cohort, specimen))
-    return Bones(skeleton, centres_of(cohort, specimen, skeleton))
+    centres = centres_of(cohort, specimen, skeleton)
+    if factors is None:
+        return Bones(skeleton, centres)
+    grown = Skeleton(steps_of(skeleton, factors), skeleton.masses)
+    return Bones(grown, by_body(factors)[:, None] * centres)
 
 
 def errors_of(moved: Moved, truth: Truth, bones: Bones) -> Iterator[Off]:

@@ -7,7 +7,7 @@ without `bodies.csv` says `gravity: false`, which here is about the file alone: 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.ratios import RatioSet
 from spinepipe.motion.reading import DEFAULT_AXES, read_motion
 from spinepipe.motion.recorded import Recorded
+from spinepipe.motion.scaling import by_body, scaled
 from spinepipe.motion.skeleton import (
     BODIES,
     PELVIS,
@@ -42,6 +43,8 @@ from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE
+from spinepipe.studies.tracking.settings import Scaling
+from spinepipe.studies.tracking.sizes import Sized, sized_by
 from spinepipe.units import MM_PER_M
 
 LOWER_TRUNK_PERCENT = {"male": 11.17, "female": 12.47}
@@ -71,6 +74,7 @@ class Person:
     trials : in the order of the file, markers in the order of the set.
     passive, limits : what comes along, the cohort's own rows in place.
     centres : (18, 3) m, the point of each body that counts as its centre, in its frame.
+    static : name of the trial that tells how the person stands; None without one.
     """
 
     name: str
@@ -81,20 +85,44 @@ class Person:
     passive: PassiveElements
     limits: Bounds
     centres: Array
+    static: str | None
 
 
-def person_of(cohort: Cohort, specimen: str, folder: Path) -> Person:
+def person_of(cohort: Cohort, specimen: str, folder: Path, scaling: Scaling = "none") -> Person:
     """A person and what was recorded.
 
     Parameters
     ----------
     folder : of the cohort, where the files of motion are.
+    scaling : by markers, skeleton and markers are as large as the static trial says, and as the
+        cohort has them where it does not say it.
 
     Raises
     ------
     InputError
         Of motion that cannot be read, and of joint tables that are unsound.
     """
+    told = _as_told(cohort, specimen, folder)
+    fit = size_of(told).fit if scaling == "markers" else None
+    return told if fit is None else as_large(told, fit.factors)
+
+
+def size_of(person: Person) -> Sized:
+    """How large a person is beside the skeleton, by the static trial."""
+    trial = next((trial for trial in person.trials if trial.name == person.static), None)
+    return sized_by(person.skeleton, person.markers, trial)
+
+
+def as_large(person: Person, factors: Array) -> Person:
+    """A person, parts (3,) of the skeleton so many times as large; what bodies weigh stays."""
+    kg = float(person.skeleton.masses.kg.sum())
+    skeleton, markers = scaled(person.skeleton, person.markers, factors, kg)
+    centres = by_body(factors)[:, None] * person.centres
+    return replace(person, skeleton=skeleton, markers=markers, centres=centres)
+
+
+def _as_told(cohort: Cohort, specimen: str, folder: Path) -> Person:
+    """The same as large as the cohort has it."""
     subject = subject_of(cohort, specimen)
     skeleton = skeleton_in(cohort, specimen, subject)
     markers = marker_set(cohort, specimen)
@@ -110,6 +138,7 @@ def person_of(cohort: Cohort, specimen: str, folder: Path) -> Person:
         laws.passive_elements(own_rows(cohort, PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}"),
         ranges.bounds(own_rows(cohort, BOUNDS.stem), f"{cohort.name}/{BOUNDS.file}"),
         centres_of(cohort, specimen, skeleton),
+        static_trial(cohort, specimen),
     )
 
 

@@ -49,7 +49,7 @@ def run(
 ) -> None:
     """Write the rows of a region and coordinate, a file for each table."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    person = person_of(cohort, specimen, cohort.folder)
+    person = person_of(cohort, specimen, cohort.folder, settings.scaling)
     made_by = provenance("profile", settings, cohort, [specimen], marks_of(cohort, specimen))
     known: Row = {"specimen": specimen, "region": region, "coordinate": coordinate}
     ratios = np.array(sorted(settings.profiles.ratios))

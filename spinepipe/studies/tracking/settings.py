@@ -57,6 +57,8 @@ LEARNT: dict[str, str] = {
 }
 """From which trials passive elements are, that an approach takes over."""
 
+Scaling = Literal["none", "markers"]
+
 ForceCost = Literal["squared", "minus_gravity", "level_difference"]
 
 Ratio = Annotated[float, Field(gt=0, le=1e4)]
@@ -133,6 +135,11 @@ class Tracking(Study):
         default="level_difference",
         description="which loads cost: squared, all that muscles do; minus_gravity, as if bodies "
         "had no weight; level_difference, by how much it differs from joint to joint",
+    )
+    scaling: Scaling = Field(
+        default="none",
+        description="of skeletons: none, the cohort's are taken as they are; markers, pelvis, "
+        "lumbar and thoracic part are made as large as markers of the static trial say",
     )
     scales: Scales = Field(default=Scales(), description="what counts as much as what")
     bounds: Bounds = Field(default=Bounds(), description="ranges of joints")

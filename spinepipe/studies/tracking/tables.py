@@ -1,5 +1,6 @@
 """Tables of studies of kind tracking: one person, one motion, one approach."""
 
+from spinepipe.motion.scaling import SEGMENTS
 from spinepipe.status import Status
 from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
 from spinepipe.tables.schema import MESSAGE, SPECIMEN, Column, Table, length_or_angle
@@ -275,6 +276,48 @@ CLUSTERS = Table(
             "not_rigid: distances vary more than those of a rigid cluster do",
             allowed=("rigid", "not_rigid", "too_few"),
         ),
+    ),
+)
+
+TOLD, NOT_TOLD, NO_STATIC = "told", "not_told", "no_static"
+
+_NO_SIZE = "markers do not tell the size, see status"
+
+SIZES = Table(
+    "sizes",
+    "How large persons are beside the cohort's skeleton, by pairs of markers in the static trial: "
+    "one row per person and part of the skeleton. How well that fits is of all pairs together. "
+    "Motions are tracked with it where `scaling` is markers.",
+    ("specimen", "segment"),
+    (
+        SPECIMEN,
+        Column("segment", "text", "part of the skeleton", allowed=SEGMENTS),
+        Column("factor", "number", "size over the cohort's", null=_NO_SIZE, low=0.0),
+        Column("n_pairs", "integer", "pairs of markers that tell it", low=0),
+        length("rms", "root mean square of what is left of their distances", _NO_SIZE),
+        length("largest", "most that is left of one distance", _NO_SIZE),
+        Column("first_marker", "text", "one marker of this pair; may be empty"),
+        Column("second_marker", "text", "the other; may be empty"),
+        Column(
+            "status",
+            "text",
+            "told; not_told: pairs do not tell it, or it is none of a person; no_static: no trial "
+            "is static",
+            allowed=(TOLD, NOT_TOLD, NO_STATIC),
+        ),
+        MESSAGE,
+    ),
+)
+
+REMARKS = Table(
+    "remarks",
+    "What a reader must know of recordings though nothing of them is refused: one row per person, "
+    "trial and remark.",
+    ("specimen", "trial", "remark"),
+    (
+        SPECIMEN,
+        Column("trial", "text", "motion, as in trials.csv; empty where it is of the person"),
+        Column("remark", "text", "what is so, or what was put right"),
     ),
 )
 

@@ -34,7 +34,7 @@ def run(
 ) -> None:
     """Write a file for each table; law : the calibration that is taken over, if any."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    person = person_of(cohort, specimen, cohort.folder)
+    person = person_of(cohort, specimen, cohort.folder, settings.scaling)
     taken = [law_in(read_frame(path), person.passive) for path in law]
     learnt = taken[0] if taken else None
     known: Row = {"specimen": specimen, "trial": trial, "approach": approach}

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import Trial
 from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, seen_in
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.moved import Moved
-from spinepipe.studies.tracking.off_truth import bones_of, errors_of
+from spinepipe.studies.tracking.off_truth import Bones, errors_of
 from spinepipe.studies.tracking.persons import Person, person_of
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.settings import Approach, Tracking
@@ -31,21 +30,19 @@ MEASURED = ("centre_mm", "angle_deg")
 def run(root: str, study: str, specimen: str, output: str) -> None:
     """Write the rows of a person."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    person = person_of(cohort, specimen, cohort.folder)
+    person = person_of(cohort, specimen, cohort.folder, settings.scaling)
     everyone = truths(dict(cohort.further))
     known = {truth.trial: truth for truth in everyone if truth.specimen == specimen}
     rows = [
         {"specimen": specimen, "trial": trial.name} | row
         for trial in person.trials
-        for row in weighed(settings, cohort, person, trial, known.get(trial.name))
+        for row in weighed(settings, person, trial, known.get(trial.name))
     ]
     made_by = provenance("weigh", settings, cohort, [specimen], marks_of(cohort, specimen))
     write(from_rows(WEIGHTS, rows), output, made_by)
 
 
-def weighed(
-    settings: Tracking, cohort: Cohort, person: Person, trial: Trial, truth: Truth | None
-) -> Iterator[Row]:
+def weighed(settings: Tracking, person: Person, trial: Trial, truth: Truth | None) -> Iterator[Row]:
     """Rows of a trial by ratio."""
     seen, ask = seen_in(settings, person, trial), asked_of(settings, person, APPROACH)
     for ratio in sorted(settings.trade_off):
@@ -54,7 +51,7 @@ def weighed(
         try:
             found = found_by(APPROACH, heavier, seen, {})
             fit = fit_row(settings, found, time.process_time() - begun)
-            off = _errors(cohort, person.name, trial.name, found, truth)
+            off = _errors(person, trial.name, found, truth)
         except (ValueError, np.linalg.LinAlgError) as why:
             fit, off = failed_row(str(why)), dict.fromkeys(MEASURED)
         shown = ("marker_rmse_mm", "load_rms_nm", "status")
@@ -62,14 +59,14 @@ def weighed(
 
 
 def _errors(
-    cohort: Cohort, specimen: str, trial: str, found: Found, truth: Truth | None
+    person: Person, trial: str, found: Found, truth: Truth | None
 ) -> dict[str, float | None]:
     """Mean errors where the truth is known."""
     sizes: dict[str, float | None] = dict.fromkeys(MEASURED)
     if truth is None:
         return sizes
-    moved = Moved(specimen, trial, APPROACH, found.watched.grid.times_s, found.q)
-    for off in errors_of(moved, truth, bones_of(cohort, specimen)):
+    moved = Moved(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
+    for off in errors_of(moved, truth, Bones(person.skeleton, person.centres)):
         if off.measure in MEASURED and off.told.any():
             sizes[off.measure] = float(off.size[off.told].mean())
     return sizes

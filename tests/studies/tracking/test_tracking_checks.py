@@ -17,7 +17,7 @@ from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.persons import person_of
-from spinepipe.studies.tracking.remarks import repairs_of, warnings_of
+from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
 from spinepipe.studies.tracking.settings import Tracking
 
 DOCUMENT = Document("s.yaml", {}, {})
@@ -391,9 +391,10 @@ def test_levels_without_markers_are_a_warning(tmp_path: Path) -> None:
     cohort = cohorts.read(folder, (SUBJECTS, *FORMS))
     assert not list(check_recordings(DOCUMENT, asked(), cohort, tmp_path))
     warnings = warnings_of(person_of(cohort, "a", folder))
-    assert warnings[0].startswith("6 levels from T7 to T1 without a marker")
-    assert warnings[1].startswith("flexion_extension: 1 short gaps, most of T9")
-    assert repairs_of(cohort, "a")[0] == (
-        "stance: not in the set and ignored: T3_a, T3_b, T3_c, T5"
-    )
+    assert warnings[0].text.startswith("6 levels from T7 to T1 without a marker")
+    assert warnings[0].trial == ""
+    assert warnings[1].trial == "flexion_extension"
+    assert warnings[1].text.startswith("1 short gaps, most of T9")
+    spare = "not in the set and ignored: T3_a, T3_b, T3_c, T5"
+    assert repairs_of(cohort, "a")[0] == Remark("stance", spare)
     assert BODIES.index("T1") - BODIES.index("T7") == 6

@@ -1,18 +1,21 @@
-"""Job: whether clusters of markers are rigid, as markers on a plate have to be."""
+"""Job: a person's recordings before anything is tracked: clusters, size, what is remarkable."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.measures import rigidity
 from spinepipe.motion.skeleton import MarkerSet, Trial
 from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.persons import person_of
+from spinepipe.studies.tracking.persons import Person, person_of, size_of
+from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import CLUSTERS
+from spinepipe.studies.tracking.sizes import Sized, size_rows
+from spinepipe.studies.tracking.tables import CLUSTERS, REMARKS, SIZES
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 
@@ -20,13 +23,25 @@ RIGID_MM = 1.0
 """More is not rigid: Wang et al. 2021 found 0.27 mm (SD 0.04), and cameras add some tenths."""
 
 
-def run(root: str, study: str, specimen: str, output: str) -> None:
-    """Write the rows of a person."""
+def run(root: str, study: str, specimen: str, clusters: str, remarks: str, sizes: str) -> None:
+    """Write the rows of a person, a file for each table."""
     settings, cohort = study_of_kind(Tracking, root, study)
     person = person_of(cohort, specimen, cohort.folder)
-    rows = [row for one in person.trials for row in cluster_rows(specimen, person.markers, one)]
-    made_by = provenance("clusters", settings, cohort, [specimen], marks_of(cohort, specimen))
-    write(from_rows(CLUSTERS, rows), output, made_by)
+    found = size_of(person)
+    rigid = [row for one in person.trials for row in cluster_rows(specimen, person.markers, one)]
+    made_by = provenance("examine", settings, cohort, [specimen], marks_of(cohort, specimen))
+    write(from_rows(CLUSTERS, rigid), clusters, made_by)
+    write(from_rows(REMARKS, list(remark_rows(cohort, person, found))), remarks, made_by)
+    write(from_rows(SIZES, list(size_rows(specimen, found))), sizes, made_by)
+
+
+def remark_rows(cohort: Cohort, person: Person, found: Sized) -> Iterator[dict[str, Any]]:
+    """Rows of table `remarks`: what is so, then what was put right, each once."""
+    remarks = [*warnings_of(person), *repairs_of(cohort, person.name)]
+    if found.message:
+        remarks.append(Remark("", found.message))
+    for remark in dict.fromkeys(remarks):
+        yield {"specimen": person.name, "trial": remark.trial, "remark": remark.text}
 
 
 def cluster_rows(specimen: str, markers: MarkerSet, trial: Trial) -> Iterator[dict[str, Any]]:
