@@ -107,7 +107,8 @@ def _scene(one: Shown) -> Any:
         f"{letter}axis": {**light_axis(letter, title), "range": box[0][letter]}
         for letter, title in zip("xyz", TITLES, strict=True)
     }
-    camera = {"up": {"x": 0, "y": 1, "z": 0}, "eye": {"x": -1.5, "y": 0.35, "z": 1.25}}
+    camera = {"up": {"x": 0, "y": 1, "z": 0}, "eye": {"x": -1.6, "y": 0.35, "z": 1.35}}
+    camera["center"] = {"x": 0, "y": -0.1, "z": 0}
     layout = {
         "template": "none",
         "scene": {**axes, "aspectmode": "manual", "aspectratio": aspect(box), "camera": camera},

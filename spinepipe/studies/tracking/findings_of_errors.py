@@ -1,0 +1,306 @@
+"""Which approach is nearest the truth, and whether persons tell approaches apart.
+
+An error of a person is the mean over levels, then over trials. Two approaches are held against each
+other person by person: the difference counts where its 95 % interval over persons is all on one
+side of zero, and of fewer than three persons nothing is said to be better.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.page.document import Results
+from spinepipe.report.words import capital, count, listed, number
+from spinepipe.statistics.outcome import Mean, corrected, mean_of
+from spinepipe.status import Status
+from spinepipe.studies.tracking.forms import STANCE
+from spinepipe.studies.tracking.moved import kinds_of_trials
+from spinepipe.studies.tracking.settings import LEARNT, Tracking
+from spinepipe.studies.tracking.tables import MARKER_OFF
+from spinepipe.studies.tracking.tables_of_studies import MEASURES
+from spinepipe.studies.tracking.words import in_order, short_of, sized, told
+
+FEWEST = 3
+"""Persons that a verdict needs."""
+
+SIGNIFICANT = 0.05
+SAID = ("centre_mm", "angle_deg")
+"""Measures that are spoken of, the one that the answer hangs on first."""
+
+IK, ZERO, GENERIC = "ik", "optk_zero", "optk_generic"
+CALIBRATED = ("optk_calibrated", *LEARNT)
+MOVING_WORDS, STANCE_WORDS = "in motion", "in stance"
+
+_SAME = 1e-9
+_MOST_NAMES = 4
+
+
+@dataclass(frozen=True)
+class Paired:
+    """How much larger the error of one approach is than that of another, within persons.
+
+    Attributes
+    ----------
+    mean : of the differences, with its interval.
+    """
+
+    mean: Mean
+    scale: float
+
+    @property
+    def verdict(self) -> str:
+        """``too_few``, ``same``, ``smaller``, ``larger`` or ``unsure``."""
+        if self.mean.n < FEWEST or self.mean.value is None:
+            return "too_few"
+        if self.mean.interval is None:
+            return "same" if abs(self.mean.value) <= _SAME * self.scale else "unsure"
+        low, high = self.mean.interval
+        return "smaller" if high < 0.0 else "larger" if low > 0.0 else "unsure"
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Errors of a measure by person (rows) and approach (columns), the least mean first.
+
+    Attributes
+    ----------
+    words : over what, ``in motion`` or ``in stance``. trials : their names.
+    lacking : approaches that do not have all motions whose truth is known.
+    """
+
+    measure: str
+    words: str
+    trials: tuple[str, ...]
+    values: pd.DataFrame
+    lacking: tuple[str, ...]
+
+    @property
+    def approaches(self) -> list[str]:
+        """Names, the least error first."""
+        return [str(name) for name in self.values]
+
+    @property
+    def n(self) -> int:
+        """Number of persons."""
+        return len(self.values)
+
+    def mean(self, approach: str) -> Mean:
+        """Mean over persons and its interval."""
+        return mean_of(self.values[approach].to_numpy(float))
+
+    def sized(self, approach: str) -> str:
+        """Mean error with its unit."""
+        return sized(float(self.values[approach].mean()), self.measure)
+
+    def paired(self, one: str, other: str) -> Paired:
+        """The error of one approach less that of another, within persons."""
+        apart = (self.values[one] - self.values[other]).to_numpy(float)
+        return Paired(
+            mean_of(apart), float(np.abs(self.values[[one, other]].to_numpy(float)).max())
+        )
+
+    @property
+    def alike(self) -> list[str]:
+        """Approaches whose error is not told from the least, corrected for how many there are."""
+        best, *others = self.approaches
+        ps = [self.paired(name, best).mean.p for name in others]
+        held = zip(others, corrected(ps, "holm"), strict=True)
+        return [name for name, p in held if p is None or p >= SIGNIFICANT]
+
+
+def standings(cohort: Cohort, results: Results, measure: str) -> list[Standing]:
+    """Of motions, then of stances, where a truth is known."""
+    errors = results.table("errors")
+    if errors.empty:
+        return []
+    kinds = kinds_of_trials(cohort)
+    keys = zip(errors["specimen"], errors["trial"], strict=True)
+    stands = np.array([kinds.get((str(a), str(b))) == STANCE for a, b in keys])
+    own = errors["measure"] == measure
+    found = [
+        _standing(measure, words, errors[own & chosen])
+        for words, chosen in ((MOVING_WORDS, ~stands), (STANCE_WORDS, stands))
+    ]
+    return [one for one in found if one is not None]
+
+
+def _standing(measure: str, words: str, rows: pd.DataFrame) -> Standing | None:
+    if rows.empty:
+        return None
+    keys = ["specimen", "trial", "approach"]
+    wide = rows.groupby(keys, observed=True)["mean"].mean().unstack("approach")
+    whole = wide.dropna(axis="columns")
+    if whole.empty or not len(whole.columns):
+        return None
+    values = whole.groupby(level="specimen").mean()
+    means = {
+        name: float(values[name].to_numpy(float).mean()) for name in in_order(map(str, values))
+    }
+    order = sorted(means, key=lambda name: means[name])
+    lacking = tuple(in_order(set(wide.columns) - set(whole.columns)))
+    return Standing(measure, words, tuple(dict.fromkeys(rows["trial"])), values[order], lacking)
+
+
+def nearest(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """The least error of each measure, and what cannot be told from it."""
+    for measure in SAID:
+        for one in standings(cohort, results, measure):
+            said = f"{capital(one.words)}, {MEASURES[measure][1]}: {_least(one)}"
+            yield f"{said}{_lost(one)}{_unsettled(one, results.table('fits'))}"
+
+
+def _least(one: Standing) -> str:
+    best = one.approaches[0]
+    said = f"the least error has {told(best)}, {one.sized(best)}{between(one, best)}"
+    if len(one.approaches) < 2:
+        return f"{said}; nothing is there to compare it with."
+    worst = one.approaches[-1]
+    said += f", the largest {told(worst)}, {one.sized(worst)}"
+    if one.n < FEWEST:
+        return f"{said}. {too_few(one.n)}"
+    others = one.approaches[1:]
+    alike = one.alike
+    held = f"over {one.n} persons, corrected for {count(len(others), 'comparison')}"
+    if not alike:
+        return f"{said}. It is smaller than that of all others ({held})."
+    if len(alike) == len(others):
+        return f"{said}. No other can be told from it ({held}), so none is shown to be the best."
+    names = listed([told(name) for name in alike], _MOST_NAMES)
+    return f"{said}. Not told from the least ({held}): {names}."
+
+
+def _lost(one: Standing) -> str:
+    if not one.lacking:
+        return ""
+    return f" Left out, as not all motions were found: {listed(map(told, one.lacking))}."
+
+
+def _unsettled(one: Standing, fits: pd.DataFrame) -> str:
+    """Fits behind the least error that did not settle."""
+    if fits.empty:
+        return ""
+    own = fits[fits["trial"].isin(one.trials) & (fits["approach"] == one.approaches[0])]
+    lost = own[~own["status"].isin([Status.CONVERGED.value, MARKER_OFF])]
+    if lost.empty:
+        return ""
+    return f" Of the fits behind the least error {len(lost)} of {len(own)} did not settle."
+
+
+def between(one: Standing, approach: str) -> str:
+    """Interval of a mean error; errors are not negative, whatever Student's interval says."""
+    ends = one.mean(approach).interval
+    if ends is None or one.n < FEWEST:
+        return ""
+    low, high = (max(end, 0.0) for end in ends)
+    return f" (95 % interval {number(low, 2)} to {sized(high, one.measure)})"
+
+
+def too_few(n: int) -> str:
+    """Why there is no verdict."""
+    return f"{capital(count(n, 'person'))} cannot tell approaches apart: that takes {FEWEST}."
+
+
+def beside_kinematics(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """Whether dynamics are better than inverse kinematics, without passive elements and with."""
+    for first in (ZERO, GENERIC):
+        for measure in SAID:
+            every = standings(cohort, results, measure)
+            there = [one for one in every if {first, IK} <= set(one.approaches)]
+            if there:
+                told_ = "; ".join(compared(one, first, IK) for one in there)
+                yield (
+                    f"{capital(told(first))} beside {told(IK)}, {MEASURES[measure][1]}: {told_}."
+                )
+
+
+def compared(one: Standing, first: str, other: str) -> str:
+    """Errors of two approaches, and whether persons tell them apart."""
+    verdicts = {
+        "smaller": "better",
+        "larger": "worse",
+        "same": "as good",
+        "unsure": "not told apart",
+        "too_few": f"{count(one.n, 'person')} cannot tell them apart",
+    }
+    found = one.paired(first, other)
+    said = f"{one.words} {one.sized(first)} against {one.sized(other)}, {verdicts[found.verdict]}"
+    if found.verdict == "too_few" or found.mean.interval is None or found.mean.value is None:
+        return said
+    low, high = (number(end, 2) for end in found.mean.interval)
+    value = number(found.mean.value, 2)
+    return f"{said} (difference {value}, 95 % interval {low} to {high}, {one.n} persons)"
+
+
+def calibrated(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """Whether calibrated passive elements are better or worse than generic ones."""
+    for measure in SAID:
+        for one in standings(cohort, results, measure):
+            there = [name for name in CALIBRATED if name in one.approaches]
+            if there and GENERIC in one.approaches:
+                yield _beside_generic(one, there)
+
+
+def _beside_generic(one: Standing, there: list[str]) -> str:
+    names = {name: short_of(name).removeprefix("dynamics, ") for name in there}
+    values = [f"{names[name]} {one.sized(name)}" for name in there]
+    said = (
+        f"Calibrated passive elements, {MEASURES[one.measure][1]} {one.words}: "
+        f"{listed(values, len(values))}, against {one.sized(GENERIC)} with generic ones. "
+        f"{worse_words(one, there)}"
+    )
+    sure = {name: one.paired(name, GENERIC).verdict for name in there}
+    if one.n < FEWEST:
+        return f"{said} {too_few(one.n)}"
+    kinds = {"smaller": "Better beyond its interval", "larger": "Worse beyond its interval"}
+    parts = [
+        f"{words}: {listed([names[name] for name in there if sure[name] == kind])}."
+        for kind, words in kinds.items()
+        if kind in sure.values()
+    ]
+    if not parts:
+        return f"{said} Over {one.n} persons none of these differences is larger than its interval."
+    return f"{said} {' '.join(parts)}"
+
+
+def all_worse(one: Standing, there: list[str]) -> bool:
+    """Whether every one of some calibrations has a larger mean error than generic elements."""
+    generic = float(one.values[GENERIC].mean())
+    return all(float(one.values[name].mean()) > generic for name in there)
+
+
+def worse_words(one: Standing, there: list[str]) -> str:
+    """Whether calibration makes the mean error larger or smaller."""
+    worse = [name for name in there if all_worse(one, [name])]
+    if len(worse) == len(there):
+        return "On average calibration makes it worse."
+    if not worse:
+        return "On average calibration does not make it worse."
+    return f"On average {len(worse)} of {len(there)} calibrations make it worse."
+
+
+def close_to_markers(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """Whether the approach that is closest to the markers is nearest the truth as well."""
+    fits = results.table("fits")
+    for one in standings(cohort, results, SAID[0])[:1]:
+        if fits.empty or len(one.approaches) < 2:
+            return
+        own = fits[fits["trial"].isin(one.trials) & fits["approach"].isin(one.approaches)]
+        off = own.groupby("approach", observed=True)["marker_rmse_mm"].mean().dropna()
+        best = one.approaches[0]
+        if best not in off:
+            return
+        closest = str(off.idxmin())
+        here = f"{capital(one.words)}, closest to the markers is {told(closest)}"
+        here += f" ({sized(float(off[closest]), SAID[0])}, root mean square)"
+        if closest == best:
+            yield f"{here}, which has the least error of {MEASURES[one.measure][1]} too."
+            return
+        place = one.approaches.index(closest) + 1
+        yield (
+            f"{here}, but in errors of {MEASURES[one.measure][1]} it is number {place} of "
+            f"{len(one.approaches)}; {told(best)} leaves markers {sized(float(off[best]), SAID[0])}"
+            " off. How closely markers are met does not show which posture is right."
+        )

@@ -1,0 +1,187 @@
+"""What markers tell of stiffness, and what calibrations and weights make of it.
+
+A calibrated stiffness is said to be a property of a spine only where the profile of its region and
+coordinate is closed at both ends.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.page.document import Results
+from spinepipe.report.words import AXIS, capital, count, listed, number, percent, plain, tick
+from spinepipe.status import Status
+from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables import VERDICTS
+from spinepipe.studies.tracking.words import short_of, sized
+
+Row = dict[Any, Any]
+
+NOT_KNOWN = "a number of the fit and no property of the spine"
+_MOST_PLACES = 9
+
+
+def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """What profiles say, each verdict in plain words."""
+    rows = results.table("profiles")
+    if rows.empty:
+        return
+    for verdict in VERDICTS:
+        own = rows[rows["verdict"] == verdict]
+        if len(own):
+            yield _SAY[verdict](own, rows)
+    edges = rows[_at_end(rows, results.table("profile_points"))]
+    if len(edges):
+        ways = sorted({tick(float(value)) for value in edges["best_ratio"]})
+        yield (
+            f"In {len(edges)} of {count(len(rows), 'profile')} the least cost lies at the end of "
+            f"what was tried ({listed(ways)} times generic): a better value may lie beyond it, and "
+            "slipping skin or loads that are left out can ask for it as well as a spine."
+        )
+    lost = rows[rows["message"].fillna("") != ""]
+    if len(lost):
+        yield f"Profiles with fits that did not settle: {_places(lost)}."
+
+
+def closed(results: Results) -> tuple[int, int]:
+    """How many profiles tell a stiffness, of how many."""
+    rows = results.table("profiles")
+    return (0, 0) if rows.empty else (int((rows["verdict"] == "told").sum()), len(rows))
+
+
+def _told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
+    ends = [
+        f"{_place(row)} {number(row['low'], 2)} to {number(row['high'], 2)} times generic"
+        for row in own.to_dict("records")
+    ]
+    return f"Markers tell stiffness between two ends (95 %): {listed(ends, _MOST_PLACES)}."
+
+
+def _one_sided(own: pd.DataFrame, rows: pd.DataFrame) -> str:
+    ends = [f"{_place(row)} {_only(row)} times generic" for row in own.to_dict("records")]
+    return (
+        f"Markers tell one end of stiffness alone, so they do not tell how stiff it is (95 %): "
+        f"{listed(ends, _MOST_PLACES)}."
+    )
+
+
+def _only(row: Row) -> str:
+    if pd.notna(row["high"]):
+        return f"below {number(row['high'], 2)}"
+    return f"above {number(row['low'], 2)}"
+
+
+def _not_told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
+    return (
+        f"In {len(own)} of {count(len(rows), 'profile')} markers tell nothing of stiffness: "
+        f"whatever was tried fits as well ({_places(own)})."
+    )
+
+
+_SAY = {"told": _told, "one_sided": _one_sided, "not_told": _not_told}
+
+
+def _place(row: Row) -> str:
+    return f"{plain(row['region'])} {AXIS[row['coordinate']].lower()} of {row['specimen']}"
+
+
+def _places(rows: pd.DataFrame) -> str:
+    return listed([_place(row) for row in rows.to_dict("records")], _MOST_PLACES)
+
+
+def _at_end(rows: pd.DataFrame, points: pd.DataFrame) -> "pd.Series[bool]":
+    """Profiles whose least cost is at the smallest or largest ratio that settled."""
+    if points.empty:
+        return pd.Series(False, index=rows.index)
+    settled = points.dropna(subset=["cost_over_best"])
+    keys = ["specimen", "region", "coordinate"]
+    ends = settled.groupby(keys, observed=True)["ratio"].agg(["min", "max"])
+    beside = rows.join(ends, on=keys)
+    return (beside["best_ratio"] == beside["min"]) | (beside["best_ratio"] == beside["max"])
+
+
+def calibrations(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """What calibration makes of generic stiffness, and what it is worth."""
+    rows = results.table("stiffness")
+    if rows.empty:
+        return
+    fits = rows.drop_duplicates(["specimen", "law"])
+    lost = fits[fits["status"] != Status.CONVERGED.value]
+    if len(lost):
+        names = [f"{short_of(str(r['law']))} of {r['specimen']}" for r in lost.to_dict("records")]
+        yield f"{len(lost)} of {count(len(fits), 'calibration')} did not settle: {listed(names)}."
+    known = rows.dropna(subset=["ratio_to_generic"])
+    if known.empty:
+        yield "No calibration loaded a joint, so none tells a stiffness."
+        return
+    inside = int(known["inside_generic"].astype(bool).sum())
+    ratios = known["ratio_to_generic"].to_numpy(float)
+    yield (
+        f"Calibrated stiffness is {number(float(np.median(ratios)), 2)} times generic at the "
+        f"median ({number(float(ratios.min()), 2)} to {number(float(ratios.max()), 2)}); "
+        f"{inside} of {count(len(known), 'value')} ({percent(inside, len(known))}) are inside the "
+        f"generic range. {_worth(results)}"
+    )
+    yield from _between_laws(known)
+
+
+def _worth(results: Results) -> str:
+    """Whether such a number is knowledge."""
+    sure, asked = closed(results)
+    if not asked:
+        return f"Whether markers tell stiffness was not asked: each is {NOT_KNOWN}."
+    if sure == asked:
+        return "Profiles of all regions that were asked are closed."
+    if not sure:
+        return f"No profile is closed at both ends: each is {NOT_KNOWN}."
+    return (
+        f"{sure} of {count(asked, 'profile')} are closed at both ends: outside of these each is "
+        f"{NOT_KNOWN}."
+    )
+
+
+def _between_laws(known: pd.DataFrame) -> Iterator[str]:
+    """How unlike the same element comes out of one motion and another."""
+    pair = ("optk_from_flexion", "optk_from_bending")
+    keys = ["specimen", "joint", "coordinate", "side"]
+    one, other = (known[known["law"] == law].set_index(keys)["ratio_to_generic"] for law in pair)
+    ratio = (one / other).dropna().to_numpy(float)
+    if len(ratio):
+        apart = np.exp(np.abs(np.log(ratio)))
+        yield (
+            f"The same element, calibrated on flexion and on bending, differs by a factor of "
+            f"{number(float(np.median(apart)), 3)} at the median and of "
+            f"{number(float(apart.max()), 2)} at most ({count(len(ratio), 'element')})."
+        )
+
+
+def weights(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """Whether the weight of loads is a good one, where the truth is known."""
+    rows = results.table("weights")
+    if rows.empty:
+        return
+    for trial, own in rows.groupby("trial", sort=False, observed=True):
+        best = {
+            name: own.iloc[int(np.nanargmin(own[column].to_numpy(float)))]
+            for name, column in (("centres", "centre_mm"), ("sagittal angles", "angle_deg"))
+            if own[column].notna().any()
+        }
+        if best:
+            yield (
+                f"{capital(plain(str(trial)))} of {own['specimen'].iloc[0]}, weight of loads: "
+                f"{'; '.join(_best(name, row, own) for name, row in best.items())}."
+            )
+
+
+def _best(name: str, row: "pd.Series[Any]", own: pd.DataFrame) -> str:
+    column = "centre_mm" if name == "centres" else "angle_deg"
+    ratio = float(row["ratio"])
+    ends = (float(own["ratio"].min()), float(own["ratio"].max()))
+    edge = ", an end of what was tried" if ratio in ends else ""
+    at_one = own.loc[own["ratio"] == 1.0, column].dropna()
+    now = f" (now {sized(float(at_one.iloc[0]), column)})" if len(at_one) else ""
+    least = sized(float(row[column]), column)
+    return f"errors of {name} are least, {least}{now}, at {tick(ratio)} times the study's{edge}"
