@@ -93,7 +93,7 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
 
 def mot(name: str, time_s: Array, q: Array) -> str:
     """OpenSim's motion file of postures (F, 18, 6) m and rad at times (F,) s: m and deg."""
-    rows = np.column_stack([time_s, (q * _PER_SI).reshape(len(q), -1)])
+    rows = np.column_stack([time_s, (q * _PER_SI).reshape(len(q), len(COLUMNS))])
     head = (name, "version=1", f"nRows={len(rows)}", f"nColumns={rows.shape[1]}", "inDegrees=yes")
     lines = [*head, "endheader", "\t".join(("time", *COLUMNS))]
     lines += ["\t".join(f"{value:.15g}" for value in row) for row in rows.tolist()]

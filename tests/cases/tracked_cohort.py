@@ -1,4 +1,4 @@
-"""A small cohort of one person who bends, with markers, written without the library."""
+"""A small cohort of a person who bends, or two, with markers; written without the library."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -169,3 +169,80 @@ def write(folder: Path, *changes: Change, spoilt: tuple[Spoil, ...] = ()) -> Pat
         assert isinstance(content, str)
         (folder / NAME / name).write_text(content)
     return folder / NAME
+
+
+def two_persons(files: Files) -> None:
+    """Whoever a is, b is too, with files of motion of their own."""
+    for name in [name for name in files if name.endswith(".csv")]:
+        header, *rows = str(files[name]).splitlines()
+        again = ["b" + row.removeprefix("a") for row in rows]
+        if name == "trials.csv":
+            again = [
+                row.replace(f",{trial}.trc", f",b_{trial}.trc")
+                for row, trial in zip(again, FRAMES, strict=True)
+            ]
+        files[name] = "\n".join([header, *rows, *again]) + "\n"
+    for trial in FRAMES:
+        files[f"b_{trial}.trc"] = files[f"{trial}.trc"]
+
+
+def known_truth(files: Files) -> None:
+    """Where L5 to T2 are at the first frame of stance and at the last of flexion."""
+    header = f"specimen,trial,time_s,vertebra,x_mm,y_mm,z_mm,{TURNS}"
+    rows = [header]
+    for trial, frame, whole in (
+        ("stance", 0, (0.0, 0.0, 0.0)),
+        ("flexion_extension", FRAMES["flexion_extension"] - 1, WHOLE_DEG["flexion_extension"]),
+    ):
+        turns, places = bodies_at(whole)
+        angles = turns.as_euler("ZXY", degrees=True)
+        for k in range(1, 17):
+            at = ",".join(f"{value:.4f}" for value in (places[k] + places[k + 1]) / 2.0)
+            turned = ",".join(f"{value:.6f}" for value in angles[k])
+            rows.append(f"a,{trial},{frame / RATE:.4f},{BODIES[k]},{at},{turned}")
+    files["truth_centres.csv"] = "\n".join(rows) + "\n"
+
+
+def told_smaller(share: float) -> Change:
+    """The files tell skeleton and markers so many times as large; plates of clusters stay."""
+
+    def smaller(name: str) -> Array:
+        _, at, cluster = MARKERS[name]
+        plate = [np.array(p) for _, p, c in MARKERS.values() if c and c == cluster]
+        offset = np.array(at) - np.mean(plate, axis=0) if plate else np.zeros(3)
+        return share * (np.array(at) - offset) + offset
+
+    def change(files: Files) -> None:
+        rows = [row.split(",") for row in str(files["joints.csv"]).splitlines()]
+        for row in rows[1:]:
+            row[2:5] = [f"{share * float(value):.6f}" for value in row[2:5]]
+        files["joints.csv"] = "\n".join(map(",".join, rows)) + "\n"
+        rows = [row.split(",") for row in str(files["marker_set.csv"]).splitlines()]
+        for row in rows[1:]:
+            row[3:6] = [f"{value:.6f}" for value in smaller(row[1])]
+        files["marker_set.csv"] = "\n".join(map(",".join, rows)) + "\n"
+
+    return change
+
+
+def lost(marker: str, trial: str) -> Spoil:
+    """A marker that a file of motion does not have."""
+
+    def spoil(recorded: dict[str, Motion]) -> None:
+        motion = recorded[trial]
+        kept = [name != marker for name in motion.names]
+        recorded[trial] = Motion([n for n in motion.names if n != marker], motion.places[:, kept])
+
+    return spoil
+
+
+def project(
+    root: Path, study: str, *changes: Change, spoilt: tuple[Spoil, ...] = (), name: str = "small"
+) -> None:
+    """A study of the cohort; study : lines added to its file."""
+    (root / "config/studies").mkdir(parents=True, exist_ok=True)
+    (root / "config/cohorts").mkdir(parents=True, exist_ok=True)
+    write(root / "config/cohorts", *changes, spoilt=spoilt)
+    header = f"study: {name}\nkind: tracking\ncohort: {NAME}\n"
+    (root / f"config/studies/{name}.yaml").write_text(header + study)
+    (root / "config/config.yaml").write_text(f"studies: [{name}]\n")

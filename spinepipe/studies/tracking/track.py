@@ -46,7 +46,7 @@ def run(
     motion = list(motion_rows(found)) if found else []
     fit = fit_row(settings, found, spent) if found else failed_row(message)
     write(from_rows(TRACKED, [known | row for row in motion]), tracked, made_by)
-    write(from_rows(FITS, [known | fit]), fits, made_by)
+    write(from_rows(FITS, [fit | known]), fits, made_by)
     shown = approach in settings.drawn_approaches
     scenes = drawn_rows(found.watched, found.q) if found and shown else ()
     write(from_rows(DRAWN, [known | row for row in scenes]), drawn, made_by)
