@@ -150,6 +150,27 @@ def rigid(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
     )
 
 
+def sizes(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+    """How large persons are beside the cohort's skeleton, and whether that is used."""
+    rows = results.table("sizes")
+    if rows.empty:
+        return
+    persons = rows["specimen"].nunique()
+    known = rows.dropna(subset=["factor"])
+    used = "with these sizes" if study.scaling == "markers" else "with the skeleton as it is"
+    if known.empty:
+        yield f"Markers do not tell the size of any of {count(persons, 'person')}."
+        return
+    n = known["specimen"].nunique()
+    ends = [number(float(known["factor"].agg(end)), 3) for end in ("min", "max")]
+    left = number(float(known["rms_mm"].max()), 2)
+    yield (
+        f"Markers of the static trial make {n} of {count(persons, 'person')} {ends[0]} to {ends[1]}"
+        f" times as large as the cohort's skeleton, which leaves distances between markers {left} "
+        f"mm off (root mean square, at most); motions were tracked {used}."
+    )
+
+
 def remarks(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
     """How much there is to know of the input."""
     rows = results.table("remarks")
@@ -171,6 +192,6 @@ def beside_the_paper(study: Tracking, cohort: Cohort, results: Results) -> Itera
 MAKERS: tuple[Finding, ...] = (
     *(ended, nearest, beside_kinematics, calibrated, close_to_markers),
     *(profiles, calibrations, vibrating, markers_off, shares, likeness, rigid),
-    *(weights, remarks, beside_the_paper),
+    *(weights, sizes, remarks, beside_the_paper),
 )
 """What makes findings, in the order of the page."""

@@ -52,13 +52,16 @@ class Shown:
 
 
 def motions_of(drawn: pd.DataFrame) -> Iterator[Shown]:
-    """Every person, trial and approach of the table drawn."""
+    """Every person, trial and approach of the table drawn, dynamics before the other approaches."""
     if drawn.empty:
         return
     several = drawn["specimen"].nunique() > 1
-    for (person, trial, approach), rows in drawn.groupby(
-        ["specimen", "trial", "approach"], sort=False, observed=True
-    ):
+    keys = ["specimen", "trial", "approach"]
+    groups = dict(iter(drawn.groupby(keys, sort=False, observed=True)))
+    place = {key: k for k, key in enumerate(dict.fromkeys(key[:2] for key in groups))}
+    order = sorted(groups, key=lambda key: (place[key[:2]], not str(key[2]).startswith("optk")))
+    for person, trial, approach in order:
+        rows = groups[person, trial, approach]
         words = [plain(str(trial)), short_of(str(approach))]
         yield _shown(", ".join([str(person), *words] if several else words), rows)
 

@@ -12,6 +12,8 @@ from spinepipe.studies.tracking.tables import (
     FITS,
     PROFILE_POINTS,
     PROFILES,
+    REMARKS,
+    SIZES,
     STIFFNESS,
 )
 from spinepipe.studies.tracking.tables_of_studies import (
@@ -42,7 +44,9 @@ _TITLES = {
     WEIGHTS: "What the weight of loads does",
     STIFFNESS: "Stiffness of every joint",
     PROFILE_POINTS: "What each ratio costs",
+    REMARKS: "What to know of recordings",
     CLUSTERS: "How rigid clusters of markers are",
+    SIZES: "How large persons are",
     RANGES: "How far every joint moves",
     ERRORS: "Errors of every person",
 }
@@ -52,11 +56,15 @@ READ = (*(table.name for table in _TITLES), DRAWN.name)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _SORTED = {
-    ACCURACY: ["measure", "trial", "mean"],
-    SHARING: ["trial", "approach", "window", "specimen"],
-    CLUSTERS: ["variability_mm"],
+    ACCURACY: (["measure", "trial", "mean"], True),
+    FITS: (["status"], False),
+    SHARING: (["trial", "approach", "window", "specimen"], True),
+    CLUSTERS: (["variability_mm"], False),
 }
-"""By what rows of a table are sorted; the others stay as they are."""
+"""By what rows of a table are sorted, and whether from the least; the others stay as they are.
+
+Fits that did not settle stand first that way, as `converged` is the first of all words.
+"""
 
 
 def document(study: Tracking, cohort: Cohort, results: Results) -> Document:
@@ -85,7 +93,9 @@ def shown_tables(results: Results) -> list[Sortable]:
     for shape, title in _TITLES.items():
         rows = results.table(shape.name)
         if len(rows):
-            rows = rows.sort_values(_SORTED[shape], kind="stable") if shape in _SORTED else rows
+            if shape in _SORTED:
+                columns, rising = _SORTED[shape]
+                rows = rows.sort_values(columns, ascending=rising, kind="stable")
             found.append(sortable(shape.name, title, shape.about, rows, _columns(shape)))
     return [table for table in found if table.rows]
 
