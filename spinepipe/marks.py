@@ -35,8 +35,10 @@ _AT_END = re.compile(
 
 _MOTION = ".mot"
 _HEAD_END = b"endheader\n"
-_HEAD_BYTES = 1024
-_IN_HEAD = re.compile(rb"^" + KEY.encode() + rb"=([0-9a-f]{64})\n", re.MULTILINE)
+_IN_HEAD = re.compile(
+    rb"\A.*?\nnRows=(\d+)\n.*?\n" + KEY.encode() + rb"=([0-9a-f]{64})\nendheader\n", re.DOTALL
+)
+"""Rows that a whole motion has below its names of columns, and the mark."""
 
 _PARQUET = b"PAR1"
 _PARQUET_END_BYTES = 8
@@ -101,10 +103,19 @@ def read_mark(path: str | Path) -> str:
         if str(path).endswith(".parquet"):
             found = _IN_FOOTER.search(_footer(file))
         elif str(path).endswith(_MOTION):
-            found = _IN_HEAD.search(file.read(_HEAD_BYTES))
+            return _mark_of_motion(file.read())
         else:
             found = _AT_END.search(_tail(file, _TAIL_BYTES))
     return found[1].decode() if found else ""
+
+
+def _mark_of_motion(raw: bytes) -> str:
+    """The mark in the header, if all rows are there."""
+    found = _IN_HEAD.match(raw)
+    if not found or not raw.endswith(b"\n"):
+        return ""
+    rows = raw.count(b"\n", found.end()) - 1
+    return found[2].decode() if rows == int(found[1]) else ""
 
 
 def _footer(file: BinaryIO) -> bytes:

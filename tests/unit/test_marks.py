@@ -4,12 +4,14 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from spinepipe.marks import KEY, marked, read_mark, with_mark, without_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, read_model, write_model
+from spinepipe.motion.export import mot
 from spinepipe.report.style import picture
 from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
 from spinepipe.tables import from_rows, write
@@ -29,12 +31,14 @@ def save(suffix: str, path: Path, digest: str) -> None:
         write_model(MODEL, path, digest)
     elif suffix in (".svg", ".png"):
         write_marked(picture(figure, suffix[1:]), path, digest)
+    elif suffix == ".mot":
+        write_marked(mot("m", np.zeros(3), np.zeros((3, 18, 6))), path, digest)
     else:
         write_marked("<html><body>text</body></html>", path, digest)
 
 
 MODEL = ModelFile(model="m", cohort="c", effects=(EffectEntry(effect="linear_bushing"),))
-KINDS = (".parquet", ".json", ".yaml", ".svg", ".png", ".html")
+KINDS = (".parquet", ".json", ".yaml", ".svg", ".png", ".html", ".osim", ".mot")
 
 
 @pytest.mark.parametrize("suffix", KINDS)
