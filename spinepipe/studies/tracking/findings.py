@@ -43,9 +43,11 @@ def ended(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
         return
     messages = dict.fromkeys(str(m) for m in lost["message"].fillna("") if m)
     why = f" One message: {next(iter(messages))}." if messages else ""
+    kept = int((lost["frames"] > 0).sum())
+    used = f" {kept} of them left a posture, which is in tables and figures all the same."
     yield (
-        f"{len(lost)} of {count(len(fits), 'fit')} did not settle: {places(lost)}.{why} Their "
-        "numbers are in tables and figures all the same."
+        f"{len(lost)} of {count(len(fits), 'fit')} did not settle: {places(lost)}.{why}"
+        f"{used if kept else ' None of them left a posture.'}"
     )
 
 

@@ -254,9 +254,10 @@ def _beside_generic(one: Standing, there: list[str]) -> str:
     sure = {name: one.paired(name, GENERIC).verdict for name in there}
     if one.n < FEWEST:
         return f"{said} {too_few(one.n)}"
-    kinds = {"smaller": "Better beyond its interval", "larger": "Worse beyond its interval"}
+    kinds = {"smaller": "Better", "larger": "Worse"}
     parts = [
-        f"{words}: {listed([names[name] for name in there if sure[name] == kind])}."
+        f"{words}, with an interval that leaves out zero: "
+        f"{listed([names[name] for name in there if sure[name] == kind])}."
         for kind, words in kinds.items()
         if kind in sure.values()
     ]

@@ -52,6 +52,11 @@ def closed(results: Results) -> tuple[int, int]:
     return (0, 0) if rows.empty else (int((rows["verdict"] == "told").sum()), len(rows))
 
 
+def profiled(results: Results) -> list[str]:
+    """Persons whose markers were asked."""
+    return [str(name) for name in dict.fromkeys(results.table("profiles")["specimen"])]
+
+
 def _told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
     ends = [
         f"{_place(row)} {number(row['low'], 2)} to {number(row['high'], 2)} times generic"
@@ -134,7 +139,10 @@ def _worth(results: Results) -> str:
     if not asked:
         return f"Whether markers tell stiffness was not asked: each is {NOT_KNOWN}."
     if sure == asked:
-        return "Profiles of all regions that were asked are closed."
+        persons = set(results.table("stiffness")["specimen"].astype(str))
+        others = len(persons - set(profiled(results)))
+        more = f"; of {count(others, 'other person')} it was not asked" if others else ""
+        return f"All profiles of {listed(profiled(results))} are closed at both ends{more}."
     if not sure:
         return f"No profile is closed at both ends: each is {NOT_KNOWN}."
     return (

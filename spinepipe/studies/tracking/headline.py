@@ -25,7 +25,7 @@ from spinepipe.studies.tracking.findings_of_errors import (
     standings,
     too_few,
 )
-from spinepipe.studies.tracking.findings_of_stiffness import closed
+from spinepipe.studies.tracking.findings_of_stiffness import closed, profiled
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import MARKER_OFF
 from spinepipe.studies.tracking.tables_of_studies import MEASURES
@@ -69,7 +69,7 @@ def _answer(one: Standing) -> str:
             "it is better."
         )
     if not alike:
-        return f"{capital(told(best))} is nearest the truth: {where} are off by {off}."
+        return f"Nearest the truth is {told(best)}: {where} are off by {off}."
     others = len(one.approaches) - 1
     which = (
         f"{len(alike)} of {count(others, 'other')} cannot"
@@ -83,14 +83,16 @@ def _answer(one: Standing) -> str:
 
 
 def _stiffness(results: Results) -> str:
+    """What profiles say, of whom they were made."""
     sure, asked = closed(results)
     if not asked:
         return ""
+    whose = f"the spine of {listed(profiled(results))}"
     if sure == 0:
-        return "Markers do not tell how stiff a spine is."
+        return f"Markers do not tell how stiff {whose} is."
     if sure == asked:
-        return "Markers tell the stiffness of all regions that were asked."
-    return f"Markers tell the stiffness in {sure} of {count(asked, 'profile')}."
+        return f"Markers tell the stiffness of {whose} in all regions that were asked."
+    return f"Markers tell the stiffness of {whose} in {sure} of {count(asked, 'profile')}."
 
 
 def _sure(one: Standing) -> str:
@@ -171,8 +173,9 @@ def _worse(cohort: Cohort, results: Results) -> Iterator[str]:
             there = [name for name in CALIBRATED if name in one.approaches]
             if there and GENERIC in one.approaches and all_worse(one, there):
                 sure = [n for n in there if one.paired(n, GENERIC).verdict == "larger"]
-                held = f"{len(sure)} of {len(there)} " if sure else "not "
-                parts.append(f"{MEASURES[measure][1]} {one.words} ({held}beyond chance)")
+                held = f"{len(sure)} of {len(there)} beyond chance" if sure else "not beyond chance"
+                held = "too few to tell whether by chance" if one.n < FEWEST else held
+                parts.append(f"{MEASURES[measure][1]} {one.words} ({held})")
                 where = count(one.n, "person")
     if parts:
         yield (

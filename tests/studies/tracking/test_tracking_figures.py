@@ -148,7 +148,9 @@ def test_errors_are_means_over_persons() -> None:
     assert names == ["ik", "optk_zero", "optk_generic", "optk_from_both"]
     look = looks_of_approaches(names)["optk_generic"]
     line = next(one for one in axis.lines if one.get_color() == look.color)
-    assert np.mean(line.get_xdata()) == pytest.approx(1.1 * ERROR["optk_generic"])
+    assert np.mean(np.asarray(line.get_xdata(), dtype=float)) == pytest.approx(
+        1.1 * ERROR["optk_generic"]
+    )
 
 
 def test_an_approach_looks_the_same_in_all_figures() -> None:
