@@ -1,6 +1,6 @@
 """What is asked of a motion: markers that it has to follow, and what else costs."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -29,6 +29,9 @@ class Sizes:
     ----------
     marker_m : of a marker. moment_nm, force_n : of what muscles do at a joint.
     loads : how much all loads count beside markers.
+    common_n : of the mean force over all joints, where forces are held against each other.
+    own_skin_m, shared_skin_m : SD of how far skin slides over each vertebra and over all of them,
+        at the whole bend (`skin`).
     turn_rad_per_s2, move_m_per_s2 : of accelerations, which are wanted small to be smooth.
     beyond_rad, beyond_m : of coordinates beyond their range.
     size, shape : SD of the logarithms of a passive element's A and B about the generic ones.
@@ -39,6 +42,9 @@ class Sizes:
     moment_nm: float = 10.0
     force_n: float = 200.0
     loads: float = 1.0
+    common_n: float = 2000.0
+    own_skin_m: float = 5e-3
+    shared_skin_m: float = 10e-3
     turn_rad_per_s2: float = 10.0
     move_m_per_s2: float = 2.0
     beyond_rad: float = 0.02
@@ -50,7 +56,14 @@ class Sizes:
     @property
     def of_loads(self) -> Array:
         """(6,) N and N m, with their share."""
-        each = np.array([self.force_n] * 3 + [self.moment_nm] * 3)
+        return self._counted(np.array([self.force_n] * 3 + [self.moment_nm] * 3))
+
+    @property
+    def of_common(self) -> Array:
+        """(6,) N and N m, of the mean over joints; a mean moment costs nothing."""
+        return self._counted(np.array([self.common_n] * 3 + [np.inf] * 3))
+
+    def _counted(self, each: Array) -> Array:
         found: Array = each / np.sqrt(self.loads) if self.loads > 0.0 else np.full(6, np.inf)
         return found
 
@@ -103,8 +116,10 @@ class Watched:
 
     Attributes
     ----------
-    places : (N + 1, K, 3) m. weight : (N + 1, K), zero where
-        a marker was not seen.
+    places : (N + 1, K, 3) m. weight : (N + 1, K), zero where a marker was not seen.
+    shares : (N + 1, 3 K, 3 K) by which places off are multiplied (`skin`); None: each marker by
+        itself, by its weight.
+    muscles : size of what muscles may do in the trial, over that of `Sizes`.
     """
 
     skeleton: Skeleton
@@ -112,6 +127,13 @@ class Watched:
     grid: Grid
     places: Array
     weight: Array
+    shares: Array | None = None
+    muscles: float = 1.0
+
+    def at(self, nodes: NDArray[np.int64]) -> "Watched":
+        """Some of the nodes, each by itself."""
+        shares = None if self.shares is None else self.shares[nodes]
+        return replace(self, places=self.places[nodes], weight=self.weight[nodes], shares=shares)
 
 
 def watched(skeleton: Skeleton, markers: MarkerSet, trial: Trial, intervals: int) -> Watched:

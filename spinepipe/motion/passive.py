@@ -4,7 +4,7 @@ A coordinate q is resisted by A (exp(B q) - 1), each side with its own A and B (
 either side); where the exponent has grown to `STRAIGHT` the law goes on straight.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,14 +21,16 @@ class PassiveLaw:
     Attributes
     ----------
     a : (17, 6, 2) N or N m, for positive and for negative coordinates. b : (17, 6, 2) 1/m or 1/rad.
+    rest : (17, 6) m and rad, where nothing is stretched; sides are counted from there.
     """
 
     a: Array
     b: Array
+    rest: Array = field(default_factory=lambda: np.zeros(6))
 
     def scaled(self, size: Array, shape: Array) -> "PassiveLaw":
         """Times as large (17, 6), and with exponents as many times as large (17, 6), both sides."""
-        return PassiveLaw(self.a * size[..., None], self.b * shape[..., None])
+        return replace(self, a=self.a * size[..., None], b=self.b * shape[..., None])
 
     def forces(self, q: Array) -> Array:
         """(F, 17, 6) N and N m that resist coordinates (F, 17, 6) m and rad; of their sign."""
@@ -39,6 +41,7 @@ class PassiveLaw:
 
         The slope by the logarithm of both A is the force itself.
         """
+        q = q - self.rest
         side = (q < 0.0).astype(np.int64)[..., None]
         a, b = (
             np.take_along_axis(np.broadcast_to(one, (*q.shape, 2)), side, axis=-1)[..., 0]

@@ -40,7 +40,9 @@ class Postures:
     steps: int
 
 
-def postures(ask: Ask, watched: Watched, ratios: Array | None = None) -> Postures:
+def postures(
+    ask: Ask, watched: Watched, ratios: Array | None = None, most_steps: int = MOST_STEPS
+) -> Postures:
     """Postures of all nodes of a trial.
 
     Parameters
@@ -52,8 +54,8 @@ def postures(ask: Ask, watched: Watched, ratios: Array | None = None) -> Posture
     frames = len(watched.places)
     q = np.zeros((frames, *SHAPE))
     q[:, PELVIS, :3] = _first_place(watched)
-    q, _, _ = _rounds(_stiff(ask), watched, q, np.eye(COUNT)[:, :6])
-    q, steps, settled = _rounds(ask, watched, q, whole)
+    q, _, _ = _rounds(_stiff(ask), watched, q, np.eye(COUNT)[:, :6], most_steps)
+    q, steps, settled = _rounds(ask, watched, q, whole, most_steps)
     return Postures(q, settled, steps)
 
 
@@ -73,15 +75,17 @@ def _stiff(ask: Ask) -> Ask:
     return replace(ask, loads=False, passive=None)
 
 
-def _rounds(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, int, Array]:
+def _rounds(
+    ask: Ask, watched: Watched, q: Array, whole: Array, most_steps: int
+) -> tuple[Array, int, Array]:
     """Steps of each frame until they are short; each frame has its own damping."""
     damping, q = np.full(len(q), 1e-4), q.copy()
     cost, settled = _cost(ask, watched, q), np.zeros(len(q), dtype=bool)
     steps = 0
-    while steps < MOST_STEPS and not settled.all():
+    while steps < most_steps and not settled.all():
         steps += 1
         left = np.flatnonzero(~settled)
-        seen = replace(watched, places=watched.places[left], weight=watched.weight[left])
+        seen = watched.at(left)
         square, down = _normal(ask, seen, q[left], whole)
         diagonal = np.einsum("fii->fi", square)
         ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)

@@ -25,21 +25,25 @@ class Markers:
     watched: Watched
     ask: Ask
 
-    @property
-    def _share(self) -> Array:
-        return np.sqrt(self.watched.weight)[..., None] / self.ask.sizes.marker_m
-
     def residuals(self, q: Array) -> Array:
         """Of postures (F, 18, 6)."""
         at = marker_places(self.watched.skeleton, self.watched.markers, q)
-        return ((at - self.watched.places) * self._share).reshape(len(q), -1)
+        return self._weighed((at - self.watched.places).reshape(len(q), -1, 1))[..., 0]
 
     def with_slopes(self, q: Array) -> tuple[Array, Array]:
         """Residuals and their slopes."""
         at, slopes = with_slopes(self.watched.skeleton, self.watched.markers, q)
-        off = (at - self.watched.places) * self._share
-        slopes *= self._share[..., None]
-        return off.reshape(len(q), -1), slopes.reshape(len(q), -1, COUNT)
+        off = (at - self.watched.places).reshape(len(q), -1, 1)
+        return self._weighed(off)[..., 0], self._weighed(slopes.reshape(len(q), -1, COUNT))
+
+    def _weighed(self, rows: Array) -> Array:
+        """(F, 3 K, n) over their sizes."""
+        seen, size = self.watched, self.ask.sizes.marker_m
+        if seen.shares is not None:
+            return seen.shares @ (rows / size)
+        share = np.repeat(np.sqrt(seen.weight), 3, axis=1) / size
+        found: Array = rows * share[..., None]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +52,23 @@ class Loads:
 
     `squared`: all that is not done by passive elements. `minus_gravity`: as if bodies had mass and
     no weight. `level_difference`: by how much that differs from joint to joint, since muscles span
-    several.
+    several, and beside it by the mean force of all joints: without it, a spine that is pressed
+    together as a whole costs nothing.
     """
 
     bodies: RigidBodies
     ask: Ask
+    muscles: float = 1.0
 
     @classmethod
     def of(cls, watched: Watched, ask: Ask) -> "Loads":
         """Of the bodies of a trial."""
-        return cls(bodies_of(watched.skeleton, ask.force_cost != "minus_gravity"), ask)
+        weight = ask.force_cost != "minus_gravity"
+        return cls(bodies_of(watched.skeleton, weight), ask, watched.muscles)
+
+    @property
+    def _size(self) -> Array:
+        return self.muscles * self.ask.sizes.of_loads
 
     def active(self, law: PassiveLaw | None, motion: tuple[Array, Array, Array]) -> Array:
         """(F, 17, 6) N and N m that muscles do; motion (F, 18, 6) each, place to acceleration."""
@@ -68,8 +79,8 @@ class Loads:
         return loads if law is None else loads + law.forces(motion[0][:, 1:])
 
     def residuals(self, law: PassiveLaw | None, motion: tuple[Array, Array, Array]) -> Array:
-        """(F, 102), or fewer where levels are held against each other."""
-        active = self.active(law, motion) / self.ask.sizes.of_loads
+        """(F, 102)."""
+        active = self.active(law, motion) / self._size
         return self._between(active.reshape(len(active), len(JOINTS), -1)).reshape(len(active), -1)
 
     def with_slopes(
@@ -91,31 +102,27 @@ class Loads:
             slopes[:, 0, diagonal, diagonal + _PELVIS] += stiffness
             shared[:, fitted, np.arange(len(fitted))] = force[:, fitted]
             shared[:, fitted, len(fitted) + np.arange(len(fitted))] = by_shape[:, fitted]
-        size = np.tile(self.ask.sizes.of_loads, len(JOINTS))
+        size = np.tile(self._size, len(JOINTS))
         loads, slopes, shared = (
             loads / size,
             slopes / size[:, None],
             shared / size[:, None],
         )
+        levels = len(JOINTS), len(self._size)
         return (
-            self._between(loads.reshape(frames, len(JOINTS), 6)).reshape(frames, -1),
-            self._rows(slopes, 2),
-            self._rows(shared, 1),
+            self._between(loads.reshape(frames, *levels)).reshape(frames, -1),
+            self._between(slopes.reshape(frames, 3, *levels, -1), 2).reshape(slopes.shape),
+            self._between(shared.reshape(frames, *levels, -1)).reshape(shared.shape),
         )
 
-    def _between(self, by_level: Array) -> Array:
-        if self.ask.force_cost == "level_difference":
-            return np.diff(by_level, axis=1)
-        return by_level
-
-    def _rows(self, slopes: Array, axis: int) -> Array:
-        """The same of slopes whose rows are on that axis."""
+    def _between(self, by_level: Array, axis: int = 1) -> Array:
+        """Rows (..., 17, 6, ...) as they cost, levels on that axis."""
         if self.ask.force_cost != "level_difference":
-            return slopes
-        shape = slopes.shape
-        apart = slopes.reshape(*shape[:axis], len(JOINTS), 6, *shape[axis + 1 :])
-        rows = (len(JOINTS) - 1) * 6
-        return np.diff(apart, axis=axis).reshape(*shape[:axis], rows, *shape[axis + 1 :])
+            return by_level
+        lighter = self.ask.sizes.of_loads / self.ask.sizes.of_common / np.sqrt(len(JOINTS))
+        whole = by_level.sum(axis=axis, keepdims=True)
+        whole *= lighter.reshape(-1, *[1] * (by_level.ndim - axis - 2))
+        return np.concatenate([np.diff(by_level, axis=axis), whole], axis=axis)
 
 
 def beyond(ask: Ask, q: Array) -> tuple[Array, Array]:

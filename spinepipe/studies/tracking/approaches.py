@@ -13,6 +13,7 @@ from spinepipe.motion.points import COUNT
 from spinepipe.motion.posture import postures
 from spinepipe.motion.ratios import RatioSet
 from spinepipe.motion.skeleton import PELVIS, Trial
+from spinepipe.motion.skin import with_sliding_skin
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
 from spinepipe.studies.tracking.persons import Person, carrying
@@ -23,6 +24,9 @@ OWN = "optk_calibrated"
 """The approach that calibrates passive elements on the motion itself."""
 
 _LENGTHS = len(TRANSLATIONS)
+
+_NEAR_ENOUGH = 25
+"""Steps to a first guess of a posture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,9 @@ def sizes_of(scales: Scales) -> Sizes:
         moment_nm=scales.moment_nm,
         force_n=scales.force_n,
         loads=scales.loads,
+        common_n=scales.common_force_n,
+        own_skin_m=scales.skin_mm / MM_PER_M,
+        shared_skin_m=scales.shared_skin_mm / MM_PER_M,
         turn_rad_per_s2=scales.turn_deg_per_s2 / DEG_PER_RAD,
         move_m_per_s2=scales.move_mm_per_s2 / MM_PER_M,
         size=scales.size_sd,
@@ -99,6 +106,27 @@ def law_of(elements: PassiveElements, approach: str, learnt: PassiveLaw | None) 
     return PassiveLaw(elements.a * ends.get(approach, 1.0), elements.b)
 
 
+def unloaded(settings: Tracking, person: Person) -> Array:
+    """(17, 6) m and rad, where passive elements are at rest.
+
+    Raises
+    ------
+    ValueError
+        Where it is to be the posture of the static trial, and there is none.
+    """
+    if settings.unloaded_posture == "neutral":
+        return np.zeros(SHAPE)[PELVIS + 1 :]
+    static = next((one for one in person.trials if one.name == person.static), None)
+    if static is None:
+        raise ValueError("there is no static trial in whose posture joints could be unloaded")
+    low, high = _ranges(settings, person)
+    law = PassiveLaw(person.passive.a, person.passive.b)
+    ask = Ask(low=low, high=high, passive=law, loads=False, sizes=sizes_of(settings.scales))
+    seen = watched(carrying(person, static), person.markers, still(static), settings.intervals)
+    found: Array = postures(ask, seen).q[0, PELVIS + 1 :]
+    return found
+
+
 def asked_of(
     settings: Tracking, person: Person, approach: Approach, learnt: PassiveLaw | None = None
 ) -> Ask:
@@ -109,10 +137,11 @@ def asked_of(
             free=_rotations_alone(), loads=False, smooth=approach == "ik_smooth", sizes=sizes
         )
     low, high = _ranges(settings, person)
+    law = law_of(person.passive, approach, learnt)
     return Ask(
         low=low,
         high=high,
-        passive=None if approach == "optk_zero" else law_of(person.passive, approach, learnt),
+        passive=None if approach == "optk_zero" else replace(law, rest=unloaded(settings, person)),
         loads=approach != "ik_springs",
         force_cost=settings.force_cost,
         sizes=sizes,
@@ -153,18 +182,24 @@ def found_by(approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, R
 
 def trajectory(ask: Ask, seen: Watched, start: Array | None = None) -> Found:
     """The motion over all its time; start : (N + 3, 18, 6) coefficients, else from springs."""
-    begin = first_guess(ask, seen) if start is None else start
-    solved = solve(ask, [seen], [begin])
+    seen, begin = begun(ask, seen)
+    solved = solve(ask, [seen], [begin if start is None else start])
     return Found(
         *(ask, seen, seen.grid.at_nodes(solved.coefficients[0]), solved.status, solved.message),
         *(int(ask.free.sum()) * seen.grid.coefficients, solved.steps),
     )
 
 
-def first_guess(ask: Ask, seen: Watched) -> Array:
-    """(N + 3, 18, 6) coefficients through postures of each frame by itself."""
+def begun(ask: Ask, seen: Watched) -> tuple[Watched, Array]:
+    """A trial with markers weighed as skin slides, and coefficients (N + 3, 18, 6) to begin with.
+
+    Both are from postures of each frame by itself, near enough. Without dynamics markers are
+    weighed alike, as inverse kinematics has it.
+    """
     simple = replace(ask, loads=False, smooth=False, fitted=np.zeros_like(ask.fitted))
-    return seen.grid.through(postures(simple, seen).q)
+    found = postures(simple, seen, most_steps=_NEAR_ENOUGH).q
+    known = with_sliding_skin(seen, found, ask.sizes) if ask.loads else seen
+    return known, seen.grid.through(found)
 
 
 def _whole(ratios: RatioSet) -> Array:

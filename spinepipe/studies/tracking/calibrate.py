@@ -10,7 +10,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.asked import Watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.trajectory import Solved, solve
-from spinepipe.studies.tracking.approaches import first_guess, fitting, seen_in
+from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
 from spinepipe.studies.tracking.laws import highest, stiffness_rows, without
 from spinepipe.studies.tracking.marks import marks_of
@@ -29,7 +29,8 @@ def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
     made_by = provenance("calibrate", settings, cohort, [specimen], marks_of(cohort, specimen))
     try:
         ask = fitting(settings, person)
-        solved = solve(ask, seen, [first_guess(ask, one) for one in seen])
+        ready = [begun(ask, one) for one in seen]
+        solved = solve(ask, [one for one, _ in ready], [start for _, start in ready])
     except (ValueError, np.linalg.LinAlgError) as why:
         rows = list(without(str(why)))
     else:

@@ -17,7 +17,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.asked import Ask, Watched
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
-from spinepipe.studies.tracking.approaches import first_guess, fitting, seen_in
+from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import BOTH
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.persons import Person, person_of
@@ -84,7 +84,8 @@ def profiled(ask: Ask, seen: Sequence[Watched], held: Array, ratios: Array) -> A
     """(R,) least costs; each fit begins where that of the ratio next to it, nearer to 1, ended."""
     found = np.full(len(ratios), np.inf)
     middle = int(np.argmin(np.abs(np.log(ratios))))
-    begin = [first_guess(ask, one) for one in seen]
+    known = [begun(ask, one) for one in seen]
+    seen, begin = [one for one, _ in known], [start for _, start in known]
     for order in (range(middle, len(ratios)), range(middle, -1, -1)):
         starts, parameters = begin, np.zeros(ask.parameters)
         for k in order:

@@ -75,6 +75,22 @@ class Scales(BaseModel):
     loads: float = Field(
         default=1.0, gt=0, le=1e4, description="how much loads count beside markers"
     )
+    common_force_n: float = Field(
+        default=2000.0,
+        gt=0,
+        le=1e6,
+        description="of the mean force over all joints, where levels are held against each other",
+    )
+    skin_mm: float = Field(
+        default=5.0,
+        ge=0,
+        le=100,
+        description="SD of how far skin slides along a vertebra when the trunk is bent by 60 deg, "
+        "each vertebra by itself; with dynamics alone",
+    )
+    shared_skin_mm: float = Field(
+        default=10.0, ge=0, le=100, description="the same, of all vertebrae alike"
+    )
     turn_deg_per_s2: float = Field(
         default=600.0, gt=0, le=1e5, description="of an angular acceleration of a joint"
     )
@@ -140,6 +156,11 @@ class Tracking(Study):
         default="none",
         description="of skeletons: none, the cohort's are taken as they are; markers, pelvis, "
         "lumbar and thoracic part are made as large as markers of the static trial say",
+    )
+    unloaded_posture: Literal["neutral", "standing"] = Field(
+        default="neutral",
+        description="where passive elements are at rest: neutral, in the cohort's neutral pose; "
+        "standing, as the static trial's markers are. Markers cannot tell it from weight",
     )
     scales: Scales = Field(default=Scales(), description="what counts as much as what")
     bounds: Bounds = Field(default=Bounds(), description="ranges of joints")
