@@ -98,6 +98,7 @@ def _written(seen: Watched, asked: Ask) -> dict[str, Any]:
         "marker_at": seen.markers.at.tolist(),
         "marker_m": sizes.marker_m,
         "load_sizes": ([sizes.force_n] * 3 + [sizes.moment_nm] * 3) * BODIES,
+        "common_share": sizes.force_n / sizes.common_n / np.sqrt(17),
         "bend_size": sizes.turn_rad_per_s2,
         "force_cost": asked.force_cost,
     }

@@ -120,7 +120,8 @@ def _node(asked: dict[str, Any]) -> ca.Function:
     loads = ca.substitute(loads, ca.vertcat(q, v, a), ca.vertcat(*full))
     if asked["force_cost"] == "level_difference":
         # above the second body nothing weighs anything
-        loads = ca.vertcat(loads[6:] - loads[:6], -loads[6:])
+        whole = asked["common_share"] * (loads[:3] + loads[6:9])
+        loads = ca.vertcat(loads[6:] - loads[:6], -loads[6:], whole)
     chain, off = _chain(asked, full[0]), []
     for k, (body, at) in enumerate(zip(asked["marker_body"], asked["marker_at"], strict=True)):
         place = chain.origins[body] + chain.turns[body] @ ca.DM(at)
