@@ -1,4 +1,4 @@
-"""Skin that slides: how errors of markers hang together, and that vertebrae are not dragged along."""
+"""Skin that slides: errors of markers hang together, and vertebrae are not dragged along."""
 
 from dataclasses import replace
 

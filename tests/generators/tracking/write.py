@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,36 +73,52 @@ class Taken:
 class Subject:
     """A person with markers, who can be asked for trials; each trial by itself, in any order."""
 
-    def __init__(self, wanted: Wanted, number: int) -> None:
+    def __init__(self, wanted: Wanted, number: int, errors: Errors | None = None) -> None:
         rng = np.random.default_rng([wanted.seed, number])
-        self.wanted, self.name = wanted, f"s{number + 1:02d}"
+        self.wanted, self.number, self.name = wanted, number, f"s{number + 1:02d}"
+        self.errors = wanted.errors if errors is None else errors
+        self._motions: dict[str, tuple[Motion, np.random.Generator]] = {}
         self._male = number % 10 in (2, 5, 8)
         self._seeds = dict(zip(ARMS, rng.integers(2**32, size=3).tolist(), strict=True))
         self._drawing = int(rng.integers(2**32))
         self._plain = plain_curves(wanted.seed) if wanted.plain else None
         self.person = self._with("none")
-        self.markers = worn(self.person, rng, wanted.errors)
-        self.told = told(self.person, rng, wanted.errors)
+        self.markers = worn(self.person, rng, self.errors)
+        self.told = told(self.person, rng, self.errors)
+
+    def with_errors(self, errors: Errors) -> "Subject":
+        """The same person in the same motions, seen and told with other errors."""
+        found = Subject(self.wanted, self.number, errors)
+        found._motions = self._motions
+        return found
 
     def _with(self, arms: str) -> Person:
         return drawn(np.random.default_rng(self._drawing), self._male, arms, self._plain)
 
     def taken(self, kind: str) -> Taken:
         """A trial."""
-        rng, person = np.random.default_rng(self._seeds[kind]), self._with(ARMS[kind])
-        long_s = STANCE_S if kind == "stance" else self.wanted.long_s
-        filmed = Filmed(self.wanted.rate_hz, long_s)
-        motion = moved(person, kind, self.wanted.generator, rng, filmed)
-        places = seen(motion, self.markers, rng, self.wanted.errors)
+        person = self._with(ARMS[kind])
+        if kind not in self._motions:
+            rng = np.random.default_rng(self._seeds[kind])
+            long_s = STANCE_S if kind == "stance" else self.wanted.long_s
+            filmed = Filmed(self.wanted.rate_hz, long_s)
+            self._motions[kind] = moved(person, kind, self.wanted.generator, rng, filmed), rng
+        motion, rng = self._motions[kind]
+        places = seen(motion, self.markers, deepcopy(rng), self.errors)
         return Taken(kind, person, motion, self.markers, places)
 
 
 def cohort(wanted: Wanted, folder: Path) -> None:
     """Write all files of a cohort."""
+    write(wanted, [Subject(wanted, number) for number in range(wanted.subjects)], folder)
+
+
+def write(wanted: Wanted, subjects: Sequence[Subject], folder: Path) -> None:
+    """The same of people that are there."""
     (folder / "hidden").mkdir(parents=True, exist_ok=True)
     rows: dict[str, list[Row]] = {name: [] for name in FILES}
-    for number in range(wanted.subjects):
-        _subject(Subject(wanted, number), folder, rows)
+    for subject in subjects:
+        _subject(subject, folder, rows)
     for stem, columns in FILES.items():
         _csv(folder / f"{stem}.csv", columns, rows[stem])
     if wanted.plain:
