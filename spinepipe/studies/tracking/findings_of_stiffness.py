@@ -29,10 +29,17 @@ def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]
     rows = results.table("profiles")
     if rows.empty:
         return
+    settled = rows["best_ratio"].notna()
     for verdict in VERDICTS:
-        own = rows[rows["verdict"] == verdict]
+        own = rows[settled & (rows["verdict"] == verdict)]
         if len(own):
             yield _SAY[verdict](own, rows)
+    if not settled.all():
+        lost = rows[~settled]
+        yield (
+            f"In {len(lost)} of {count(len(rows), 'profile')} no fit settled, so what markers tell "
+            f"there is not known: {_places(lost)}."
+        )
     edges = rows[_at_end(rows, results.table("profile_points"))]
     if len(edges):
         ways = sorted({tick(float(value)) for value in edges["best_ratio"]})
@@ -41,15 +48,17 @@ def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]
             f"what was tried ({listed(ways)} times generic): a better value may lie beyond it, and "
             "slipping skin or loads that are left out can ask for it as well as a spine."
         )
-    lost = rows[rows["message"].fillna("") != ""]
+    lost = rows[settled & (rows["message"].fillna("") != "")]
     if len(lost):
         yield f"Profiles with fits that did not settle: {_places(lost)}."
 
 
 def closed(results: Results) -> tuple[int, int]:
-    """How many profiles tell a stiffness, of how many."""
+    """How many profiles tell a stiffness, of how many of which some fit settled."""
     rows = results.table("profiles")
-    return (0, 0) if rows.empty else (int((rows["verdict"] == "told").sum()), len(rows))
+    if rows.empty:
+        return 0, 0
+    return int((rows["verdict"] == "told").sum()), int(rows["best_ratio"].notna().sum())
 
 
 def profiled(results: Results) -> list[str]:
@@ -137,7 +146,7 @@ def _worth(results: Results) -> str:
     """Whether such a number is knowledge."""
     sure, asked = closed(results)
     if not asked:
-        return f"Whether markers tell stiffness was not asked: each is {NOT_KNOWN}."
+        return f"No profile says whether markers tell stiffness: each is {NOT_KNOWN}."
     if sure == asked:
         persons = set(results.table("stiffness")["specimen"].astype(str))
         others = len(persons - set(profiled(results)))

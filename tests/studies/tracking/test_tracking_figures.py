@@ -98,7 +98,7 @@ def test_what_is_not_there_is_said() -> None:
     assert "no trial turns" in words(draw("motion_sharing", Size(1, ("stance",))))
     assert "turns too little" in words(draw("motion_sharing", SIZES["turned too little"]))
     assert "no calibration loaded" in words(draw("stiffness_by_level", nothing))
-    assert "no fit settled" in words(draw("stiffness_profiles", SIZES["profiles lost"]))
+    assert "not known: no fit settled" in words(draw("stiffness_profiles", SIZES["profiles lost"]))
     untold = words(draw("trade_off", Size(1, truth=False)))
     assert untold.count("no truth is known") == 2
     empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}

@@ -178,7 +178,19 @@ def test_stiffness_is_told_only_by_closed_profiles() -> None:
     assert "profiles of s01 are closed at both ends; of 2 other persons it was not asked" in found
     assert "end of what was tried (" not in found
     assert "in all regions that were asked" in answer(closed).words
-    assert "markers tell nothing of stiffness" in told(Size(verdict="lost"))
+
+
+def test_profiles_without_a_fit_say_nothing_of_markers() -> None:
+    lost = Size(verdict="lost")
+    found = told(lost)
+    assert "In 6 of 6 profiles no fit settled, so what markers tell there is not known" in found
+    assert "markers tell nothing" not in found
+    assert "fits as well" not in found
+    assert "stiff" not in answer(lost).words
+    mixed = tables_of(THREE)["profiles"]
+    mixed.loc[0, ["best_ratio", "verdict", "message"]] = [np.nan, "not_told", "no fit settled"]
+    assert "In 1 of 6 profiles no fit settled" in told(THREE, profiles=mixed)
+    assert "Markers do not tell how stiff" in answer(THREE, profiles=mixed).words
 
 
 def test_some_closed_profiles_do_not_speak_for_the_others() -> None:
@@ -189,7 +201,7 @@ def test_some_closed_profiles_do_not_speak_for_the_others() -> None:
     assert "2 of 6 profiles are closed at both ends: outside of these each is a number of" in found
     assert "in 2 of 6 profiles." in answer(THREE, profiles=mixed).words
     without = rows.iloc[:0]
-    assert "Whether markers tell stiffness was not asked" in told(THREE, profiles=without)
+    assert "No profile says whether markers tell stiffness" in told(THREE, profiles=without)
     assert "stiff" not in answer(THREE, profiles=without).words
 
 

@@ -88,20 +88,21 @@ def _panel(axis: Axes, points: pd.DataFrame, ends: pd.DataFrame, looks: Mapping[
         if len(told):
             _interval(axis, told.iloc[0], (_BAR - _STEP * k) * LIMIT, look, reach)
     if len(looks) == 1 and len(ends):
-        words = f"{VERDICTS[str(ends['verdict'].iloc[0])]}{_least(points, ends.iloc[0])}"
+        words = _verdict(points, ends.iloc[0])
         how: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": SMALL_PT}
         how["bbox"] = {"facecolor": WHITE, "edgecolor": "none", "alpha": 0.8, "pad": 0.4}
         axis.text(0.97, 0.97, words, transform=axis.transAxes, **how)
 
 
-def _least(points: pd.DataFrame, row: "pd.Series[float]") -> str:
-    """Whether the least cost lies at the end of what was tried."""
+def _verdict(points: pd.DataFrame, row: "pd.Series[Any]") -> str:
+    """What a profile says, and whether its least cost lies at the end of what was tried."""
     best = row["best_ratio"]
     if pd.isna(best):
-        return "\nno fit settled"
+        return "not known: no fit settled"
     settled = points.dropna(subset=["cost_over_best"])["ratio"]
     at_end = best in (settled.min(), settled.max())
-    return f"\nleast cost at {tick(float(best))}" + (", an end" if at_end else "")
+    said = VERDICTS[str(row["verdict"])]
+    return f"{said}\nleast cost at {tick(float(best))}" + (", an end" if at_end else "")
 
 
 def _course(axis: Axes, points: pd.DataFrame, look: Look) -> None:
