@@ -44,10 +44,14 @@ VERDICTS = {
 """What a profile says of a stiffness."""
 
 
+_AUTHORS = {"white_panjabi": "White and Panjabi"}
+"""Names that are more than a name with a capital."""
+
+
 def _ratios(approach: str) -> str:
     """``Christophy 2012`` of the approach with these ratios."""
     name, _, year = approach.removeprefix(CONSTRAINED).rpartition("_")
-    return capital(f"{plain(name)} {year}".strip())
+    return f"{_AUTHORS.get(name, capital(plain(name)))} {year}".strip()
 
 
 def short_of(approach: str) -> str:
