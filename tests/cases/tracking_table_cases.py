@@ -71,11 +71,12 @@ FRAMES = 21
 RATIOS = np.array([0.2, 0.5, 1.0, 2.0, 5.0])
 COSTS = {
     "told": np.array([20.0, 6.0, 0.0, 6.0, 20.0]),
-    "one_sided": np.array([0.0, 6.0, 12.0, 18.0, 24.0]),
-    "not_told": np.array([0.0, 0.5, 1.0, 1.5, 2.0]),
+    "one_sided": np.array([0.5, 0.0, 6.0, 12.0, 18.0]),
+    "not_told": np.array([1.0, 0.5, 0.0, 0.5, 1.0]),
+    "falls": np.array([0.0, 6.0, 12.0, 18.0, 24.0]),
     "lost": np.full(5, np.inf),
 }
-"""What ratios cost, by the verdict that follows."""
+"""What ratios cost, by the verdict that follows; `falls`, to the softest, tells nothing."""
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,9 @@ def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]
     if rows.empty:
         return
     settled = rows["best_ratio"].notna()
+    falling = _at_end(rows, results.table("profile_points"))
     for verdict in VERDICTS:
-        own = rows[settled & (rows["verdict"] == verdict)]
+        own = rows[settled & ~falling & (rows["verdict"] == verdict)]
         if len(own):
             yield _SAY[verdict](own, rows)
     if not settled.all():
@@ -40,15 +41,16 @@ def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]
             f"In {len(lost)} of {count(len(rows), 'profile')} no fit settled, so what markers tell "
             f"there is not known: {_places(lost)}."
         )
-    edges = rows[_at_end(rows, results.table("profile_points"))]
+    edges = rows[falling]
     if len(edges):
         ways = sorted({tick(float(value)) for value in edges["best_ratio"]})
         yield (
             f"In {len(edges)} of {count(len(rows), 'profile')} the least cost lies at the end of "
-            f"what was tried ({listed(ways)} times generic): a better value may lie beyond it, and "
-            "slipping skin or loads that are left out can ask for it as well as a spine."
+            f"what was tried ({listed(ways)} times generic), so that markers tell nothing there: "
+            "slack joints need little of muscles, whoever they belong to, and slipping skin can "
+            "ask for them as well as a spine."
         )
-    lost = rows[settled & (rows["message"].fillna("") != "")]
+    lost = rows[settled & rows["message"].fillna("").str.contains("did not settle")]
     if len(lost):
         yield f"Profiles with fits that did not settle: {_places(lost)}."
 

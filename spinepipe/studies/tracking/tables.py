@@ -222,7 +222,8 @@ PROFILES = Table(
         Column(
             "verdict",
             "text",
-            "told: both ends are closed; one_sided: one of them; not_told: none, or no fit settled",
+            "told: both ends are closed; one_sided: one of them; not_told: none, no fit settled, "
+            "or the cost falls to the end of what was tried",
             allowed=VERDICTS,
         ),
         MESSAGE,

@@ -163,14 +163,15 @@ def test_an_approach_looks_the_same_in_all_figures() -> None:
 def test_profiles_show_open_ends_and_what_is_told() -> None:
     for verdict, said in (
         ("told", "markers tell it least cost at 1"),
-        ("one_sided", "markers tell one end least cost at 0.2, an end"),
-        ("not_told", "markers do not tell it least cost at 0.2, an end"),
+        ("one_sided", "markers tell one end least cost at 0.5"),
+        ("falls", "markers do not tell it least cost at 0.2, an end"),
+        ("not_told", "markers do not tell it least cost at 1"),
     ):
         figure = draw("stiffness_profiles", Size(1, verdict=verdict))
         assert said in words(figure), verdict
         marks = {str(line.get_marker()) for line in figure.axes[0].lines}
         assert ("<" in marks) == (verdict != "told")
-        assert (">" in marks) == (verdict == "not_told")
+        assert (">" in marks) == (verdict in ("not_told", "falls"))
 
 
 def test_stiffness_is_filled_only_where_it_is_told() -> None:

@@ -13,6 +13,7 @@ from spinepipe.studies.tracking.accuracy import accuracy_rows
 from spinepipe.studies.tracking.errors import error_rows
 from spinepipe.studies.tracking.moved import IN_ORDER, motions
 from spinepipe.studies.tracking.off_truth import Bones
+from spinepipe.studies.tracking.profile import verdict
 from spinepipe.studies.tracking.ranges import range_rows
 from spinepipe.studies.tracking.sharing import sharing_rows
 from spinepipe.studies.tracking.similarity import similarity_rows
@@ -293,3 +294,22 @@ def test_persons_that_hardly_turn_are_left_out_and_told_of() -> None:
 def test_one_frame_holds_for_all_times() -> None:
     (moved,) = motions(tracked(still(1)))
     assert replace(moved, q=moved.q + 0.5).at(np.array([0.0, 9.0])).min() == 0.5
+
+
+def test_a_cost_that_falls_to_the_end_of_what_was_tried_tells_no_stiffness() -> None:
+    """A minimum inside closes ends; one at an end closes none, however steep the cost is."""
+    ratios = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
+    inside = verdict(ratios, np.array([9.0, 1.0, 0.0, 1.0, 9.0]))
+    assert inside["verdict"] == "told"
+    share = (3.84 - 1.0) / 8.0  # straight in logarithms between 1 and 9
+    assert inside["low"] == pytest.approx(0.5 * 0.5**share)
+    assert inside["high"] == pytest.approx(2.0 * 2.0**share)
+    for costs, edge in (([0, 9, 20, 30, 40], "softest"), ([40, 30, 20, 9, 0], "stiffest")):
+        found = verdict(ratios, np.array(costs, dtype=float))
+        assert (found["low"], found["high"], found["verdict"]) == (None, None, "not_told")
+        assert found["open_below"]
+        assert found["open_above"]
+        assert edge in found["message"]
+    lost = verdict(ratios, np.array([np.inf, 0.0, 1.0, 9.0, 20.0]))
+    assert lost["verdict"] == "not_told"  # the least that settled is the end
+    assert "1 of 5 fits did not settle" in lost["message"]
