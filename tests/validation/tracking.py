@@ -194,11 +194,19 @@ def _profile(made: Made, truth: pd.DataFrame, region: str, coordinate: str) -> R
     coarse = SETTINGS.model_copy(update={"intervals": SETTINGS.profiles.intervals})
     ask = fitting(coarse, made.person)
     seen = [seen_in(coarse, made.person, one) for one in made.person.trials if one.kind in BOTH]
-    told = verdict(RATIOS, profiled(ask, seen, held_in(ask, region, coordinate), RATIOS))
+    costs = profiled(ask, seen, held_in(ask, region, coordinate), RATIOS)
+    told, settled = verdict(RATIOS, costs), np.isfinite(costs)
     ratio = _true_ratio(made, truth, region, coordinate)
+    at, over = np.log(RATIOS[settled]), costs[settled] - costs[settled].min()
+    ends = ("low", "high")
     inside = (told["low"] or 0.0) <= ratio <= (told["high"] or np.inf)
-    shown = ("low", "best_ratio", "high", "verdict")
-    return {**{name: told[name] for name in shown}, "true_ratio": ratio, "inside": inside}
+    closed = any(told[end] is not None for end in ends)
+    return {
+        **{name: "open" if told[name] is None else float(told[name]) for name in ends},
+        **{"best_ratio": told["best_ratio"], "verdict": told["verdict"], "true_ratio": ratio},
+        "cost_of_truth_over_best": float(np.interp(np.log(ratio), at, over)),
+        "holds": str(inside) if closed else "no end is closed",
+    }
 
 
 def _true_ratio(made: Made, truth: pd.DataFrame, region: str, coordinate: str) -> float:

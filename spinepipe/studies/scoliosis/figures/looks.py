@@ -6,13 +6,9 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from spinepipe.report.looks import PURPLE, Dashes
 from spinepipe.report.style import BLUE, GREEN, GREY, VERMILLION
 from spinepipe.studies.scoliosis.words import IN_WORDS
-
-PURPLE = "#CC79A7"
-"""Okabe and Ito's reddish purple."""
-
-Dashes = str | tuple[int, tuple[float, ...]]
 
 
 @dataclass(frozen=True)

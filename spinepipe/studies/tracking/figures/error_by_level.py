@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS
+from spinepipe.report.looks import Look
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import blank, saying
 from spinepipe.report.words import capital
 from spinepipe.studies.tracking.figures.looks import (
-    Look,
     chosen,
     key_of,
     looks_of_approaches,

@@ -14,11 +14,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.motion.measures import between_neighbours
 from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
+from spinepipe.report.looks import Look
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
 from spinepipe.report.words import capital, listed
 from spinepipe.studies.tracking.figures.looks import (
-    Look,
     about,
     chosen,
     key_of,

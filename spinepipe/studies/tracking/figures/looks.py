@@ -1,40 +1,19 @@
 """How approaches and persons are told apart in all figures of this kind, in colour and without."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE
+from spinepipe.report.looks import PURPLE, SKY, Look
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
 from spinepipe.report.words import plain
 from spinepipe.status import Status
 from spinepipe.studies.tracking.moved import AXIS
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.words import in_order, short_of
-
-PURPLE, SKY = "#CC79A7", "#56B4E9"
-"""Okabe and Ito's reddish purple and sky blue."""
-
-Dashes = str | tuple[int, tuple[float, ...]]
-
-
-@dataclass(frozen=True)
-class Look:
-    """Colour, line and mark of one of several."""
-
-    color: str
-    marker: str
-    dashes: Dashes
-
-    def line(self, hollow: bool = False, **how: Any) -> dict[str, Any]:
-        """Settings of a line with marks; hollow where it is not to be trusted."""
-        face = WHITE if hollow else self.color
-        look = {"color": self.color, "ls": self.dashes, "marker": self.marker, "lw": 1.0}
-        return {**look, "ms": 3.4, "mec": self.color, "mfc": face, "mew": 0.8, **how}
-
 
 LOOKS = (
     Look(VERMILLION, "o", "-"),
