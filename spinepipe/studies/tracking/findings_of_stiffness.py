@@ -21,6 +21,10 @@ from spinepipe.studies.tracking.words import short_of, sized
 Row = dict[Any, Any]
 
 NOT_KNOWN = "a number of the fit and no property of the spine"
+_THIS_MODEL = (
+    "Such an end holds for this model and its weights alone, and on made-up persons one was wrong "
+    "(docs/studies/tracking.md)."
+)
 _MOST_PLACES = 9
 
 
@@ -73,14 +77,15 @@ def _told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
         f"{_place(row)} {number(row['low'], 2)} to {number(row['high'], 2)} times generic"
         for row in own.to_dict("records")
     ]
-    return f"Markers tell stiffness between two ends (95 %): {listed(ends, _MOST_PLACES)}."
+    told = listed(ends, _MOST_PLACES)
+    return f"Markers tell stiffness between two ends (95 %): {told}. {_THIS_MODEL}"
 
 
 def _one_sided(own: pd.DataFrame, rows: pd.DataFrame) -> str:
     ends = [f"{_place(row)} {_only(row)} times generic" for row in own.to_dict("records")]
     return (
         f"Markers tell one end of stiffness alone, so they do not tell how stiff it is (95 %): "
-        f"{listed(ends, _MOST_PLACES)}."
+        f"{listed(ends, _MOST_PLACES)}. {_THIS_MODEL}"
     )
 
 
