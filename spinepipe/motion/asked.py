@@ -119,7 +119,6 @@ class Watched:
     places : (N + 1, K, 3) m. weight : (N + 1, K), zero where a marker was not seen.
     shares : (N + 1, 3 K, 3 K) by which places off are multiplied (`skin`); None: each marker by
         itself, by its weight.
-    muscles : size of what muscles may do in the trial, over that of `Sizes`.
     """
 
     skeleton: Skeleton
@@ -128,7 +127,6 @@ class Watched:
     places: Array
     weight: Array
     shares: Array | None = None
-    muscles: float = 1.0
 
     def at(self, nodes: NDArray[np.int64]) -> "Watched":
         """Some of the nodes, each by itself."""

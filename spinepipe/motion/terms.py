@@ -58,17 +58,11 @@ class Loads:
 
     bodies: RigidBodies
     ask: Ask
-    muscles: float = 1.0
 
     @classmethod
     def of(cls, watched: Watched, ask: Ask) -> "Loads":
         """Of the bodies of a trial."""
-        weight = ask.force_cost != "minus_gravity"
-        return cls(bodies_of(watched.skeleton, weight), ask, watched.muscles)
-
-    @property
-    def _size(self) -> Array:
-        return self.muscles * self.ask.sizes.of_loads
+        return cls(bodies_of(watched.skeleton, ask.force_cost != "minus_gravity"), ask)
 
     def active(self, law: PassiveLaw | None, motion: tuple[Array, Array, Array]) -> Array:
         """(F, 17, 6) N and N m that muscles do; motion (F, 18, 6) each, place to acceleration."""
@@ -80,7 +74,7 @@ class Loads:
 
     def residuals(self, law: PassiveLaw | None, motion: tuple[Array, Array, Array]) -> Array:
         """(F, 102)."""
-        active = self.active(law, motion) / self._size
+        active = self.active(law, motion) / self.ask.sizes.of_loads
         return self._between(active.reshape(len(active), len(JOINTS), -1)).reshape(len(active), -1)
 
     def with_slopes(
@@ -102,13 +96,13 @@ class Loads:
             slopes[:, 0, diagonal, diagonal + _PELVIS] += stiffness
             shared[:, fitted, np.arange(len(fitted))] = force[:, fitted]
             shared[:, fitted, len(fitted) + np.arange(len(fitted))] = by_shape[:, fitted]
-        size = np.tile(self._size, len(JOINTS))
+        size = np.tile(self.ask.sizes.of_loads, len(JOINTS))
         loads, slopes, shared = (
             loads / size,
             slopes / size[:, None],
             shared / size[:, None],
         )
-        levels = len(JOINTS), len(self._size)
+        levels = len(JOINTS), SHAPE[1]
         return (
             self._between(loads.reshape(frames, *levels)).reshape(frames, -1),
             self._between(slopes.reshape(frames, 3, *levels, -1), 2).reshape(slopes.shape),

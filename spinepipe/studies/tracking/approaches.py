@@ -180,10 +180,10 @@ def found_by(approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, R
     return trajectory(ask, seen)
 
 
-def trajectory(ask: Ask, seen: Watched, start: Array | None = None) -> Found:
-    """The motion over all its time; start : (N + 3, 18, 6) coefficients, else from springs."""
+def trajectory(ask: Ask, seen: Watched) -> Found:
+    """The motion over all its time."""
     seen, begin = begun(ask, seen)
-    solved = solve(ask, [seen], [begin if start is None else start])
+    solved = solve(ask, [seen], [begin])
     return Found(
         *(ask, seen, seen.grid.at_nodes(solved.coefficients[0]), solved.status, solved.message),
         *(int(ask.free.sum()) * seen.grid.coefficients, solved.steps),

@@ -35,9 +35,6 @@ REGIONS = {
 
 PROFILED = ("extension", "right_bending")
 
-FALLS = "the cost falls to the end of what was tried,"
-"""What the message of such a profile begins with."""
-
 Row = dict[str, Any]
 
 
@@ -132,7 +129,8 @@ def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
     text = f"{lost} of {len(ratios)} fits did not settle" if lost else ""
     if best in (0, len(at) - 1):
         edge = "softest" if best == 0 else "stiffest"
-        return _told(float(np.exp(at[best])), None, None, f"{FALLS} the {edge}; {text}".strip("; "))
+        falls = f"the cost falls to the end of what was tried, the {edge}"
+        return _told(float(np.exp(at[best])), None, None, f"{falls}; {text}".strip("; "))
     low, high = _crossing(at, over, -1), _crossing(at, over, 1)
     return _told(float(np.exp(at[best])), low, high, text)
 
