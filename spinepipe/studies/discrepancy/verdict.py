@@ -23,9 +23,14 @@ UNIT = "noise sd"
 
 
 class Answer(StrEnum):
-    """What a search came to."""
+    """What a search came to.
+
+    NAMED: these effects are missing and nothing else. PART: these are, and more stays. SET: one of
+    several, which cannot be told apart. NULL: nothing above the noise. UNKNOWN: none that is known.
+    """
 
     NAMED = "NAMED"
+    PART = "PART"
     SET = "SET"
     NULL = "NULL"
     UNKNOWN = "UNKNOWN"
@@ -42,6 +47,7 @@ class Reason(StrEnum):
     IMITATED_TOGETHER = "imitated_together"
     NONE_KEEPS_ITS_PLACE = "none_keeps_its_place"
     STIFFNESS_OF_EACH_JOINT = "stiffness_of_each_joint"
+    RIVALS_UNKNOWN = "rivals_unknown"
     NOT_PROVEN = "not_proven"
 
 
@@ -161,6 +167,23 @@ class Unknown:
 
 
 @dataclass(frozen=True)
+class Part:
+    """What stays beside effects that are certain.
+
+    Attributes
+    ----------
+    left_gap : noise SD, with the effects; None where it was not told.
+    left_where : the largest gaps that stay, in words. left_shape : None without evidence.
+    reasons : why it is not said that nothing else is missing.
+    """
+
+    left_gap: float | None
+    left_where: str
+    left_shape: str | None
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class SuspectedError:
     """A mistake that the data point to; nothing is corrected.
 
@@ -204,6 +227,7 @@ class Verdict:
     gap: Gaps = field(default_factory=Gaps)
     smallest_detectable: tuple[SmallestDetectable, ...] = ()
     unknown: Unknown | None = None
+    part: Part | None = None
     suspected_data_errors: tuple[SuspectedError, ...] = ()
     threshold: Threshold = field(default_factory=Threshold)
     families: tuple[tuple[str, ...], ...] = ()
