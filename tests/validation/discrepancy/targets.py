@@ -103,6 +103,42 @@ def _full(number: int, seed: int) -> Target:
     return Target("full", label, recipe)
 
 
+def _any_null(number: int, seed: int) -> Target:
+    """Nulls of all kinds of noise by turns."""
+    noise = ("white", "serial", "outliers")[number % 3]
+    return _null(noise)(number // 3, seed)
+
+
+def _part(number: int, seed: int) -> Target:
+    """An effect that is known and one that is not, on other coordinates where that can be."""
+    rng = np.random.default_rng([seed, 1])
+    known, alien = str(rng.choice(PLAIN_LAWS)), str(rng.choice(UNKNOWN))
+    recipe = plain(seed, gap=float(rng.uniform(0.7, 1.2)), **suited(seed, 1.0, known))
+    return Target("part", f"{known}+{alien}", with_effects(recipe, known, alien))
+
+
+PLAIN_LAWS = (
+    "nonlinear_stiffening",
+    "neutral_zone",
+    "flexion_extension_asymmetry",
+    "facet_contact",
+    "hysteresis",
+)
+
+DRAWN: dict[str, Draw] = {
+    "null": _any_null,
+    "dirty": _dirty,
+    "one": _single,
+    "two": _pair,
+    "part": _part,
+    "alien": _foreign,
+    "mistake": _mistake,
+}
+"""What can be asked for while tuning, by a short name."""
+
+TUNING = (20000, 30000)
+"""Seeds for looking at while the search is changed: from, and below."""
+
 KINDS: dict[str, tuple[int, Draw]] = {
     "null_white": (150, _null("white")),
     "null_serial": (75, _null("serial")),
