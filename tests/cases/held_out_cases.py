@@ -9,7 +9,7 @@ from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.studies.discrepancy.search.gaps import whole_gap
+from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant, base_parameters
 from spinepipe.studies.discrepancy.search.inquiry import Found
@@ -114,6 +114,7 @@ def found(base: Grounds, zone: bool, spread: Spread = Spread.SHARED) -> Found:
     if zone:
         guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
-    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0)
+    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0, at={})
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)
-    return Found(base, final, (), (), lack, 0.0, *gaps)
+    at = gaps_at(base, base.fit), gaps_at(final, final.fit)
+    return Found(base, final, (), (), lack, 0.0, *gaps, *at, {})

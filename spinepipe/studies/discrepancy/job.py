@@ -58,6 +58,7 @@ from spinepipe.studies.discrepancy.verdict import (
     Gaps,
     Missing,
     Noise,
+    Part,
     Reason,
     Rival,
     Scope,
@@ -240,6 +241,7 @@ def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> 
         ),
         smallest_detectable=told.smallest_detectable,
         unknown=_unknown(found, ended, final),
+        part=_part(found, ended, final),
         suspected_data_errors=investigation.errors,
         threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
         families=told.families,
@@ -305,11 +307,27 @@ def _rms(sd: Array) -> float | None:
 def _unknown(found: Found, ended: Outcome, final: Sequence[Place]) -> Unknown | None:
     if ended.reason is None:
         return None
-    where = "; ".join(
+    return Unknown(_where(final), _shape(found), ended.reason)
+
+
+def _part(found: Found, ended: Outcome, final: Sequence[Place]) -> Part | None:
+    """What stays beside the effects that are certain; None where nothing is said to."""
+    if not ended.left:
+        return None
+    return Part(found.final_gap.gap, _where(final), _shape(found), ended.left)
+
+
+def _where(final: Sequence[Place]) -> str:
+    """The largest gaps that are left, in words."""
+    named = "; ".join(
         f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
         f"(gap {p.gap.gap:.1f})"
         for p in worst(final, MOST_PLACES)
     )
+    return named or "no single place stands out"
+
+
+def _shape(found: Found) -> str | None:
+    """What the generic basis sees there; None without evidence."""
     evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
-    shape = found.lack.shape if evident else None
-    return Unknown(where or "no single place stands out", shape, ended.reason)
+    return found.lack.shape if evident else None

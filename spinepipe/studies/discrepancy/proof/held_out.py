@@ -35,6 +35,9 @@ SAME = 1e-6
 
 SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 
+CLEARLY = 2.5
+"""SDs of noise by which an unseen test or specimen must be worse to count as worse: 1 in 160."""
+
 FEWEST_FOLDS = 3
 """Folds from which a margin has a standard error."""
 
@@ -63,6 +66,7 @@ class FoldRow:
     base, with_effects : None where nothing was scored; the same where no effect is named.
     surrogate : None where there is none. status : scored, not determined or no fit.
     expected : chi2 of a model that is right: noise, and nuisances that the training left open.
+    moved : chi2 of the difference between what base and model with effects predict.
     """
 
     name: str
@@ -75,6 +79,18 @@ class FoldRow:
     expected: float
     status: str
     message: str
+    moved: float = 0.0
+
+    @property
+    def worse(self) -> bool:
+        """Whether the effects predict clearly worse than the base: by more than noise makes.
+
+        With noise n and predictions that differ by d, chi2 differs by 2 n d and what is no noise.
+        """
+        if self.base is None or self.with_effects is None:
+            return False
+        sd = 2.0 * float(np.sqrt(self.moved * max(self.expected / self.readings, 1.0)))
+        return self.base.chi2 - self.with_effects.chi2 < -CLEARLY * sd
 
     @property
     def closed(self) -> float | None:
@@ -222,6 +238,7 @@ def _scored_row(
         base.readings + sum(part.left_open for part in parts),
         SCORED,
         "; ".join(said),
+        sum(_moved(chosen, part) for part in parts),
     )
 
 
@@ -263,6 +280,18 @@ def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
     ]
     residual = np.concatenate([np.zeros(0), *white])
     return Gap(float(residual @ residual), float(len(residual)), len(residual))
+
+
+def _moved(chosen: Chosen, part: Predictions) -> float:
+    """chi2 of the difference between base and model with effects, over the scored readings."""
+    total = 0.0
+    for name, tests in part.scored.items():
+        for test, there in enumerate(tests):
+            if there.any():
+                models = (part.base, part.with_effects)
+                base, final = (_missed(chosen, name, test, there, one) for one in models)
+                total += float(np.sum((base - final) ** 2))
+    return total
 
 
 def _missed(chosen: Chosen, specimen: str, test: int, there: Flags, placed: Placed) -> Array:

@@ -107,6 +107,21 @@ def whole_gap(grounds: Grounds, fit: JointFit) -> Gap:
     return gap_of([one.residual for one in left], [one.freedom for one in left])
 
 
+def gaps_at(grounds: Grounds, fit: JointFit) -> dict[str, Gap]:
+    """The gap over the readings of each coordinate that was read."""
+    left = left_over(grounds, fit).values()
+    found = {}
+    for place, name in enumerate(COORDINATES):
+        residuals, freedoms = (
+            [tuple(test[..., place] for test in tests) for tests in every]
+            for every in ([one.residual for one in left], [one.freedom for one in left])
+        )
+        gap = gap_of(residuals, freedoms)
+        if gap.readings:
+            found[name] = gap
+    return found
+
+
 def left_over(grounds: Grounds, fit: JointFit) -> dict[str, LeftOver]:
     """What a fit leaves of every reading, nuisances at their most likely values."""
     unknowns = len(fit.x)

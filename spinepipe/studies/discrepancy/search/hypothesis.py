@@ -15,12 +15,13 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import spine_model
 from spinepipe.effects import Effect, Parameter, Spread, Trial, create, registered
+from spinepipe.effects.carried_share import ALL_ROTATIONS
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.statics import FreeParameter, declared, free_parameters
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS
 
 BUSHING, PER_SPECIMEN = "linear_bushing", "per_specimen"
 DAMPING = np.array([2000.0] * 3 + [10.0] * 3)
@@ -86,6 +87,14 @@ class Variant:
     def create(self) -> Effect:
         """The effect itself."""
         return create(self.effect, dict(self.options))
+
+    def coordinates(self, read: Sequence[str]) -> tuple[str, ...]:
+        """Those of the read coordinates that it loads by its options; all, if it names none."""
+        options = dict(self.options)
+        named = {options.get("coordinate"), *options.get("pair", ())}
+        if ALL_ROTATIONS in named:
+            named |= set(ROTATIONS)
+        return tuple(name for name in read if name in named) or tuple(read)
 
     @property
     def strengths(self) -> tuple[int, ...]:

@@ -1,12 +1,12 @@
 """A search at work: what it may do, what it has looked at so far, and where it ended."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.progress import Progress
-from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.gaps import Gap, gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Supposed, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     signatures_of_each,
     taken_out,
 )
-from spinepipe.studies.discrepancy.search.refit import Refit, refit, refits
+from spinepipe.studies.discrepancy.search.refit import STARTS, Refit, refit, refits, weaker
 from spinepipe.studies.discrepancy.search.screen import Index, Screen, screen, screened
 from spinepipe.studies.discrepancy.store import Run
 
@@ -54,7 +54,9 @@ class Standing:
 
     Attributes
     ----------
-    log_evidence : beside the others. alone : of its effect on the first screen, beside none.
+    log_evidence : beside the others; to second order where these alone have no fit.
+    alone : of its effect on the first screen, beside none.
+    rivals_known : whether others could be tried in its place.
     over_stiffness : how far its evidence is above that of a stiffness of its own for each joint of
         each specimen, where the form differs between joints as well; None elsewhere.
     """
@@ -65,6 +67,7 @@ class Standing:
     gain: float
     rivals: tuple[Rival, ...]
     over_stiffness: float | None
+    rivals_known: bool = True
 
     @property
     def name(self) -> str:
@@ -80,12 +83,14 @@ class Stage:
     ----------
     name : number of the round, or whose place all others were tried in.
     in_place : whether they were tried in the place of an effect; else some could enter.
+    beside : names of the effects in the model beside which they were tried.
     """
 
     name: str
     screen: Screen
     refits: tuple[Refit, ...]
     in_place: bool
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,9 @@ class Found:
     ----------
     base, final : the grounds with the base alone and with what stands. standing : what stands.
     lack : the generic basis beside the final model.
-    generic_threshold : evidence of the generic basis that the null seldom exceeds.
+    generic_threshold, generic_threshold_at : evidence of the generic basis that the null seldom
+        exceeds, as a whole and in any single coordinate.
+    base_at, final_at : the gap at each coordinate that was read, by its name.
     """
 
     base: Grounds
@@ -107,6 +114,15 @@ class Found:
     generic_threshold: float
     base_gap: Gap
     final_gap: Gap
+    base_at: Mapping[str, Gap]
+    final_at: Mapping[str, Gap]
+    generic_threshold_at: Mapping[str, float]
+
+    def with_only(self, kept: Sequence[Standing], fit: JointFit) -> "Found":
+        """The same with some of the effects, and the fit that has no others."""
+        final = self.final.at(fit)
+        gap, at = whole_gap(final, fit), gaps_at(final, fit)
+        return replace(self, final=final, standing=tuple(kept), final_gap=gap, final_at=at)
 
 
 def look(
@@ -187,7 +203,8 @@ class Inquiry:
             tried = self._refits(grounds, screen) if place or evident else ()
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
-        self.stages.append(Stage(name, screen, tried, place))
+        beside = tuple(dict.fromkeys(one.form.name for one in grounds.fit.hypothesis.supposed))
+        self.stages.append(Stage(name, screen, tried, place, beside))
         return self.stages[-1]
 
     def _look(self, grounds: Grounds) -> Screen:
@@ -211,10 +228,17 @@ class Inquiry:
         trials = next(t for t in self.rules.trials if t.effect == one.form.name)
         return refit(grounds, one, trials, self.run)
 
-    def beside(self, current: Grounds, others: tuple[Supposed, ...]) -> Grounds:
-        """Grounds with these of the current effects alone; the base where they have no fit."""
+    def beside(self, current: Grounds, others: tuple[Supposed, ...]) -> Grounds | None:
+        """Grounds with these of the current effects alone; None where they have no fit.
+
+        Looked for near where all stand, then from the neutral pose, then with weaker effects.
+        """
         if not others:
             return self.base
-        start, near = current.suppose(others), current.fit.poses
-        fit: JointFit = self.run(joint_fit, start, self.base.setting, near)
-        return self.base.at(fit) if fit.usable else self.base
+        setting = self.base.setting
+        for share, near in ((1.0, current.fit.poses), *((share, None) for share in STARTS)):
+            start = current.suppose(tuple(weaker(one, share) for one in others))
+            fit: JointFit = self.run(joint_fit, start, setting, near)
+            if fit.usable:
+                return self.base.at(fit)
+        return None

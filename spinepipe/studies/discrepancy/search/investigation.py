@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     trials,
 )
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
-from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
     estimated_noise,
@@ -110,7 +110,22 @@ def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> 
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     ended = outcome(found, study.margin, proof, errors)
-    return Investigation(grounds, rules, found, errors, proof, ended)
+    told = Investigation(grounds, rules, found, errors, proof, ended)
+    return _with_sure_effects(told, asked, run)
+
+
+def _with_sure_effects(one: Investigation, asked: Asked, run: Run) -> Investigation:
+    """Fitted and held out again without effects that stood and are doubted beside sure ones."""
+    kept = [effect for effect in one.found.standing if one.ended.keeps(effect)]
+    if not kept or len(kept) == len(one.found.standing):
+        return one
+    final = one.found.final
+    fit = run(joint_fit, final.suppose([e.supposed for e in kept]), final.setting, final.fit.poses)
+    if not fit.usable:
+        return one
+    found = one.found.with_only(kept, fit)
+    run(on_record, fit, one.grounds.readings)
+    return replace(one, found=found, proof=held_out(found, asked, run))
 
 
 def on_record(fit: JointFit, readings: Mapping[str, SpecimenReadings]) -> int:
@@ -139,8 +154,9 @@ def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
 def _measured(
     study: Discrepancy, cohort: Cohort, coordinates: Sequence[str]
 ) -> tuple[SpecimenReadings, ...]:
-    tests = study.tests or cohort.tests
-    found = (specimen_readings(cohort, s, tests, coordinates) for s in cohort.specimen_names)
+    # in an order of their own: how a cohort lists them says nothing, and changes no verdict
+    tests, names = sorted(study.tests or cohort.tests), sorted(cohort.specimen_names)
+    found = (specimen_readings(cohort, s, tests, coordinates) for s in names)
     return tuple(one for one in found if one.tests)
 
 
@@ -174,7 +190,7 @@ def _rules(ready: Prepared) -> Rules:
     study, cohort = ready.study, ready.cohort
     joints = len(cohort.joint_names)
     return Rules(
-        trials(study.effects, ready.coordinates, cohort.specimen_names, joints),
+        trials(study.effects, ready.coordinates, sorted(cohort.specimen_names), joints),
         ready.coordinates,
         study.false_alarm,
         study.bootstrap,

@@ -2,11 +2,12 @@
 
 A generic basis: what could be missing without being any known effect, joint by joint.
 
-Loads that are polynomials and bumps of a joint's own rotation, cross terms of its other rotations,
-terms of the neighbouring joints' rotation, and readings that drift over the steps of a test.
+Loads that are polynomials and bumps of a joint's own motion, cross terms of its other motions,
+terms of the neighbouring joints' motion, and readings that drift over the steps of a test; in each
+coordinate that was read.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -29,17 +30,19 @@ from spinepipe.studies.discrepancy.search.projected import (
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.screen import Group
-from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
+from spinepipe.units import COORDINATES, less_step_0
 
 SIZE = 0.1
 """Prior size of a term at the largest motion, as a share of the joint's load there."""
 
-LEAST_REACH = np.deg2rad(0.2)
+LEAST_REACH = np.array([5e-5] * 3 + [np.deg2rad(0.2)] * 3)
+"""m and rad; less motion than this has no shape."""
+
 BUMPS, BUMP_WIDTH = (-0.6, -0.2, 0.2, 0.6), 0.25
 
 FAMILIES = {
     "own": "load over the joint's own {coordinate}",
-    "cross": "load in {coordinate} over the joint's other rotations",
+    "cross": "load in {coordinate} over the joint's other motions",
     "neighbour": "load in {coordinate} over that of the neighbouring joints",
     "drift": "readings of {coordinate} that drift over the steps of a test",
 }
@@ -67,23 +70,22 @@ def generic_columns(
     model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, coordinates: Sequence[str]
 ) -> GenericColumns:
     """The generic basis of a specimen where its model stands."""
-    rotations = [name for name in coordinates if name in ROTATIONS]
     solved = Solved(model, cases, zeroed)
     motions = solved.poses
     reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
     stiffness = _stiffness(model)
     terms: list[Term] = []
     moved: list[list[Array]] = [[] for _ in cases]
-    for name in rotations:
+    for name in coordinates:
         at = COORDINATES.index(name)
-        for family, count in _counts(len(rotations)).items():
+        for family, count in _counts(len(coordinates)).items():
             terms += [
                 Term(family, name, number, joint)
                 for number in range(count)
                 for joint in range(model.n_joints)
             ]
         size = SIZE * stiffness[:, at] * reach[:, at]
-        loads = [_loads(motion / reach, at, rotations) * size[:, None] for motion in motions]
+        loads = [_loads(motion / reach, at, coordinates) * size[:, None] for motion in motions]
         by_load = solved.by_loads([_alone(one, at) for one in loads])
         for place, motion in enumerate(motions):
             drift = _drift(len(motion), SIZE * reach[:, at], at)
@@ -102,19 +104,19 @@ def _stiffness(model: SpineModel) -> Array:
     return np.where(total > 0.0, total, 1.0)
 
 
-def _counts(rotations: int) -> dict[str, int]:
+def _counts(coordinates: int) -> dict[str, int]:
     """Terms of each family for one coordinate, in the order of `_loads`."""
-    others = rotations - 1
+    others = coordinates - 1
     cross = 4 * others + len(list(combinations(range(others), 2)))
     return {"own": 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
 
 
-def _loads(u: Array, at: int, rotations: Sequence[str]) -> Array:
+def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
     """(T, J, K) terms of relative motion u (T, J, 6) that load one coordinate."""
     own = u[..., at]
     found = [own**2, own**3, own * np.abs(own)]
     found += [np.exp(-(((own - b) / BUMP_WIDTH) ** 2)) for b in BUMPS]
-    others = [COORDINATES.index(n) for n in rotations if COORDINATES.index(n) != at]
+    others = [COORDINATES.index(n) for n in coordinates if COORDINATES.index(n) != at]
     for other in others:
         x = u[..., other]
         found += [x, x**2, x * own, x**2 * own]
@@ -147,12 +149,12 @@ SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
 
 
 @dataclass(frozen=True)
-class LackOfFit:
-    """The generic basis against what the fit leaves.
+class Lack:
+    """What speaks for some terms of the generic basis; averaged over families and ways to differ.
 
     Attributes
     ----------
-    log_evidence : averaged over families, coordinates and ways to differ. null : of each draw.
+    log_evidence : of the data. null : (D,) of each draw without a missing effect.
     family, coordinate, spread : where most is explained. explained : drop of chi2 there.
     """
 
@@ -171,6 +173,13 @@ class LackOfFit:
 
 
 @dataclass(frozen=True)
+class LackOfFit(Lack):
+    """The generic basis against what the fit leaves, as a whole and ``at`` each coordinate."""
+
+    at: Mapping[str, Lack]
+
+
+@dataclass(frozen=True)
 class _Part:
     family: str
     coordinate: str
@@ -182,19 +191,25 @@ class _Part:
 def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int) -> LackOfFit:
     """Evidence of the generic basis beside the grounds' fit."""
     terms, problem = _problem(grounds, coordinates, draws, seed)
-    parts = [
-        _part(problem, terms, family, coordinate, spread)
-        for coordinate in ROTATIONS
-        if coordinate in coordinates
-        for family in FAMILIES
-        for spread in SPREADS
-        if not (spread is Spread.EACH and len(grounds.readings) == 1)
-    ]
+    spreads = [s for s in SPREADS if not (s is Spread.EACH and len(grounds.readings) == 1)]
+    families = [family for family, count in _counts(len(coordinates)).items() if count]
+    parts = {
+        coordinate: [
+            _part(problem, terms, family, coordinate, spread)
+            for family in families
+            for spread in spreads
+        ]
+        for coordinate in coordinates
+    }
+    at = {coordinate: _lack(of_coordinate) for coordinate, of_coordinate in parts.items()}
+    whole = _lack([part for of_coordinate in parts.values() for part in of_coordinate])
+    return LackOfFit(**vars(whole), at=at)
+
+
+def _lack(parts: Sequence[_Part]) -> Lack:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
-    return LackOfFit(
-        float(logs[0]), logs[1:], best.family, best.coordinate, best.spread, best.explained
-    )
+    return Lack(float(logs[0]), logs[1:], best.family, best.coordinate, best.spread, best.explained)
 
 
 def _problem(

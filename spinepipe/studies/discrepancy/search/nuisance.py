@@ -5,7 +5,7 @@ the fitted base: a nuisance adds ``J S J'`` to the covariance of the readings.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -94,9 +94,78 @@ ALIKE = ("rotation_order", "bending_rotation_coupling")
 def _alike(columns: Sequence[Column], moved: tuple[Array, ...]) -> list[Array]:
     """(T, J, 6, g) per test: columns of a nuisance that joints may share, all joints together."""
     names = [(c.variant, c.strength) if c.variant.effect in ALIKE else None for c in columns]
-    kinds = [kind for kind in dict.fromkeys(names) if kind is not None]
+    kinds = _shared(columns)
     onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
     return [one @ onto.reshape(len(columns), len(kinds)) for one in moved]
+
+
+def _shared(columns: Sequence[Column]) -> list[tuple[Variant, int]]:
+    """Variant and strength of the nuisances that joints may share, in order of appearance."""
+    names = [(c.variant, c.strength) for c in columns if c.variant.effect in ALIKE]
+    return list(dict.fromkeys(names))
+
+
+KINDS = {
+    "joint_centre_offset": "joint_centre",
+    "axes_tilt": "law_axes",
+    "marker_bias": "registration",
+    "load_misalignment": "load_axis",
+    "bending_rotation_coupling": "off_diagonal",
+}
+"""What `NuisancePriors` and settings call an effect's nuisance; others have the effect's name."""
+
+OFF_DIAGONAL, POSTURE_KIND = "off_diagonal", "posture"
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a column of `nuisance_signatures` is of.
+
+    Attributes
+    ----------
+    kind : as a field of `NuisancePriors`. component : parameter, or the coordinates it couples.
+    joint : index; None for all joints alike, or for a load. test : name, or ``*``.
+    sd : one prior SD in ``unit``: m, rad, or 1 for a share.
+    """
+
+    kind: str
+    component: str
+    joint: int | None
+    test: str
+    sd: float
+    unit: str
+
+
+def nuisance_labels(
+    priors: NuisancePriors, stiffness: Array, tests: Sequence[str]
+) -> tuple[Label, ...]:
+    """What each column of `nuisance_signatures` is, in its order.
+
+    Parameters
+    ----------
+    stiffness : (J, 6) of the base, SI.
+    """
+    columns = nuisance_columns(priors, stiffness, tests)
+    shared = [
+        next(c for c in columns if (c.variant, c.strength) == one) for one in _shared(columns)
+    ]
+    posture = np.full(len(stiffness), priors.posture)
+    tilts = _columns(POSTURE[0], posture, (EVERY_TEST,))
+    return (
+        *(_label(one, one.joint, priors) for one in columns),
+        *(_label(one, None, priors) for one in shared),
+        *(replace(_label(one, one.joint, priors), kind=POSTURE_KIND) for one in tilts),
+    )
+
+
+def _label(one: Column, joint: int | None, priors: NuisancePriors) -> Label:
+    parameter = one.variant.create().parameters[one.strength]
+    kind = KINDS.get(one.variant.effect, one.variant.effect)
+    pair = dict(one.variant.options).get("pair")
+    if kind == OFF_DIAGONAL:  # its SD is a share of what it couples
+        component = " x ".join(pair) if pair else parameter.name
+        return Label(kind, component, joint, one.test, priors.off_diagonal, "1")
+    return Label(kind, parameter.name, joint, one.test, one.scale, parameter.unit)
 
 
 def nuisance_signatures(

@@ -1,10 +1,15 @@
-"""The verdict of a search: named, a set, nothing, or something no known effect is."""
+"""The verdict of a search: named, a part of it, a set, nothing, or something no known effect is.
+
+Each effect that stands is doubted by itself, on the coordinates that it loads: what stays elsewhere
+says nothing against it, but forbids to say that it is all that is missing.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
@@ -12,11 +17,17 @@ from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
 UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""
 
+TRIFLE = 0.02
+"""Of all that the effects explain: less than this left at a coordinate is no part of it."""
+
 GAP_LEFT, LEAST_LEFT = 0.5, 0.3
 """Share of the discrepancy that named effects may leave, unless that may be a gap below this."""
 
 WORSE_SHARE, WORSE = 0.05, 30.0
-"""An unseen test may be predicted worse by this share of the base's excess chi2, or so much."""
+"""Unseen tests together may be predicted worse by this share of the base's excess, or so much."""
+
+CLOSED = 0.5
+"""Of what is above the noise in held-out readings: effects that close less are not all of it."""
 
 ALONE = 0.25
 """Share of its evidence that an effect must have without the others.
@@ -33,6 +44,7 @@ class Outcome:
     ----------
     named : effects that are sure. tied : names that cannot be told apart here.
     reason : why nothing is named though something is missing; None elsewhere.
+    left : why what is named is not all, a sentence each.
     """
 
     verdict: Answer
@@ -40,6 +52,11 @@ class Outcome:
     named: tuple[Standing, ...] = ()
     tied: tuple[str, ...] = ()
     reason: Reason | None = None
+    left: tuple[str, ...] = ()
+
+    def keeps(self, one: Standing) -> bool:
+        """Whether the verdict stands for an effect, for certain or in a set."""
+        return one.name in self.tied or any(one is other for other in self.named)
 
 
 _NoName = tuple[Reason, str]
@@ -58,10 +75,15 @@ def outcome(
     ----------
     proof : on data held out; None where none was asked for. errors : suspected in the data.
     """
+    doubts = {number: _doubt(found, number, margin) for number in range(len(found.standing))}
+    kept = [one for number, one in enumerate(found.standing) if doubts[number] is None]
+    tied = _tied(kept, margin)
+    named = tuple(one for one in kept if one.name not in tied)
+    first = next((doubt for doubt in doubts.values() if doubt is not None), None)
     unexplained = (
         _mistaken(errors)
-        or _unexplained(found)
-        or _stiffness_of_each(found.standing, margin)
+        or (_unexplained(found) if not found.standing else None)
+        or (first if not kept else None)
         or _unproven(found, proof)
     )
     if unexplained:
@@ -70,32 +92,19 @@ def outcome(
     if not found.standing:
         why = "no effect has evidence above what noise alone would show on these tests"
         return Outcome(Answer.NULL, why)
-    tied = _tied(found.standing, margin)
-    sure = tuple(one for one in found.standing if one.name not in tied)
+    left = _left(found, [doubt for doubt in doubts.values() if doubt is not None], proof)
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
-        return Outcome(Answer.SET, why, sure, tied)
-    names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
+        return Outcome(Answer.SET, why, named, tied, left=left)
+    names = _listed(list(dict.fromkeys(one.name for one in named)), "and")
     why = (
         f"{names}: more evidence than noise alone would show, and at least {margin:g} more than "
         "any other effect has"
     )
-    return Outcome(Answer.NAMED, why, sure)
-
-
-def _without_place(found: Found) -> _NoName | None:
-    """Whether effects had evidence and none kept its place."""
-    evident = [
-        one
-        for stage in found.stages[:1]
-        for one in stage.refits
-        if one.log_evidence > stage.screen.threshold
-    ]
-    if not evident:
-        return None
-    names = _listed(list(dict.fromkeys(one.name for one in evident)), "and")
-    why = f"there is evidence for {names}, but none keeps its place beside the others"
-    return Reason.NONE_KEEPS_ITS_PLACE, why
+    if left:
+        why = f"{why}; but more stays: {'; '.join(left)}"
+        return Outcome(Answer.PART, why, named, left=left)
+    return Outcome(Answer.NAMED, why, named)
 
 
 def _mistaken(errors: Sequence[SuspectedError]) -> _NoName | None:
@@ -106,16 +115,93 @@ def _mistaken(errors: Sequence[SuspectedError]) -> _NoName | None:
     return Reason.DATA_ERRORS, f"the data look wrong, so nothing is named: {places}"
 
 
-def _stiffness_of_each(standing: Sequence[Standing], margin: float) -> _NoName | None:
-    """Whether plain stiffness, another in each joint of each specimen, does as well."""
-    for one in standing:
-        if one.over_stiffness is not None and one.over_stiffness < margin:
-            why = (
-                f"{one.name} explains no more than a stiffness of its own for each joint of each "
-                "specimen: try base per_joint"
-            )
-            return Reason.STIFFNESS_OF_EACH_JOINT, why
+def _unexplained(found: Found) -> _NoName | None:
+    """Why something is missing that no known effect is, where none stands."""
+    if found.lack.log_evidence <= max(LEAST_THRESHOLD, found.generic_threshold):
+        return None
+    why = f"a discrepancy that no known effect explains: {found.lack.shape}"
+    return Reason.NO_KNOWN_EFFECT, why
+
+
+def _doubt(found: Found, number: int, margin: float) -> _NoName | None:
+    """Why an effect that stands is not sure, if so."""
+    one = found.standing[number]
+    if one.over_stiffness is not None and one.over_stiffness < margin:
+        why = (
+            f"{one.name} explains no more than a stiffness of its own for each joint of each "
+            "specimen: try base per_joint"
+        )
+        return Reason.STIFFNESS_OF_EACH_JOINT, why
+    if not one.rivals_known:
+        why = f"without {one.name} the other effects have no fit, so its rivals are not known"
+        return Reason.RIVALS_UNKNOWN, why
+    return _most_stays(found, one) or _imitated(found, one)
+
+
+def _most_stays(found: Found, one: Standing) -> _NoName | None:
+    """Whether too much stays on the coordinates that an effect loads."""
+    at = one.supposed.form.variant.coordinates(tuple(found.base_at))
+    for coordinate in at if len(at) < len(found.base_at) else (EVERYWHERE,):
+        share = _share_left(found, coordinate)
+        if share > UNEXPLAINED_SHARE:
+            why = f"{one.name} would explain a part, but {100 * share:.0f} % stays"
+            return Reason.A_PART_STAYS, f"{why}{_in(coordinate)}"
+        gain, gap = _gain(found, coordinate), _final(found, coordinate)
+        if gap.interval[0] > LEAST_LEFT and gap.excess > GAP_LEFT * (gain + gap.excess):
+            why = "most of the discrepancy stays whatever known effect is added"
+            return Reason.MOST_STAYS, f"{why}{_in(coordinate)}"
     return None
+
+
+EVERYWHERE = ""
+"""In the place of a coordinate: all of them."""
+
+
+def _in(coordinate: str) -> str:
+    return f" in {coordinate.replace('_', ' ')}" if coordinate else ""
+
+
+def _gain(found: Found, coordinate: str) -> float:
+    """Drop of chi2 by the effects."""
+    if not coordinate:
+        return found.base.fit.chi2 - found.final.fit.chi2
+    return found.base_at[coordinate].chi2 - found.final_at[coordinate].chi2
+
+
+def _final(found: Found, coordinate: str) -> Gap:
+    return found.final_at[coordinate] if coordinate else found.final_gap
+
+
+def _share_left(found: Found, coordinate: str) -> float:
+    """Share of what effects and generic basis explain that is left to the basis; 0 if not evident.
+
+    Evidence e is a drop of chi2 of 2 e or so.
+    """
+    lack = found.lack.at[coordinate] if coordinate else found.lack
+    needed = found.generic_threshold_at[coordinate] if coordinate else found.generic_threshold
+    if lack.log_evidence <= max(LEAST_THRESHOLD, needed):
+        return 0.0
+    left, gain = 2.0 * lack.log_evidence, max(_gain(found, coordinate), 0.0)
+    if left < TRIFLE * _gain(found, EVERYWHERE):
+        return 0.0
+    return left / (gain + left)
+
+
+def _imitated(found: Found, one: Standing) -> _NoName | None:
+    """Whether effects on the same coordinates stand only together."""
+    read = tuple(found.base_at)
+
+    def at(other: Standing) -> set[str]:
+        return set(other.supposed.form.variant.coordinates(read))
+
+    beside = [other for other in found.standing if at(other) & at(one)]
+    props = [other for other in beside if other.alone < ALONE * other.log_evidence]
+    if not props or len(beside) < 2:
+        return None
+    names = _listed(list(dict.fromkeys(other.name for other in beside)), "and")
+    alone = _listed(list(dict.fromkeys(other.name for other in props)), "and")
+    why = f"{names} imitate it together, but by itself nothing speaks for {alone}"
+    return Reason.IMITATED_TOGETHER, why
 
 
 def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:
@@ -132,12 +218,31 @@ def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:
 
 
 def _worse_on_tests(proof: HeldOut) -> bool:
-    """Whether tests that no fit has seen are clearly worse with the effects than without."""
+    """Whether tests that no fit has seen are together clearly worse with the effects."""
     rows = [row for row in proof.folds if row.kind == TEST]
     pairs = [(row.base, row.with_effects, row.expected) for row in rows]
     drops = sum(b.chi2 - e.chi2 for b, e, _ in pairs if b is not None and e is not None)
     excess = sum(b.chi2 - expected for b, _, expected in pairs if b is not None)
     return drops < -max(WORSE, WORSE_SHARE * max(excess, 0.0))
+
+
+def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tuple[str, ...]:
+    """Why what is sure is not all that is missing, a sentence each."""
+    said = [why for _, why in doubts]
+    for coordinate, gap in found.final_at.items():
+        share = _share_left(found, coordinate)
+        if share > UNEXPLAINED_SHARE:
+            shape = found.lack.at[coordinate].shape
+            said.append(f"a gap of {gap.gap:.1f} noise SD{_in(coordinate)} ({shape})")
+    if proof is not None and proof.tells:
+        said += [
+            f"{row.kind} {row.name}, held out, is predicted worse than by the base"
+            for row in proof.folds
+            if row.worse
+        ]
+        if proof.closed is not None and proof.closed < CLOSED:
+            said.append(f"held-out readings: only {100 * proof.closed:.0f} % of the gap closes")
+    return tuple(dict.fromkeys(said))
 
 
 def _tied(standing: Sequence[Standing], margin: float) -> tuple[str, ...]:
@@ -149,33 +254,6 @@ def _tied(standing: Sequence[Standing], margin: float) -> tuple[str, ...]:
         if close:
             tied |= dict.fromkeys([one.name, *close])
     return tuple(tied)
-
-
-def _unexplained(found: Found) -> _NoName | None:
-    """Why something is missing that no known effect is, if so."""
-    threshold = max(LEAST_THRESHOLD, found.generic_threshold)
-    lack = found.lack
-    if not found.standing:
-        if lack.log_evidence <= threshold:
-            return _without_place(found)
-        why = f"a discrepancy that no known effect explains: {lack.shape}"
-        return Reason.NO_KNOWN_EFFECT, why
-    gain = found.base.fit.chi2 - found.final.fit.chi2
-    left = 2.0 * max(lack.log_evidence, 0.0)
-    if lack.log_evidence > threshold and left > UNEXPLAINED_SHARE * (gain + left):
-        names = _listed([one.name for one in found.standing], "and")
-        why = f"{names} would explain a part, but {100 * left / (gain + left):.0f} % stays"
-        return Reason.A_PART_STAYS, why
-    props = [one.name for one in found.standing if one.alone < ALONE * one.log_evidence]
-    if props and len(found.standing) > 1:
-        names = _listed([one.name for one in found.standing], "and")
-        alone = _listed(list(dict.fromkeys(props)), "and")
-        why = f"{names} imitate it together, but by itself nothing speaks for {alone}"
-        return Reason.IMITATED_TOGETHER, why
-    excess = found.final_gap.excess
-    if found.final_gap.interval[0] > LEAST_LEFT and excess > GAP_LEFT * (gain + excess):
-        return Reason.MOST_STAYS, "most of the discrepancy stays whatever known effect is added"
-    return None
 
 
 def _listed(names: Sequence[str], word: str) -> str:

@@ -14,6 +14,9 @@ from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
 from spinepipe.units import COORDINATES
 
+_ROTATION_AXES = [2, 0, 1]
+"""Axis of the joint frame about which each rotation turns in the neutral pose."""
+
 
 @dataclass(frozen=True)
 class Repeats:
@@ -54,6 +57,11 @@ class SpecimenReadings:
         """The load histories."""
         return tuple(test.case for test in self.tests)
 
+    @property
+    def applied(self) -> tuple[Array, ...]:
+        """(T, J, 6) N and N m of each test: what its loads do at each joint, weight not counted."""
+        return tuple(applied_loads(self.frames, case) for case in self.cases)
+
 
 def specimen_readings(
     cohort: Cohort, specimen: str, tests: Sequence[str], coordinates: Sequence[str]
@@ -90,3 +98,23 @@ def _loads(case: LoadCase) -> tuple[object, ...]:
         for step in case.steps
     )
     return (case.test, *steps)
+
+
+def applied_loads(frames: Sequence[Pose], case: LoadCase) -> Array:
+    """(T, J, 6) N and N m, conjugate to the coordinates of each joint in the neutral pose.
+
+    Every wrench loads all joints below the vertebra it acts on, with its force along the axes of
+    the joint's frame and its moment about the frame's origin.
+
+    Parameters
+    ----------
+    frames : of the joints in ground, caudal to cranial; joint j carries vertebra j.
+    """
+    found = np.zeros((len(case.steps), len(frames), 6))
+    for t, step in enumerate(case.steps):
+        for wrench in step.wrenches:
+            for j, frame in enumerate(frames[: wrench.body + 1]):
+                arm = wrench.point - frame.origin
+                moment = frame.rotation.T @ (wrench.moment + np.cross(arm, wrench.force))
+                found[t, j] += [*(frame.rotation.T @ wrench.force), *moment[_ROTATION_AXES]]
+    return found

@@ -129,6 +129,18 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
     return 0.5 * gain + float(logsumexp(found)) - float(np.log(len(SIZES)))
 
 
+def in_place(fit: JointFit, number: int) -> tuple[float, float]:
+    """Drop of chi2 by one supposed effect, and its log evidence, both to second order at the fit.
+
+    For an effect without which the others have no fit that it could be compared with.
+    """
+    own = np.array([u.supposed == number for u in fit.hypothesis.unknowns])
+    off = np.array([u.mean for u in fit.hypothesis.unknowns])
+    away = (fit.x - off)[own]
+    gain = float(away @ curvature_of(fit, own) @ away)
+    return gain, laplace(fit, number, gain)
+
+
 def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
     """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
     jacobian = fit.whole_jacobian()

@@ -27,12 +27,14 @@ class Whitening:
     roots : per test (J, 6, T, T), inverse root of the noise covariance on the steps that are used.
     directions : (N, k) orthonormal directions in which nuisances move the readings.
     shrink : (k,) factor less one by which these are shortened.
+    mixing : (k, K) orthonormal rows, what each of K nuisances has of each direction.
     """
 
     used: tuple[NDArray[np.bool_], ...]
     roots: tuple[Array, ...]
     directions: Array
     shrink: Array
+    mixing: Array
 
     @property
     def count(self) -> int:
@@ -76,21 +78,45 @@ class Whitening:
         result: Array = 1.0 - self.directions**2 @ taken
         return result
 
+    @property
+    def moves(self) -> Array:
+        """(N, K) how far one prior SD of each nuisance moves each reading, in noise SD."""
+        result: Array = (self.directions * self.sizes) @ self.mixing
+        return result
+
+    def lengthened(self, white: Array) -> Array:
+        """What `shortened` made, back to noise-whitened rows (N, ...)."""
+        inside = self.directions.T @ white
+        longer = 1.0 / (1.0 + self.shrink) - 1.0
+        longer = longer if white.ndim == 1 else longer[:, None]
+        result: Array = white + self.directions @ (longer * inside)
+        return result
+
 
 def whitening(tests: Sequence[Repeats], noise: Noise) -> Whitening:
     """Whitening for the mean over the cycles, without nuisances."""
     used = tuple(test.count > 0 for test in tests)
     roots = tuple(_roots(test, noise) for test in tests)
     count = sum(int(one.sum()) for one in used)
-    return Whitening(used, roots, np.zeros((count, 0)), np.zeros(0))
+    return Whitening(used, roots, np.zeros((count, 0)), np.zeros(0), np.zeros((0, 0)))
 
 
 def with_nuisances(plain: Whitening, moved: Sequence[Array]) -> Whitening:
     """The whitening with nuisances; ``moved`` (T, J, 6, k) per test by one prior SD of each."""
-    directions, sizes, _ = svd(plain.noise_only(moved))
+    return _with_moves(plain, *svd(plain.noise_only(moved)))
+
+
+def rescaled(white: Whitening, factors: Array) -> Whitening:
+    """The same with the prior SD of each nuisance (K,) times a factor; 0: it is known exactly."""
+    left, sizes, mixing = svd(white.sizes[:, None] * white.mixing * factors)
+    return _with_moves(white, white.directions @ left, sizes, mixing)
+
+
+def _with_moves(plain: Whitening, directions: Array, sizes: Array, mixing: Array) -> Whitening:
+    """The whitening with nuisances that move readings by ``directions * sizes @ mixing``."""
     seen = sizes > 1e-3
     shrink = 1.0 / np.sqrt(1.0 + sizes[seen] ** 2) - 1.0
-    return Whitening(plain.used, plain.roots, directions[:, seen], shrink)
+    return Whitening(plain.used, plain.roots, directions[:, seen], shrink, mixing[seen])
 
 
 def _roots(test: Repeats, noise: Noise) -> Array:

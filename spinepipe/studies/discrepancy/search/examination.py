@@ -1,0 +1,234 @@
+"""Examination: each standing effect is taken away once and all others are tried in its place.
+
+An effect leaves where nothing speaks for it beside the others. Another takes its place if it has
+more evidence by a clear margin; with less, both stand as rivals. Two effects are held against each
+single one as well, and one with many unknowns against two with few.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from spinepipe.effects import Spread
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
+from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rival, Stage, Standing
+from spinepipe.studies.discrepancy.search.refit import Refit, in_place, standing
+from spinepipe.studies.discrepancy.search.screen import Screen
+from spinepipe.units import COORDINATES
+
+IMITATED = 0.3
+"""Share of an effect's evidence that a simpler one must have, to be tried beside a second."""
+
+ANOTHER_FORM = 1.0
+"""Log evidence by which another form of an effect must be better than the one that stands."""
+
+LEVELS = "level_dependence"
+"""The effect by which joints differ in stiffness."""
+
+
+@dataclass(frozen=True)
+class Examined:
+    """Where an examination came to.
+
+    Attributes
+    ----------
+    grounds : as they were, or with what left or gave way.
+    standing : the effects with their rivals; None where one left or gave way.
+    """
+
+    grounds: Grounds
+    standing: tuple[Standing, ...] | None
+
+
+def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Examined:
+    """The effects of a fit with their rivals, or the grounds after the first change.
+
+    Parameters
+    ----------
+    settled : nothing leaves or gives way any more; what is better is a rival like the others.
+    """
+    stood: list[Standing] = []
+    supposed = standing(current.fit)
+    for number, one in enumerate(supposed):
+        found = _one(current, number, one, inquiry, settled)
+        if isinstance(found, Grounds):
+            return Examined(found, None)
+        stood.append(found)
+    for pair in combinations(range(len(supposed)), 2):
+        given, stood = _against_one(current, pair, stood, inquiry)
+        if given is not None and not settled:
+            return Examined(given, None)
+    return Examined(current, tuple(stood))
+
+
+def _one(
+    current: Grounds, number: int, one: Supposed, inquiry: Inquiry, settled: bool
+) -> Grounds | Standing:
+    """One effect with its rivals, or the grounds where it left or gave way."""
+    without, stage = _tried_without(current, (number,), inquiry)
+    if without is None or stage is None:
+        return _without_rivals(current, number, one, inquiry)
+    tried = stage.refits
+    own = _own(without, one, tried, inquiry)
+    if not settled:
+        if not own.log_evidence > stage.screen.threshold:
+            return without
+        best = max(tried, key=lambda other: other.log_evidence, default=own)
+        needed = ANOTHER_FORM if best.name == one.form.name else inquiry.rules.margin
+        if best.form != one.form and best.log_evidence > own.log_evidence + needed:
+            return without.at(best.fit)
+    rivals = _rivals(own, tried, stage.screen)
+    two = _two_simpler(without, own, tried, inquiry)
+    if two is not None:
+        if two.lead > inquiry.rules.margin and not settled:
+            return two.grounds
+        for name in two.names:
+            rivals = _nearest(rivals, Rival(name, -two.lead))
+    over = _over_stiffness(without, own, inquiry)
+    alone = _alone(one, inquiry)
+    return Standing(one, own.log_evidence, alone, own.gain, rivals, over)
+
+
+def _alone(one: Supposed, inquiry: Inquiry) -> float:
+    """Evidence of its effect on the first screen, beside none."""
+    effects = inquiry.first.screen.effects
+    return next(e.log_evidence for e in effects if e.effect == one.form.name)
+
+
+def _without_rivals(current: Grounds, number: int, one: Supposed, inquiry: Inquiry) -> Standing:
+    """An effect without which the others have no fit: nothing could be tried in its place."""
+    trials = next(t for t in inquiry.rules.trials if t.effect == one.form.name)
+    gain, log_evidence = in_place(current.fit, number)
+    log_evidence += trials.log_share(one.form)
+    return Standing(one, log_evidence, _alone(one, inquiry), gain, (), None, rivals_known=False)
+
+
+def _tried_without(
+    current: Grounds, left_out: tuple[int, ...], inquiry: Inquiry
+) -> tuple[Grounds | None, Stage | None]:
+    """The grounds without some of the effects, and all effects tried there; None without a fit."""
+    supposed = standing(current.fit)
+    others = tuple(one for number, one in enumerate(supposed) if number not in left_out)
+    without = inquiry.beside(current, others)
+    if without is None:
+        return None, None
+    names = " and ".join(supposed[number].form.name for number in left_out)
+    return without, inquiry.stage(without, in_place_of=names)
+
+
+def _against_one(
+    current: Grounds,
+    pair: tuple[int, ...],
+    stood: Sequence[Standing],
+    inquiry: Inquiry,
+) -> tuple[Grounds | None, list[Standing]]:
+    """Two effects against each single one in their place: together two may imitate a third.
+
+    Returns the grounds with the single one if it has clearly more evidence than both together, and
+    the effects, that one among their rivals.
+    """
+    without, stage = _tried_without(current, pair, inquiry)
+    if without is None or stage is None:
+        known = [replace(o, rivals_known=False) if k in pair else o for k, o in enumerate(stood)]
+        return None, known
+    tried = stage.refits
+    first, second = (stood[number] for number in pair)
+    alone = _own(without, first.supposed, tried, inquiry)
+    both = second.log_evidence + max(alone.log_evidence, 0.0)
+    singles = [one for one in tried if one.name not in (first.name, second.name)]
+    best = max(singles, key=lambda one: one.log_evidence, default=None)
+    if best is None or not np.isfinite(best.log_evidence):
+        return None, list(stood)
+    clearly = best.log_evidence > both + inquiry.rules.margin
+    rival = Rival(best.name, both - best.log_evidence)
+    return without.at(best.fit) if clearly else None, [
+        replace(one, rivals=_nearest(one.rivals, rival)) if number in pair else one
+        for number, one in enumerate(stood)
+    ]
+
+
+@dataclass(frozen=True)
+class _Two:
+    """Two effects in the place of one, and the evidence by which they are ahead of it."""
+
+    grounds: Grounds
+    names: tuple[str, str]
+    lead: float
+
+
+def _two_simpler(
+    without: Grounds, own: Refit, tried: Sequence[Refit], inquiry: Inquiry
+) -> _Two | None:
+    """The best two effects in the place of one with more unknowns; None where none comes near.
+
+    An effect that is another at each place imitates sums of effects that are the same everywhere.
+    """
+    simpler = [
+        one
+        for one in tried
+        if one.name != own.name
+        and one.unknowns < own.unknowns
+        and one.log_evidence > IMITATED * own.log_evidence
+    ]
+    if not simpler:
+        return None
+    first = max(simpler, key=lambda one: one.log_evidence)
+    beside = without.at(first.fit)
+    stage = inquiry.stage(beside, in_place_of=f"{own.name}, beside {first.name}")
+    few = own.unknowns - first.unknowns
+    others = [one for one in stage.refits if one.name != own.name and one.unknowns <= few]
+    second = max(others, key=lambda one: one.log_evidence, default=None)
+    if second is None or not second.log_evidence > stage.screen.threshold:
+        return None
+    lead = first.log_evidence + second.log_evidence - own.log_evidence
+    if lead < -inquiry.rules.margin:
+        return None
+    return _Two(beside.at(second.fit), (first.name, second.name), lead)
+
+
+def _nearest(rivals: Sequence[Rival], further: Rival) -> tuple[Rival, ...]:
+    """Rivals with one more, each by its smallest margin; nearest first."""
+    margins = {other.name: other.margin for other in rivals}
+    margins[further.name] = min(further.margin, margins.get(further.name, np.inf))
+    ranked = sorted(margins.items(), key=lambda item: item[1])
+    return tuple(Rival(name, margin) for name, margin in ranked)
+
+
+def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], inquiry: Inquiry) -> Refit:
+    """The effect itself beside the others: as tried already, or refitted from where it stands."""
+    same = [other for other in tried if other.form == one.form]
+    return same[0] if same else inquiry.refit(without, one)
+
+
+def _over_stiffness(without: Grounds, own: Refit, inquiry: Inquiry) -> float | None:
+    """Evidence above that of plain stiffness, joint by joint and specimen by specimen.
+
+    Forms that differ between joints can imitate it by their many strengths.
+    """
+    many = own.form.spread in (Spread.BY_JOINT, Spread.EACH)
+    known = any(t.effect == LEVELS for t in inquiry.rules.trials)
+    coordinate = dict(own.form.variant.options).get("coordinate")
+    if not many or own.name == LEVELS or not known or coordinate not in COORDINATES:
+        return None
+    variant = Variant(LEVELS, (("coordinate", coordinate),))
+    start = variant.off(()) * np.exp(0.01)
+    plain = inquiry.refit(without, Supposed(Form(variant, Spread.EACH), start))
+    return own.log_evidence - plain.log_evidence if np.isfinite(plain.log_evidence) else None
+
+
+def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, ...]:
+    """Other effects by their evidence: of the best refit, else of the screen.
+
+    Effects whose every refit was impossible are none.
+    """
+    evidence = {one.effect: one.log_evidence for one in screen.effects}
+    refitted: dict[str, float] = {}
+    for other in tried:
+        refitted[other.name] = max(refitted.get(other.name, -np.inf), other.log_evidence)
+    evidence |= refitted
+    possible = [(n, v) for n, v in evidence.items() if n != own.name and np.isfinite(v)]
+    ranked = sorted(possible, key=lambda item: -item[1])
+    return tuple(Rival(name, own.log_evidence - value) for name, value in ranked)
