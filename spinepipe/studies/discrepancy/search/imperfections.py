@@ -1,0 +1,307 @@
+"""Imperfections: how large each nuisance is, most likely, and how much of chi2 it takes up.
+
+With U the readings' moves by one prior SD of each nuisance (noise SD), J those by what is fitted
+and r what the fit leaves, nuisances z ~ N(0, 1) and unknowns x (weak priors P) are jointly normal:
+at the fit z = (I + U'U)^-1 U'r. Without nuisances chi2 would be larger by z' L z to first order, L
+the precision of z with x free: each nuisance takes up ``z_i (L z)_i`` of it, and these add up.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from spinepipe.decomposition import eigh
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import bushing_stiffness
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
+from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
+from spinepipe.studies.discrepancy.search.refit import standing
+from spinepipe.studies.discrepancy.search.whitening import Whitening
+from spinepipe.studies.discrepancy.store import Run
+
+EVERYWHERE = "*"
+
+BY_CHANCE = 0.01
+"""How often a mean of random errors counts as no random one, over all means that are looked at."""
+
+FEWEST_IN_COMMON = 2
+LEAST_TOLD = 0.05
+"""Share of a nuisance's prior variance that readings must tell at least, or it has no say."""
+
+SHARED = tuple(KINDS.get(name, name) for name in ALIKE)
+"""Kinds that may be common to all joints anyhow."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which nuisance, and where; ``*`` stands for all. ``sd``: one prior SD in ``unit``, SI."""
+
+    specimen: str
+    kind: str
+    component: str
+    joint: str
+    test: str
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """A nuisance at its most likely value.
+
+    Attributes
+    ----------
+    size, sd : mean and SD of what the readings say of it, in prior SDs.
+    chi2 : what it takes up of chi2; may be negative where another takes up more for it.
+    """
+
+    at: Place
+    size: float
+    sd: float
+    chi2: float
+
+
+@dataclass(frozen=True)
+class InCommon:
+    """The mean of a nuisance over the places that ``at`` leaves open, were it free.
+
+    Attributes
+    ----------
+    size, sd : the mean and its standard error by the scatter of the places, in prior SDs.
+    count : nuisances in the mean. chance : how often random errors make as large a mean.
+    certain : whether that is too seldom, of all means that are looked at.
+    """
+
+    at: Place
+    size: float
+    sd: float
+    count: int
+    chance: float
+    certain: bool = False
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """What imperfections took up in one fit.
+
+    Attributes
+    ----------
+    without : the gap without any, all refitted; None where that has no fit. beside : with them.
+    each : all of them. common : means of several, those of most places first.
+    """
+
+    without: Gap | None
+    beside: Gap
+    each: tuple[Imperfection, ...]
+    common: tuple[InCommon, ...]
+
+    @property
+    def linear_chi2(self) -> float:
+        """By how much chi2 would be larger without them."""
+        return sum(one.chi2 for one in self.each)
+
+    @property
+    def by_kind(self) -> dict[str, float]:
+        """chi2 that each kind takes up, largest first."""
+        found: dict[str, float] = {}
+        for one in self.each:
+            found[one.at.kind] = found.get(one.at.kind, 0.0) + one.chi2
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    @property
+    def largest(self) -> tuple[Imperfection, ...]:
+        """Largest first, in prior SDs."""
+        return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
+
+
+def taken_up(grounds: Grounds, fit: JointFit, joints: Sequence[str], run: Run) -> TakenUp:
+    """What imperfections took up of what a fit would leave without them."""
+    places = _places(grounds, joints)
+    parts = _parts(grounds, fit)
+    posterior = _posterior(fit, parts)
+    return TakenUp(
+        run(gap_without, grounds, fit),
+        whole_gap(grounds, fit),
+        tuple(
+            Imperfection(place, float(size), float(sd), float(chi2))
+            for place, size, sd, chi2 in zip(
+                places, posterior.size, np.sqrt(posterior.variance), posterior.chi2, strict=True
+            )
+        ),
+        in_common(places, posterior.size, posterior.covariance),
+    )
+
+
+def gap_without(grounds: Grounds, fit: JointFit) -> Gap | None:
+    """The gap with everything that was fitted fitted again, and no nuisance; None without a fit."""
+    setting = Setting(grounds.readings, grounds.plain, grounds.noise.zeroed)
+    again = joint_fit(grounds.suppose(standing(fit)), setting, fit.poses)
+    if not again.usable:
+        return None
+    left = left_over(replace(grounds, setting=setting), again).values()
+    return gap_of([one.residual for one in left], [one.freedom for one in left])
+
+
+def labels_of(grounds: Grounds, specimen: str) -> tuple[Label, ...]:
+    """What the nuisances of a specimen's whitening are, in their order."""
+    stiffness = bushing_stiffness(grounds.fit.models[specimen])
+    tests = [case.test for case in grounds.readings[specimen].cases]
+    return nuisance_labels(grounds.priors, stiffness, tests)
+
+
+def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[Place, ...]:
+    return tuple(
+        Place(
+            specimen,
+            one.kind,
+            one.component,
+            EVERYWHERE if one.joint is None else joints[one.joint],
+            one.test,
+            one.sd,
+            one.unit,
+        )
+        for specimen in grounds.readings
+        for one in labels_of(grounds, specimen)
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A specimen: U (N, K), H = (I + U'U)^-1 (K, K), J (N, m) of all unknowns, r (N,)."""
+
+    moves: Array
+    inverse: Array
+    jacobian: Array
+    residual: Array
+
+
+def _parts(grounds: Grounds, fit: JointFit) -> list[_Part]:
+    found = []
+    for name, member in fit.hypothesis.members.items():
+        white = grounds.setting.whitenings[name]
+        own = white.lengthened(fit.jacobians[name])
+        whole = np.zeros((len(own), len(fit.x)))
+        np.add.at(whole.T, np.array(member.numbers), own.T)
+        residual = -white.lengthened(fit.residuals[name])  # measured less predicted
+        found.append(_Part(white.moves, _inverse(white), whole, residual))
+    return found
+
+
+def _inverse(white: Whitening) -> Array:
+    """(K, K) (I + U'U)^-1."""
+    shorter = (1.0 + white.shrink) ** 2 - 1.0
+    result: Array = np.eye(white.mixing.shape[1]) + (white.mixing.T * shorter) @ white.mixing
+    return result
+
+
+@dataclass(frozen=True)
+class _Posterior:
+    """Of the nuisances of all specimens: mean (K,), what each takes up (K,), covariance (K, K)."""
+
+    size: Array
+    chi2: Array
+    covariance: Array
+
+    @property
+    def variance(self) -> Array:
+        return np.maximum(np.diagonal(self.covariance), 0.0)
+
+
+def _posterior(fit: JointFit, parts: Sequence[_Part]) -> _Posterior:
+    """Of all nuisances, with the unknowns of the fit free."""
+    prior = np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
+    jacobians = [part.jacobian for part in parts]
+    size = [part.inverse @ (part.moves.T @ part.residual) for part in parts]
+    made = [part.moves @ z for part, z in zip(parts, size, strict=True)]
+    plain = prior + sum(j.T @ j for j in jacobians)
+    back = np.linalg.solve(plain, sum(j.T @ m for j, m in zip(jacobians, made, strict=True)))
+    left = [
+        z + part.moves.T @ (m - part.jacobian @ back)
+        for part, z, m in zip(parts, size, made, strict=True)
+    ]
+    # the unknowns' share: shifts of x move z by -H U'J
+    gains = np.concatenate([part.inverse @ (part.moves.T @ part.jacobian) for part in parts])
+    within = [part.jacobian.T @ part.moves for part in parts]
+    lost = sum(w @ part.inverse @ w.T for w, part in zip(within, parts, strict=True))
+    of_unknowns = np.linalg.inv(plain - lost)
+    covariance = block_diag(*(part.inverse for part in parts)) + gains @ of_unknowns @ gains.T
+    whole = np.concatenate(size)
+    return _Posterior(whole, whole * np.concatenate(left), covariance)
+
+
+def in_common(places: Sequence[Place], size: Array, covariance: Array) -> tuple[InCommon, ...]:
+    """Means over joints, specimens or both, those of the most places first.
+
+    A mean is certain where random errors would hardly make it, and no wider one says it already.
+
+    Parameters
+    ----------
+    size, covariance : (K,), (K, K) what the readings say of each place, in prior SDs.
+    """
+    found = [
+        (one, set(numbers.tolist()))
+        for at, numbers in _groups(places).items()
+        if (one := _mean(at, size[numbers], covariance[np.ix_(numbers, numbers)])) is not None
+    ]
+    found.sort(key=lambda pair: -pair[0].count)
+    said: list[set[int]] = []
+    ended = []
+    for one, numbers in found:
+        wider = any(numbers <= wide for wide in said)
+        certain = one.chance < BY_CHANCE / len(found) and not wider
+        if certain:
+            said.append(numbers)
+        ended.append(replace(one, certain=certain))
+    return tuple(ended)
+
+
+def _mean(at: Place, size: Array, covariance: Array) -> InCommon | None:
+    """The mean of nuisances; None where readings say too little.
+
+    Of random errors ``size`` is N(0, I - covariance): by their SDs as allowed for, and by their
+    own scatter whatever their SDs.
+    """
+    values, vectors = eigh(np.eye(len(size)) - covariance)
+    told = values > LEAST_TOLD
+    ones = vectors[:, told].sum(axis=0) * np.sqrt(values[told])
+    seen = vectors[:, told].T @ size / np.sqrt(values[told])
+    weight, free = float(ones @ ones), int(told.sum()) - 1
+    if weight < LEAST_TOLD * len(size) or free < 1:
+        return None
+    mean = float(ones @ seen) / weight
+    scatter = float(np.linalg.norm(seen - mean * ones)) / np.sqrt(free)
+    by_scatter = max(scatter, np.finfo(float).tiny) / np.sqrt(weight)
+    chances = norm.sf(abs(mean) * np.sqrt(weight)), student.sf(abs(mean) / by_scatter, free)
+    chance = min(1.0, 4.0 * float(min(chances)))  # two sides, two ways
+    return InCommon(at, mean, float(by_scatter), len(size), chance)
+
+
+def _groups(places: Sequence[Place]) -> Mapping[Place, Indices]:
+    """Numbers of the nuisances of one kind and component that could be off together."""
+    found: dict[Place, list[int]] = {}
+    for number, one in enumerate(places):
+        if one.kind in SHARED:
+            continue
+        wider = {
+            replace(one, specimen=EVERYWHERE, joint=EVERYWHERE, test=EVERYWHERE),
+            replace(one, specimen=EVERYWHERE),
+            replace(one, joint=EVERYWHERE, test=EVERYWHERE),
+        }
+        for at in sorted(wider - {one}, key=str):
+            found.setdefault(at, []).append(number)
+    return {
+        at: np.array(numbers)
+        for at, numbers in found.items()
+        if len(numbers) >= FEWEST_IN_COMMON and not _repeated(at, numbers, found)
+    }
+
+
+def _repeated(at: Place, numbers: list[int], found: Mapping[Place, list[int]]) -> bool:
+    """Whether the same nuisances are another group already, as with one specimen or one joint."""
+    return next(other for other, same in found.items() if same == numbers) != at
