@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cholesky, solve, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
@@ -129,7 +129,7 @@ class _Normal:
 
     def nuisances(self, x: Array) -> Array:
         """(k,) most likely values beside unknowns x (m,)."""
-        found: Array = solve(self.inner, self.drive - self.outer @ x, assume_a="pos")
+        found: Array = _solved_alike(self.inner, self.drive - self.outer @ x)
         return found
 
 
@@ -161,7 +161,7 @@ class LinearFolds:
         precision = np.diag(self.model.sd**-2.0)
         for name, one in members.items():
             np.add.at(precision, np.ix_(one.numbers, one.numbers), self._normal(name, part).held)
-        covariance: Array = solve(precision, np.eye(count), assume_a="pos")
+        covariance: Array = _solved_alike(precision, np.eye(count))
         found = {}
         for name in part.scored:
             own = covariance[np.ix_(members[name].numbers, members[name].numbers)]
@@ -173,7 +173,7 @@ class LinearFolds:
         found = {}
         for name in part.scored:
             inner = self._normal(name, part).inner
-            found[name] = solve(inner, np.eye(len(inner)), assume_a="pos")
+            found[name] = _solved_alike(inner, np.eye(len(inner)))
         return found
 
     def _fitted(self, part: Part, normals: Mapping[str, _Normal]) -> Array:
@@ -208,7 +208,7 @@ class LinearFolds:
         x, z = slice(0, m), slice(m, m + k)
         inner = np.eye(k) + gram[z, z]
         outer, drive = gram[z, x], gram[z, -1]
-        gain = solve(inner, outer, assume_a="pos").T
+        gain = _solved_alike(inner, outer).T
         matrix = gram[x, x] - gain @ outer
         return _Normal(gram[x, x], matrix, gram[x, -1] - gain @ drive, inner, outer, drive)
 
@@ -223,6 +223,15 @@ class LinearFolds:
             whole = white.noise_only([np.concatenate(rows, axis=-1)])
             self._grams[key] = whole.T @ whole
         return self._grams[key]
+
+
+def _solved_alike(matrix: Array, right: Array) -> Array:
+    """``matrix^-1 right`` of a positive matrix whose unknowns have units and sizes of their own."""
+    scale = 1.0 / np.sqrt(np.diagonal(matrix))
+    lower = cholesky(matrix * np.outer(scale, scale), lower=True)
+    scaled = (scale * right.T).T
+    found: Array = (scale * cho_solve((lower, True), scaled).T).T
+    return found
 
 
 def own_unknowns(numbers: Mapping[str, Indices], specimen: str) -> Indices:
