@@ -151,8 +151,8 @@ def gap_without(grounds: Grounds, fit: JointFit) -> Gap | None:
 def labels_of(grounds: Grounds, specimen: str) -> tuple[Label, ...]:
     """What the nuisances of a specimen's whitening are, in their order."""
     stiffness = bushing_stiffness(grounds.fit.models[specimen])
-    tests = [case.test for case in grounds.readings[specimen].cases]
-    return nuisance_labels(grounds.priors, stiffness, tests)
+    one = grounds.readings[specimen]
+    return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
 
 
 def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[Place, ...]:
