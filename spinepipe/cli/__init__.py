@@ -1,4 +1,4 @@
-"""The command line: `spinepipe check`, `show`, `doctor`, `export` and `docs`."""
+"""The command line: `spinepipe import`, `check`, `show`, `doctor`, `export` and `docs`."""
 
 from spinepipe.cli.program import main
 

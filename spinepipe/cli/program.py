@@ -8,9 +8,11 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 
 COMMANDS = {
+    "import": "make a cohort of a testing machine's files",
     "check": "say everything that is wrong with studies and cohorts",
     "show": "print a specimen and draw it",
     "doctor": "test whether this computer can run the studies",
@@ -48,7 +50,7 @@ def _add_root(parser: argparse.ArgumentParser, default: Path) -> None:
 
 def _run(command: str, rest: Sequence[str], root: Path) -> int:
     try:
-        module = import_module(f"spinepipe.cli.{command}")
+        module = import_module(f"spinepipe.cli.{command}{'_' if iskeyword(command) else ''}")
     except ImportError as error:
         return _fail(command, f"{error}; `spinepipe doctor` says what is missing")
     parser = argparse.ArgumentParser(f"spinepipe {command}", description=COMMANDS[command])

@@ -28,7 +28,7 @@ ROOMS = (
         "anatomy",
     ),
     *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
-    *("designs", "statistics", "sensitivity", "cohort", "tables", "comparison"),
+    *("designs", "statistics", "sensitivity", "cohort", "testing_machine", "tables", "comparison"),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it.

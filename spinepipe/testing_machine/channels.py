@@ -1,0 +1,89 @@
+"""What a column of a testing machine means: its unit, and the direction in which it is positive.
+
+Directions are told in the field's words. A moment or rotation towards flexion is a negative one
+about z, a force or translation to posterior a negative one along x: the axes of the cohort folder.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+
+LOAD_COLUMNS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
+"""Columns of ``loads.csv`` that a channel can fill."""
+
+LoadUnit = Literal["N", "kN", "N m", "N mm", "N cm", "Nm", "Nmm", "Ncm"]
+MotionUnit = Literal["deg", "rad", "mm", "um", "m"]
+TimeUnit = Literal["s", "ms", "min"]
+
+Turn = Literal[
+    "flexion", "extension", "right_bending", "left_bending", "right_rotation", "left_rotation"
+]
+Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left"]
+
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+
+FORCES: Mapping[str, float] = {"N": 1.0, "kN": 1e3}
+MOMENTS: Mapping[str, float] = {
+    **{"N m": 1.0, "N mm": 1e-3, "N cm": 1e-2},
+    **{"Nm": 1.0, "Nmm": 1e-3, "Ncm": 1e-2},
+}
+ANGLES: Mapping[str, float] = {"deg": 1.0, "rad": 57.29577951308232}
+LENGTHS: Mapping[str, float] = {"mm": 1.0, "um": 1e-3, "m": 1e3}
+"""Units by name: what one of them is in the unit of the cohort's columns (N, N m, deg, mm)."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction by its word.
+
+    Attributes
+    ----------
+    load, coordinate : column of ``loads.csv`` and joint coordinate along which it lies.
+    sign : 1 where it is the positive direction of these, else -1.
+    turns : whether it is one of a moment and a rotation, not of a force and a translation.
+    """
+
+    load: str
+    coordinate: str
+    sign: int
+    turns: bool
+
+
+DIRECTIONS: Mapping[str, Direction] = {
+    "anterior": Direction("fx_n", "anterior", 1, False),
+    "posterior": Direction("fx_n", "anterior", -1, False),
+    "superior": Direction("fy_n", "superior", 1, False),
+    "inferior": Direction("fy_n", "superior", -1, False),
+    "right": Direction("fz_n", "right", 1, False),
+    "left": Direction("fz_n", "right", -1, False),
+    "extension": Direction("mz_nm", "extension", 1, True),
+    "flexion": Direction("mz_nm", "extension", -1, True),
+    "right_bending": Direction("mx_nm", "right_bending", 1, True),
+    "left_bending": Direction("mx_nm", "right_bending", -1, True),
+    "left_rotation": Direction("my_nm", "left_rotation", 1, True),
+    "right_rotation": Direction("my_nm", "left_rotation", -1, True),
+}
+"""Every direction by the word for it."""
+
+
+def column_of(coordinate: str) -> str:
+    """Column of ``motion.csv`` of a joint coordinate."""
+    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
+
+
+def load_factor(unit: str, positive: str) -> float:
+    """What a reading of a load channel is multiplied with to be in N or N m along ground axes."""
+    return DIRECTIONS[positive].sign * {**FORCES, **MOMENTS}[unit]
+
+
+def motion_factor(unit: str, positive: str) -> float:
+    """What a reading of a motion channel is multiplied with to be in deg or mm as columns say."""
+    return DIRECTIONS[positive].sign * {**ANGLES, **LENGTHS}[unit]
+
+
+def words_that_fit(unit: str) -> tuple[str, ...]:
+    """Directions that something in this unit can have."""
+    turns = unit in MOMENTS or unit in ANGLES
+    return tuple(word for word, direction in DIRECTIONS.items() if direction.turns == turns)

@@ -1,0 +1,251 @@
+"""Make a cohort folder of a testing machine's files, and say in plain sentences what was done."""
+
+import csv
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from spinepipe.cohort.cohort import joint_names
+from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.text import read_yaml, validate
+from spinepipe.problems import InputError, Problem
+from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.recording import Recording, read_recording
+from spinepipe.testing_machine.settings import MachineMapping, check_mapping
+from spinepipe.testing_machine.thinned import Sureness, ThinnedTest, sureness, thinned_test
+from spinepipe.units import COORDINATE_COLUMNS
+
+BY_HAND = ("joints.csv", "specimens.csv")
+"""Files that are made to be edited: they stay when a folder is made again."""
+
+LEVEL_APART_MM = 35.0
+NOT_READ = {"deg": 0.1, "mm": 0.1}
+"""SD that stands for a kind of reading that there is none of: the form asks for one."""
+
+_POINT = ("px_mm", "py_mm", "pz_mm")
+_FRAME = ("x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg", "left_rotation_deg")
+
+Rows = list[Sequence[object]]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A cohort that is read and not yet written."""
+
+    mapping: MachineMapping
+    tests: tuple[ThinnedTest, ...]
+    rotation: Sureness | None
+    translation: Sureness | None
+
+
+def read(path: Path) -> Imported:
+    """Read the YAML and all files that it names.
+
+    Raises
+    ------
+    InputError
+        With every problem of the YAML, else of all files, else of all tests.
+    """
+    mapping = _mapping(path)
+    problems: list[Problem] = []
+    recordings: dict[tuple[str, str], list[Recording]] = {}
+    for of in mapping.files:
+        recording, faults = read_recording(path.parent / of.file, of, mapping)
+        problems += faults
+        if recording is not None:
+            recordings.setdefault((of.specimen, of.test), []).append(recording)
+    tests = []
+    for group in recordings.values():
+        test, faults = thinned_test(group, mapping.steps, mapping.zeroed)
+        problems += faults
+        if test is not None:
+            tests.append(test)
+    if problems:
+        raise InputError(problems)
+    sures = [sureness(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
+    return Imported(mapping, tuple(tests), *sures)
+
+
+def _mapping(path: Path) -> MachineMapping:
+    if not path.is_file():
+        allowed = "the YAML that says what the columns are"
+        raise InputError(
+            [Problem(str(path), None, None, "no such file", allowed, "check the name")]
+        )
+    document, problems = read_yaml(path, path.name)
+    if document is None:
+        raise InputError(problems)
+    mapping, faults = validate(MachineMapping, document)
+    problems += faults
+    if mapping is not None:
+        problems += check_mapping(document, mapping)
+    if problems or mapping is None:
+        raise InputError(problems)
+    return mapping
+
+
+def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
+    """Write the cohort folder, and return the names of files that were there and stayed.
+
+    Parameters
+    ----------
+    replace : whether a folder that is there may be written again; what is edited by hand stays.
+
+    Raises
+    ------
+    InputError
+        When the folder is there and must not be touched.
+    """
+    if folder.exists() and not replace:
+        remedy = "choose another `cohort:` in the YAML, or add --replace"
+        found = "a folder of this name"
+        raise InputError([Problem(str(folder), None, None, found, "a new folder", remedy)])
+    texts = {
+        COHORT_YAML: _header(imported),
+        "specimens.csv": _table([("specimen",), *((name,) for name in _specimens(imported))]),
+        "joints.csv": _table(_joints(imported)),
+        "loads.csv": _table(_loads(imported)),
+        "motion.csv": _table(_motion(imported)),
+    }
+    stay = [name for name in BY_HAND if (folder / name).exists()]
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}")
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir()
+    try:
+        for name, text in texts.items():
+            if name not in stay:
+                (temporary / name).write_text(text, encoding="utf-8")
+        if folder.exists():
+            for path in temporary.iterdir():
+                os.replace(path, folder / path.name)
+        else:
+            temporary.rename(folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return stay
+
+
+def _header(imported: Imported) -> str:
+    mapping = imported.mapping
+    files = ", ".join(dict.fromkeys(of.file for of in mapping.files))
+    end = "" if mapping.source.rstrip().endswith(".") else "."
+    source = (
+        f"{mapping.source.rstrip()}{end} Made by `spinepipe import` of {files}: cycles cut at "
+        f"reversals of the load, {_thinning(imported)} "
+        f"measurement_sd: {sd_sentence(imported)}"
+    )
+    document = {
+        "cohort": mapping.cohort,
+        "title": mapping.title,
+        "source": source,
+        "vertebrae": list(mapping.vertebrae),
+        "gravity": False,
+        "zeroed_at_step_0": mapping.zeroed,
+        "measurement_sd": {
+            "rotation_deg": _declared(imported.rotation, "deg"),
+            "translation_mm": _declared(imported.translation, "mm"),
+        },
+    }
+    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
+
+
+def _thinning(imported: Imported) -> str:
+    rows = np.concatenate([cycle.rows for test in imported.tests for cycle in test.cycles])
+    return (
+        "each reading by local regression on the load over "
+        f"{int(np.median(rows))} rows (median), loading and unloading apart."
+    )
+
+
+def _declared(sure: Sureness | None, unit: str) -> float:
+    """The SD with two digits, rounded up."""
+    if sure is None or sure.sd == 0.0:
+        return NOT_READ[unit]
+    scale = 10.0 ** (1 - int(np.floor(np.log10(sure.sd))))
+    return float(f"{np.ceil(sure.sd * scale - 1e-9) / scale:.10g}")
+
+
+def sd_sentence(imported: Imported) -> str:
+    """Where the declared SDs come from."""
+    words = []
+    for sure, unit in ((imported.rotation, "deg"), (imported.translation, "mm")):
+        if sure is None:
+            words.append(f"no motion in {unit} was read, {NOT_READ[unit]} stands for it.")
+        elif sure.sd == 0.0:
+            words.append(f"readings in {unit} never change, {NOT_READ[unit]} stands for their SD.")
+        else:
+            between = (
+                "no cycle is repeated"
+                if np.isnan(sure.cycles)
+                else f"{sure.cycles:.2g} {unit} between cycles"
+            )
+            words.append(
+                f"{_declared(sure, unit):g} {unit}, the largest of {sure.regression:.2g} {unit} by "
+                f"what rows leave around the regression ({sure.row:.2g} for a single row), "
+                f"{between}, and {sure.finest:.2g} by the resolution of the files."
+            )
+    return " ".join(words)
+
+
+def _specimens(imported: Imported) -> list[str]:
+    return list(dict.fromkeys(test.specimen for test in imported.tests))
+
+
+def _joints(imported: Imported) -> Rows:
+    """A template: joints above each other, axes of ground."""
+    joints = joint_names(imported.mapping.vertebrae)
+    rows: Rows = [("specimen", "joint", *_FRAME)]
+    for specimen in _specimens(imported):
+        for number, joint in enumerate(joints):
+            rows.append((specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0))
+    return rows
+
+
+def _loads(imported: Imported) -> Rows:
+    point = imported.mapping.load_point_mm or ("", "", "")
+    vertebra = imported.mapping.loaded_vertebra
+    rows: Rows = [
+        ("specimen", "test", "cycle", "step", "vertebra", *LOAD_COLUMNS, *_POINT, "time_s")
+    ]
+    for test in imported.tests:
+        for number, cycle in enumerate(test.cycles, start=1):
+            for step, loads in enumerate(cycle.loads):
+                time = "" if cycle.time is None else _number(cycle.time[step])
+                values = [_number(value) for value in loads]
+                key = (test.specimen, test.test, number, step, vertebra)
+                rows.append((*key, *values, *point, time))
+    return rows
+
+
+def _motion(imported: Imported) -> Rows:
+    joints = joint_names(imported.mapping.vertebrae)
+    rows: Rows = [("specimen", "test", "cycle", "step", "joint", *COORDINATE_COLUMNS)]
+    for test in imported.tests:
+        at = {place: number for number, place in enumerate(test.places)}
+        for number, cycle in enumerate(test.cycles, start=1):
+            for step, values in enumerate(cycle.motion):
+                for joint in joints:
+                    cells = [
+                        _number(values[at[joint, name]]) if (joint, name) in at else ""
+                        for name in COORDINATE_COLUMNS
+                    ]
+                    rows.append((test.specimen, test.test, number, step, joint, *cells))
+    return rows
+
+
+def _number(value: float) -> str:
+    """Six decimals at most, no minus before zero."""
+    return f"{round(float(value), 6) + 0.0:.10g}"
+
+
+def _table(rows: Iterable[Sequence[object]]) -> str:
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
