@@ -54,7 +54,7 @@ def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Ex
     supposed = standing(current.fit)
     for number, one in enumerate(supposed):
         found = _one(current, number, one, inquiry, settled)
-        if isinstance(found, Grounds):
+        if not isinstance(found, Standing):
             return Examined(found, None)
         stood.append(found)
     for pair in combinations(range(len(supposed)), 2):
