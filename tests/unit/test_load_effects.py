@@ -32,6 +32,8 @@ EFFECTS = {
     "follower load": ("follower_load", {}, (80.0,)),
     "follower load beside": ("follower_load", {"guides": "centres"}, (80.0,)),
     "misalignment": ("load_misalignment", {}, (0.06, -0.04)),
+    "frame askew": ("load_misalignment", {"turns": "wrench"}, (0.06, -0.04, 0.05)),
+    "forces askew": ("load_misalignment", {"turns": "forces"}, (0.06, -0.04, 0.05)),
     "gain": ("load_gain", {}, (0.05,)),
     "offset": ("load_offset", {}, (0.3, -0.2, 0.4)),
 }
@@ -257,6 +259,25 @@ def test_forces_are_not_misaligned() -> None:
         assert not response.load.any()
         assert not response.tangent.any()
         assert not here.effect.by_parameter(*call).any()
+
+
+@pytest.mark.parametrize("name", ["frame askew", "forces askew"])
+def test_a_loading_frame_askew_turns_forces_about_their_points(name: str) -> None:
+    """Rx Ry Rz by another library; what turns the moments too is the whole frame."""
+    turned = Rotation.from_euler("XYZ", EFFECTS[name][2]).as_matrix()
+
+    def askew(wrenches):
+        for w in wrenches:
+            moment = turned @ w.moment if name == "frame askew" else w.moment
+            yield replace(w, force=turned @ w.force, moment=moment)
+
+    case = with_wrenches(loaded(spine(3)), askew)
+    assert_same_motion(name, instead=system_with(case=case))
+
+
+def test_what_turns_is_known() -> None:
+    with pytest.raises(ValueError, match="turns 'all'; allowed: moments, wrench, forces"):
+        create("load_misalignment", {"turns": "all"})
 
 
 def test_gain_is_a_larger_load() -> None:

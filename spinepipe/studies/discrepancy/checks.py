@@ -77,10 +77,6 @@ def _coordinates(document: Document, study: Discrepancy, cohort: Cohort) -> Iter
             place = at(document, f"coordinates.{index}")
             found = f"'{name}', which was not measured in the chosen tests"
             yield Problem(*place, found, one_of(known), "delete it, or add its column to motion")
-    if known and not set(study.coordinates or known) & set(ROTATIONS):
-        found = f"no rotation, only {', '.join(study.coordinates or known)}"
-        remedy = "add a rotation: effects are told by how joints turn"
-        yield Problem(*at(document, "coordinates"), found, f"one of {one_of(ROTATIONS)}", remedy)
 
 
 def _noise(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:

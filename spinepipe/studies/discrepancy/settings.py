@@ -72,13 +72,16 @@ class Nuisance(BaseModel):
     registration_deg: float = Field(
         default=1.0, ge=0, le=45, description="frame in which motion is reported, deg"
     )
-    load_axis_deg: float = Field(default=1.0, ge=0, le=45, description="axis of the load, deg")
+    load_axis_deg: float = Field(
+        default=1.0, ge=0, le=45, description="direction of moments, and that of forces, deg"
+    )
     load_gain: float = Field(default=0.02, ge=0, le=1, description="size of the load, as a share")
     off_diagonal: float = Field(
         default=0.02,
         ge=0,
         le=1,
-        description="stiffness between two rotations, as a share of the geometric mean of theirs",
+        description="stiffness between two coordinates that are read, as a share of the geometric "
+        "mean of theirs",
     )
     rotation_order: float = Field(
         default=0.5,

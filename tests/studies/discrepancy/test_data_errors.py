@@ -13,7 +13,12 @@ from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import base_model, base_parameters
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    base_model,
+    base_parameters,
+    trials,
+)
+from spinepipe.studies.discrepancy.search.inquiry import look
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
@@ -250,6 +255,17 @@ def test_loose_markers_are_found_without_repeats() -> None:
 # Exchanged specimens -------------------------------------------------------------------------
 
 
+def grounds_of_folder(place: Path) -> Grounds:
+    cohort = read(place)
+    given = [
+        specimen_readings(cohort, name, cohort.tests, ROTATIONS) for name in cohort.specimen_names
+    ]
+    stiffness = np.array([1.5e5, 1.9e6, 1.35e5, *chains.STIFFNESS])
+    models = {one.specimen: base_model(cohort, one, stiffness, None) for one in given}
+    base = {name: base_parameters(m, "per_specimen", ROTATIONS) for name, m in models.items()}
+    return laid(given, noise(), NuisancePriors(), Start(models, base, 100.0), at_once)
+
+
 def test_an_exchange_that_stiffness_can_hide_is_not_reported() -> None:
     """Upright chains in the same moments: the motion of a is as good for b."""
     a, b, c = readings(2)
@@ -265,13 +281,23 @@ def test_specimens_of_their_own_shape_are_known_again(tmp_path: Path, exchanged:
 
     mistakes = {"swapped_specimens": {"specimens": [0, 1]}} if exchanged else {}
     make(Recipe(seed=8, errors=mistakes), tmp_path)
-    cohort = read(tmp_path)
-    given = [
-        specimen_readings(cohort, name, cohort.tests, ROTATIONS) for name in cohort.specimen_names
-    ]
-    stiffness = np.array([1.5e5, 1.9e6, 1.35e5, *chains.STIFFNESS])
-    models = {one.specimen: base_model(cohort, one, stiffness, None) for one in given}
-    base = {name: base_parameters(m, "per_specimen", ROTATIONS) for name, m in models.items()}
-    there = laid(given, noise(), NuisancePriors(), Start(models, base, 100.0), at_once)
+    there = grounds_of_folder(tmp_path)
+    given = list(there.readings.values())
     found = suspected_errors(there, given, at_once)
+    assert [(e.where, e.what) for e in found] == [("s01 and s02", "motion exchanged")] * exchanged
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_an_exchange_is_told_beside_a_real_effect(tmp_path: Path, exchanged: bool) -> None:
+    """Joints that stiffen hide it from chi2 alone, and marker bias of each joint imitates it."""
+    pytest.importorskip("opensim")
+    from tests.generators.hidden import Hidden, Recipe, make
+
+    mistakes = {"swapped_specimens": {"specimens": [0, 1]}} if exchanged else {}
+    hidden = Hidden("nonlinear_stiffening", "extension", shape={"shape": "tangent"})
+    make(Recipe(seed=20501, errors=mistakes, hidden=(hidden,)), tmp_path)
+    there = grounds_of_folder(tmp_path)
+    tried = trials(("nonlinear_stiffening", "marker_bias"), ROTATIONS, list(there.readings), 6)
+    assert look(there, tried, 0, 0.5, 0, 5.0).effects[0].log_evidence > 100.0
+    found = suspected_errors(there, list(there.readings.values()), at_once, tried)
     assert [(e.where, e.what) for e in found] == [("s01 and s02", "motion exchanged")] * exchanged

@@ -162,6 +162,16 @@ def test_zeros_of_zeroing_are_no_readings(tmp_path: Path) -> None:
     assert problem.found == "test 'flexion', which has no motion"
 
 
+def test_translations_alone_are_enough(tmp_path: Path) -> None:
+    """Shear: force and displacement of one joint, and nobody read how it turned."""
+    made = Chains({"a": A, "b": A})
+    for degrees in DEGREES:
+        made.motion[degrees] = np.nan
+    made.motion["anterior_mm"] = 0.5
+    write(made, tmp_path)
+    assert complaints(tmp_path) == []
+
+
 def test_noise_must_be_known_from_somewhere(tmp_path: Path) -> None:
     written(tmp_path, sd=False)
     (problem,) = complaints(tmp_path)

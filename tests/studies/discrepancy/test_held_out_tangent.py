@@ -42,7 +42,7 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
     # linearised at the fit before nuisances were allowed for: 1e-4 away
     cases = readings[0].cases
     solved = Solved(base.fit.models["a"], cases, False)
-    moved_by = nuisance_signatures(solved, priors, [case.test for case in cases])
+    moved_by = nuisance_signatures(solved, priors)
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])
     assert columns @ columns.T == pytest.approx(given @ given.T, rel=1e-3, abs=(1e-2 * SD) ** 2)
 

@@ -109,8 +109,7 @@ def laid(
 def _nuisances(
     model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
 ) -> tuple[Array, ...]:
-    tests = [case.test for case in one.cases]
-    return nuisance_signatures(Solved(model, one.cases, zeroed), priors, tests)
+    return nuisance_signatures(Solved(model, one.cases, zeroed), priors, one.coordinates)
 
 
 def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:

@@ -106,7 +106,7 @@ def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> 
     found = search(grounds, rules, run, progress)
     for fit in (found.base.fit, found.final.fit):
         run(on_record, fit, grounds.readings)
-    errors = suspected_errors(grounds, ready.measured, run)
+    errors = suspected_errors(grounds, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     ended = outcome(found, study.margin, proof, errors)

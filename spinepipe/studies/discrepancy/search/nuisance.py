@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.search.hypothesis import Variant, bushing_stiffness
 from spinepipe.studies.discrepancy.search.prediction import Solved
 from spinepipe.studies.discrepancy.search.projected import (
@@ -26,8 +27,9 @@ class NuisancePriors:
     """One prior SD of each imperfection, SI; zero leaves it out.
 
     ``posture`` tilts laws and reported frames of a joint together, as a neutral pose that was told
-    wrongly does; ``law_axes`` and ``registration`` tilt them apart. ``off_diagonal`` : share of the
-    (geometric) mean of the two stiffnesses that it couples.
+    wrongly does; ``law_axes`` and ``registration`` tilt them apart. ``load_axis`` turns moments,
+    and forces apart from them. ``off_diagonal`` : share of the (geometric) mean of the two
+    stiffnesses that it couples.
     """
 
     joint_centre: float = 2e-3
@@ -44,21 +46,31 @@ POSTURE = (Variant("axes_tilt", ()), Variant("marker_bias", (("form", "tilt"),))
 """What a wrongly told neutral pose tilts by the same angles."""
 
 
+TURNED_MOMENTS = Variant("load_misalignment", (("turns", "moments"),))
+TURNED_FORCES = Variant("load_misalignment", (("turns", "forces"),))
+"""Two, as a preload is seldom applied by what applies the moments."""
+
+
 def nuisance_columns(
-    priors: NuisancePriors, stiffness: Array, tests: Sequence[str]
+    priors: NuisancePriors,
+    stiffness: Array,
+    cases: Sequence[LoadCase],
+    coordinates: Sequence[str] = ROTATIONS,
 ) -> list[Column]:
     """The nuisances of a specimen as columns, each scaled to its prior SD.
 
     Parameters
     ----------
-    stiffness : (J, 6) of the base, SI.
+    stiffness : (J, 6) of the base, SI. coordinates : those that are read.
     """
-    every, each_test = (EVERY_TEST,), tuple(dict.fromkeys(tests))
+    every, each_test = (EVERY_TEST,), tuple(dict.fromkeys(case.test for case in cases))
+    pushed = tuple(dict.fromkeys(case.test for case in cases if _has_forces(case)))
     blocks = [
         (Variant("joint_centre_offset", ()), priors.joint_centre, every),
         (Variant("axes_tilt", ()), priors.law_axes, every),
         (Variant("marker_bias", (("form", "tilt"),)), priors.registration, every),
-        (Variant("load_misalignment", ()), priors.load_axis, each_test),
+        (TURNED_MOMENTS, priors.load_axis, each_test),
+        (TURNED_FORCES, priors.load_axis, pushed),
         (Variant("load_gain", ()), priors.load_gain, each_test),
         (Variant("rotation_order", ()), priors.rotation_order, every),
     ]
@@ -67,11 +79,15 @@ def nuisance_columns(
         for variant, sd, places in blocks
         for column in _columns(variant, np.full(len(stiffness), sd), places)
     ]
-    for pair in combinations(ROTATIONS, 2):
+    for pair in combinations([name for name in COORDINATES if name in coordinates], 2):
         coupled = stiffness[:, [COORDINATES.index(name) for name in pair]]
         sds = priors.off_diagonal * np.sqrt(np.prod(coupled, axis=1))
         found += _columns(Variant("bending_rotation_coupling", (("pair", pair),)), sds, every)
     return found
+
+
+def _has_forces(case: LoadCase) -> bool:
+    return any(wrench.force.any() for step in case.steps for wrench in step.wrenches)
 
 
 def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Column]:
@@ -137,15 +153,18 @@ class Label:
 
 
 def nuisance_labels(
-    priors: NuisancePriors, stiffness: Array, tests: Sequence[str]
+    priors: NuisancePriors,
+    stiffness: Array,
+    cases: Sequence[LoadCase],
+    coordinates: Sequence[str] = ROTATIONS,
 ) -> tuple[Label, ...]:
     """What each column of `nuisance_signatures` is, in its order.
 
     Parameters
     ----------
-    stiffness : (J, 6) of the base, SI.
+    stiffness : (J, 6) of the base, SI. coordinates : those that are read.
     """
-    columns = nuisance_columns(priors, stiffness, tests)
+    columns = nuisance_columns(priors, stiffness, cases, coordinates)
     shared = [
         next(c for c in columns if (c.variant, c.strength) == one) for one in _shared(columns)
     ]
@@ -161,6 +180,8 @@ def nuisance_labels(
 def _label(one: Column, joint: int | None, priors: NuisancePriors) -> Label:
     parameter = one.variant.create().parameters[one.strength]
     kind = KINDS.get(one.variant.effect, one.variant.effect)
+    if one.variant == TURNED_FORCES:
+        return Label(kind, f"{parameter.name} of forces", joint, one.test, one.scale, "rad")
     pair = dict(one.variant.options).get("pair")
     if kind == OFF_DIAGONAL:  # its SD is a share of what it couples
         component = " x ".join(pair) if pair else parameter.name
@@ -169,14 +190,18 @@ def _label(one: Column, joint: int | None, priors: NuisancePriors) -> Label:
 
 
 def nuisance_signatures(
-    solved: Solved, priors: NuisancePriors, tests: Sequence[str]
+    solved: Solved, priors: NuisancePriors, coordinates: Sequence[str] = ROTATIONS
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance.
 
     Rotation order and off-diagonals differ between joints, and again all together by as much.
+
+    Parameters
+    ----------
+    coordinates : those that are read.
     """
     stiffness = bushing_stiffness(solved.model)
-    columns = nuisance_columns(priors, stiffness, tests)
+    columns = nuisance_columns(priors, stiffness, solved.cases, coordinates)
     posture = np.full(len(stiffness), priors.posture)
     tilts = [_columns(variant, posture, (EVERY_TEST,)) for variant in POSTURE]
     single, *together = signatures_of_each(solved, [columns, *tilts])

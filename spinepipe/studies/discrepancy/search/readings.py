@@ -58,6 +58,12 @@ class SpecimenReadings:
         return tuple(test.case for test in self.tests)
 
     @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Those with a reading in some test."""
+        read = np.any([test.count.any(axis=(0, 1)) for test in self.tests], axis=0)
+        return tuple(name for name, is_read in zip(COORDINATES, read, strict=True) if is_read)
+
+    @property
     def applied(self) -> tuple[Array, ...]:
         """(T, J, 6) N and N m of each test: what its loads do at each joint, weight not counted."""
         return tuple(applied_loads(self.frames, case) for case in self.cases)
