@@ -1,6 +1,7 @@
 """Tabulated law: load over a motion of the joint, as a table says, for what has no formula."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -11,8 +12,8 @@ from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import ramp
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
-KNOTS = np.array([-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])
-"""Shares of the reach at which a load is given; at zero it is zero."""
+KNOTS = np.array([-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0])
+"""Shares of the reach between which the load goes straight; at zero it is zero."""
 
 ITSELF = "itself"
 """The table is over the coordinate that it loads."""
@@ -23,9 +24,12 @@ ROUNDED = 0.05
 FURTHEST = 10.0
 """Times the usual reach at most."""
 
-# A lumbar joint: 50 N m/rad over 6 deg, 100 N/mm over 1 mm.
-_REACH_RAD, _REACH_M = 0.1, 1e-3
-_STIFFNESS, _STIFFNESS_N_PER_M = 50.0, 1e5
+SIZE = 0.2
+"""Prior size of a stretch, as a share of a usual stiffness."""
+
+# A lumbar joint: 5 N m and 100 N where it has moved 6 deg and 1 mm.
+_REACH_RAD, _LOAD_NM = 0.1, 5.0
+_REACH_M, _LOAD_N = 1e-3, 100.0
 
 
 @register("tabulated_law")
@@ -33,12 +37,12 @@ _STIFFNESS, _STIFFNESS_N_PER_M = 50.0, 1e5
 class TabulatedLaw:
     """Adds a load on one coordinate that is a table over it, or over another coordinate.
 
-    The table has straight pieces between zero, where the load is zero, and eight knots at quarters
-    of the reach to both sides; it goes on straight beyond. The reach is in rad or m, 0 stands for
-    0.1 rad or 1 mm. Corners are rounded over 5 % of the reach to each side, so that at a knot the
-    load is off by 1.25 % of the reach times the change of slope there. The load rises wherever the
-    values rise. It is linear in the values; all zero is off. A table over another coordinate has no
-    potential.
+    The table goes straight between knots at quarters of the reach to both sides; it is zero at zero
+    and goes on straight beyond. Its values are the stiffness of the eight stretches, so that the
+    load at a knot is the sum of stiffness times length of the stretches up to it, and it rises
+    where they are positive. The reach is in rad or m, 0 stands for 0.1 rad or 1 mm. Corners are
+    rounded over 5 % of the reach to each side: at a knot the load is off by 1.25 % of the reach
+    times the change of stiffness. All zero is off. Over another coordinate it has no potential.
     """
 
     coordinate: str = "extension"
@@ -75,67 +79,62 @@ class TabulatedLaw:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The load at each knot."""
-        shift = self.coordinate in TRANSLATIONS
-        unit, most = ("N", 1e6) if shift else ("N m", 1e4)
-        share = self.furthest / self._usual
-        size = share * (_STIFFNESS_N_PER_M * _REACH_M if shift else _STIFFNESS * _REACH_RAD)
-        along, to = self.along, self.coordinate
+        """The stiffness of each stretch."""
+        shift, along_shift = self.coordinate in TRANSLATIONS, self.along in TRANSLATIONS
+        usual = (_LOAD_N if shift else _LOAD_NM) / self._usual
+        unit = f"{'N' if shift else 'N m'}/{'m' if along_shift else 'rad'}"
+        low, high, along = -1e4 * usual, 1e4 * usual, self.along
         return tuple(
             Parameter(
-                name_of(knot),
+                name,
                 unit,
-                -most,
-                most,
+                low,
+                high,
                 0.0,
-                size,
+                SIZE * usual,
                 False,
-                f"load in {to} where {along} is {100.0 * knot:+g} % of the reach",
+                f"rise of the load in {self.coordinate} with {along} {100 * start:g} to "
+                f"{100 * end:g} % of the reach",
                 off=0.0,
             )
-            for knot in KNOTS
+            for name, start, end in zip(NAMES, KNOTS[:-1], KNOTS[1:], strict=True)
         )
 
     def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:
         """Load (J, 6) and tangent (J, 6, 6)."""
         at, along = COORDINATES.index(self.coordinate), COORDINATES.index(self.along)
         load, tangent = np.zeros_like(q), np.zeros((*q.shape, 6))
-        weights, slopes = table(q[:, along] / self.furthest)
-        load[:, at] = np.sum(weights * parameters, axis=1)
-        tangent[:, at, along] = np.sum(slopes * parameters, axis=1) / self.furthest
+        passed, inside = stretches(q[:, along] / self.furthest)
+        load[:, at] = self.furthest * np.sum(passed * parameters, axis=1)
+        tangent[:, at, along] = np.sum(inside * parameters, axis=1)
         return JointResponse(load, tangent)
 
     def by_parameter(self, q: Array, parameters: Array, carried: Array) -> Array:
-        """(J, 6, 8) by the load at each knot: it is linear in them."""
+        """(J, 6, 8) by the stiffness of each stretch: it is linear in them."""
         at, along = COORDINATES.index(self.coordinate), COORDINATES.index(self.along)
-        derivative = np.zeros((*q.shape, len(KNOTS)))
-        derivative[:, at], _ = table(q[:, along] / self.furthest)
+        derivative = np.zeros((*q.shape, len(NAMES)))
+        passed, _ = stretches(q[:, along] / self.furthest)
+        derivative[:, at] = self.furthest * passed
         return derivative
 
 
-def name_of(knot: float) -> str:
-    """The name of the load at a knot."""
-    side = "plus" if knot > 0.0 else "minus"
-    return f"load_at_{side}_{100.0 * abs(knot):.0f}"
+NAMES = tuple(
+    f"stiffness_{'minus' if end <= 0.0 else 'plus'}_{100.0 * max(abs(start), abs(end)):.0f}"
+    for start, end in pairwise(KNOTS)
+)
+"""A stretch goes by the end that is further from zero."""
 
 
-def table(u: Array) -> tuple[Array, Array]:
-    """(J, 8) share that the load at each knot has at u (J,) of the reach, and its slope by u."""
-    every = np.array([*KNOTS[KNOTS < 0.0], 0.0, *KNOTS[KNOTS > 0.0]])
-    (value, slope), (rest, _) = _rounded(u, every), _rounded(np.zeros(1), every)
-    known = every != 0.0
-    return (value - rest)[:, known], slope[:, known]
+def stretches(u: Array) -> tuple[Array, Array]:
+    """(J, 8) how far each stretch is passed at u (J,) of the reach, from zero on, and its slope."""
+    (passed, inside), (at_rest, _) = _passed(u), _passed(np.zeros(1))
+    return passed - at_rest, inside
 
 
-def _rounded(u: Array, knots: Array) -> tuple[Array, Array]:
-    """(J, K) hats of straight pieces through knots (K,), corners rounded, and their slopes.
-
-    A piece from one knot to the next is the line of the first piece plus a ramp at every inner knot
-    by as much as the slope changes there.
-    """
-    gaps = np.diff(knots)
-    rises = (np.eye(len(knots))[1:] - np.eye(len(knots))[:-1]) / gaps[:, None]  # (K - 1, K)
-    change = np.diff(rises, axis=0)  # (K - 2, K) at each inner knot
-    over, slope = ramp(u[:, None] - knots[None, 1:-1], ROUNDED)
-    first = np.eye(len(knots))[0] + (u[:, None] - knots[0]) * rises[0]
-    return first + over @ change, rises[0] + slope @ change
+def _passed(u: Array) -> tuple[Array, Array]:
+    """(J, 8) part of each stretch below u, the first and last without an end, and its slope."""
+    over, slope = ramp(u[:, None] - KNOTS[1:-1], ROUNDED)
+    ones = np.ones((len(u), 1))
+    over = np.hstack([u[:, None], over, 0.0 * ones])
+    slope = np.hstack([ones, slope, 0.0 * ones])
+    return over[:, :-1] - over[:, 1:], slope[:, :-1] - slope[:, 1:]

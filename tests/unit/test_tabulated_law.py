@@ -8,7 +8,7 @@ from example_effects import NOWHERE, scoped, slope, spine
 
 from spinepipe.effects import JointLaw, Wrench, create
 from spinepipe.effects.contract import Array
-from spinepipe.effects.tabulated_law import KNOTS, ROUNDED, name_of
+from spinepipe.effects.tabulated_law import KNOTS, NAMES, ROUNDED
 from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.model.file import (
     EffectEntry,
@@ -25,9 +25,10 @@ from spinepipe.world import Chain
 
 EXTENSION = COORDINATES.index("extension")
 REACH = 0.2
-LOADS = np.array([-9.0, -5.0, -2.0, -1.5, 0.5, 1.0, 4.0, 11.0])
-EVERY_KNOT = np.concatenate([KNOTS[:4], [0.0], KNOTS[4:]])
-EVERY_LOAD = np.concatenate([LOADS[:4], [0.0], LOADS[4:]])
+LOADS = np.array([-9.0, -5.0, -2.0, -1.5, 0.0, 0.5, 1.0, 4.0, 11.0])
+"""N m at the knots."""
+
+VALUES = np.diff(LOADS) / (0.25 * REACH)
 
 
 def law(**options: Any) -> JointLaw:
@@ -36,7 +37,7 @@ def law(**options: Any) -> JointLaw:
     return made
 
 
-def loads(u: Array, values: Array = LOADS) -> Array:
+def loads(u: Array, values: Array = VALUES) -> Array:
     """(N,) load in extension at shares u (N,) of the reach."""
     q = np.zeros((len(u), 6))
     q[:, EXTENSION] = REACH * u
@@ -46,8 +47,8 @@ def loads(u: Array, values: Array = LOADS) -> Array:
 
 def straight(u: Array) -> Array:
     """The table by numpy, its first and last piece going on."""
-    inside = np.interp(u, EVERY_KNOT, EVERY_LOAD)
-    ends = [np.diff(EVERY_LOAD)[n] / np.diff(EVERY_KNOT)[n] for n in (0, -1)]
+    inside = np.interp(u, KNOTS, LOADS)
+    ends = [np.diff(LOADS)[n] / np.diff(KNOTS)[n] for n in (0, -1)]
     return inside + ends[0] * np.minimum(u + 1.0, 0.0) + ends[1] * np.maximum(u - 1.0, 0.0)
 
 
@@ -64,22 +65,20 @@ def test_the_table_is_a_running_mean_of_straight_pieces() -> None:
 
 def test_between_corners_it_is_the_table_itself() -> None:
     u = np.array([-1.3, -0.9, -0.6, -0.4, -0.1, 0.1, 0.4, 0.6, 0.9, 1.3])
-    change = (EVERY_LOAD[5] - 2.0 * EVERY_LOAD[4] + EVERY_LOAD[3]) / 0.25
+    change = (LOADS[5] - 2.0 * LOADS[4] + LOADS[3]) / 0.25
     np.testing.assert_allclose(loads(u), straight(u) - 0.25 * ROUNDED * change, rtol=1e-13)
     assert loads(np.zeros(1))[0] == 0.0
 
 
 def test_a_table_of_a_spring_is_that_spring() -> None:
     u = np.linspace(-2.0, 2.0, 41)
-    np.testing.assert_allclose(loads(u, 7.0 * KNOTS), 7.0 * u, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(loads(u, np.full(8, 7.0)), 7.0 * REACH * u, rtol=0, atol=1e-13)
 
 
 def test_it_rises_where_the_table_rises() -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
-        rises = rng.exponential(size=8) * rng.integers(0, 2, 8)
-        values = np.cumsum(rises)
-        values -= np.interp(0.0, KNOTS, values)
+        values = rng.exponential(size=8) * rng.integers(0, 2, 8)
         assert np.diff(loads(np.linspace(-1.5, 1.5, 301), values)).min() >= -1e-12
 
 
@@ -131,7 +130,7 @@ def test_off_is_nothing_but_says_what_it_would_do() -> None:
 
 def test_other_coordinates_bear_nothing() -> None:
     q = np.full((1, 6), 0.06)
-    response = law(over="right_bending").respond(q, LOADS[None], np.zeros((1, 6)))
+    response = law(over="right_bending").respond(q, VALUES[None], np.zeros((1, 6)))
     assert not np.delete(response.load, EXTENSION).any()
     assert np.argwhere(response.tangent).tolist() == [[0, EXTENSION, 4]]
 
@@ -139,7 +138,7 @@ def test_other_coordinates_bear_nothing() -> None:
 def bent(moment_nm: float) -> tuple[SpineModel, LoadCase]:
     """One joint that bears a moment about its own extension axis by a spring and a table."""
     model = spine(1, gravity=False)
-    model = model.with_effects((*model.effects, scoped(law(), (0,), tuple(LOADS.tolist()))))
+    model = model.with_effects((*model.effects, scoped(law(), (0,), tuple(VALUES.tolist()))))
     axis = model.frames[0].rotation[:, 2]
     step = LoadStep(0, (Wrench(0, NOWHERE, NOWHERE, moment_nm * axis),))
     return model, LoadCase("bent", 1, (step,))
@@ -168,14 +167,13 @@ def test_stacks_of_it_end_where_the_engine_of_record_ends() -> None:
 
 
 def test_a_model_file_carries_it(tmp_path: Any) -> None:
-    names = [name_of(knot) for knot in KNOTS]
-    values = Values(joint="L4L5", **dict(zip(names, LOADS.tolist(), strict=True)))
+    values = Values(joint="L4L5", **dict(zip(NAMES, VALUES.tolist(), strict=True)))
     options = {"coordinate": "anterior", "over": "extension", "reach": 0.15}
     entry = EffectEntry(effect="tabulated_law", options=options, values=(values,))
     write_model(ModelFile(model="m", cohort="c", effects=(entry,)), tmp_path / "model.yaml")
     (found,) = effects_for(read_model(tmp_path / "model.yaml"), "s", ["L5S1", "L4L5"])
     assert found.effect == create("tabulated_law", options)
-    np.testing.assert_array_equal(found.values, [np.zeros(8), LOADS])
+    np.testing.assert_array_equal(found.values, [np.zeros(8), VALUES])
 
 
 @pytest.mark.parametrize(

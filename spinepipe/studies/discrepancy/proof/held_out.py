@@ -177,12 +177,21 @@ def to_first_order(base: Grounds, final: Grounds, asked: Asked) -> HeldOut:
 
 
 def _proof(base: Grounds, final: Grounds, asked: Asked, run: Run) -> HeldOut:
-    readings = base.readings
     models = FoldModels(base, final, asked.refit, run)
+    return proven(models, base.readings, base.tests, asked)
+
+
+def proven(
+    models: FoldModels,
+    readings: Mapping[str, SpecimenReadings],
+    tests: Sequence[str],
+    asked: Asked,
+) -> HeldOut:
+    """Each fold's readings as these models predict them."""
     motion = nothing_held_out(readings)
     folds: list[Fold] = []
     if asked.tests:
-        folds += folds_by_test(readings, base.tests)
+        folds += folds_by_test(readings, tests)
     if asked.specimens:
         folds += folds_by_specimen(readings)
     rows = [_row(models, fold, number, motion) for number, fold in enumerate(folds)]

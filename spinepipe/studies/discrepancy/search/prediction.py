@@ -20,6 +20,7 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
+from spinepipe.statics.many.solve import carried
 from spinepipe.units import less_step_0
 
 SAME = 1e-7
@@ -202,6 +203,11 @@ class Solved:
     def poses(self) -> tuple[Array, ...]:
         """(T, J, 6) of each test."""
         return self._by_test(self._q)
+
+    @property
+    def held(self) -> tuple[Array, ...]:
+        """(T, J, 6) N and N m of each test that the joints' laws hold."""
+        return self._by_test(carried(self._stack, self._q))
 
     def by(self, full: SpineModel, free: Sequence[FreeParameter]) -> tuple[Array, ...]:
         """(T, J, 6, m) derivatives of each test's readings by unknowns of idle effects.
