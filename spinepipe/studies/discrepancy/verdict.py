@@ -107,7 +107,7 @@ class Missing:
 
 @dataclass(frozen=True)
 class NotTestable:
-    """An effect that these tests cannot show, why, and the test that would."""
+    """An effect that these tests cannot show, why, and the test that would; empty: none tried."""
 
     name: str
     why: str
@@ -152,18 +152,78 @@ class SmallestDetectable:
 
 
 @dataclass(frozen=True)
+class FormulaTerm:
+    """One term of a formula.
+
+    Attributes
+    ----------
+    joint, specimen : ``*`` for all. acts : load or reading. term : what the coefficient multiplies,
+        in words; of : the motions that it is a product of, empty for other terms.
+    explained : share of what is above the noise that the term adds to those before it.
+    """
+
+    specimen: str
+    joint: str
+    coordinate: str
+    acts: str
+    term: str
+    coefficient: float
+    sd: float
+    unit: str
+    explained: float
+    of: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Formula:
+    """What would describe a discrepancy that has no name; it is no effect.
+
+    Attributes
+    ----------
+    terms : as they entered. text : a line for each place. explained : share of what is above the
+        noise, in the fit. held_out_closed : of that in readings left out; None where none tells.
+    threshold : drop of chi2 that noise alone seldom shows for the best of all terms.
+    """
+
+    terms: tuple[FormulaTerm, ...]
+    text: str
+    explained: float
+    held_out_closed: float | None
+    threshold: float
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Tables in the model file in the place of effects that have no name.
+
+    Attributes
+    ----------
+    place : what is tabulated, and where, in words. gap : noise SD, in the fit with them.
+    held_out_closed : share of what is above the noise in readings left out that they close; None
+        where none tells.
+    """
+
+    place: str
+    gap: float
+    held_out_closed: float | None
+
+
+@dataclass(frozen=True)
 class Unknown:
     """What is missing without a name.
 
     Attributes
     ----------
     where : the largest gaps, in words. shape : as generic shapes see it, None without evidence.
-    reason : why there is no name.
+    reason : why there is no name. coordinate : of the shape; None without one.
+    formula : what would describe it; it is no name either.
     """
 
     where: str
     shape: str | None
     reason: Reason
+    coordinate: str | None = None
+    formula: Formula | None = None
 
 
 @dataclass(frozen=True)
@@ -175,12 +235,70 @@ class Part:
     left_gap : noise SD, with the effects; None where it was not told.
     left_where : the largest gaps that stay, in words. left_shape : None without evidence.
     reasons : why it is not said that nothing else is missing.
+    coordinate : of the shape; None without one. formula : what would describe what stays.
     """
 
     left_gap: float | None
     left_where: str
     left_shape: str | None
     reasons: tuple[str, ...] = ()
+    coordinate: str | None = None
+    formula: Formula | None = None
+
+
+@dataclass(frozen=True)
+class KindOfImperfection:
+    """What a kind of imperfection takes up of chi2, all joints, tests and specimens together."""
+
+    kind: str
+    taken_chi2: float
+
+
+@dataclass(frozen=True)
+class LargeImperfection:
+    """The most likely size of one imperfection, in prior SDs and in ``unit``."""
+
+    kind: str
+    where: str
+    in_prior_sds: float
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class CommonImperfection:
+    """An imperfection that is alike in so many places that it is no random error.
+
+    Attributes
+    ----------
+    mean_in_prior_sds, se : the mean, and its standard error by the scatter of the places.
+    """
+
+    kind: str
+    where: str
+    mean_in_prior_sds: float
+    se: float
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """What the small imperfections took up that the study allows for.
+
+    Attributes
+    ----------
+    gap_without, gap_with : noise SD, of the model that the verdict stands for; the first refitted
+        without any, None where that has no fit. by_kind, largest : most first.
+    common : those that are no random errors. message : all this in sentences.
+    """
+
+    gap_without: float | None
+    gap_with: float
+    by_kind: tuple[KindOfImperfection, ...]
+    largest: tuple[LargeImperfection, ...]
+    common: tuple[CommonImperfection, ...]
+    message: str
 
 
 @dataclass(frozen=True)
@@ -214,6 +332,8 @@ class Verdict:
     ----------
     effects : missing for certain. candidates_in_set : names that cannot be told apart.
     families : sets of effects that these tests cannot tell apart.
+    imperfections : what those allowed for took up; None where the base has no fit.
+    tabulated : of UNKNOWN and PART, what the model with effects has besides; None for nothing.
     """
 
     cohort: str
@@ -231,6 +351,8 @@ class Verdict:
     suspected_data_errors: tuple[SuspectedError, ...] = ()
     threshold: Threshold = field(default_factory=Threshold)
     families: tuple[tuple[str, ...], ...] = ()
+    imperfections: Imperfections | None = None
+    tabulated: Tabulated | None = None
 
     @property
     def named(self) -> tuple[str, ...]:

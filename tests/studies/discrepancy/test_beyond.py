@@ -1,0 +1,149 @@
+"""What no effect explains is carried as a table: by chains, and by a whole study and its files."""
+
+from pathlib import Path
+
+import chain_cases as cases
+import numpy as np
+import pytest
+import search_cases
+from test_formula import DRAWS, FALSE_ALARM, found, grounds
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort.measured import measured_specimen
+from spinepipe.cohort.specimen import spine_model
+from spinepipe.model.file import ModelFile, effects_for
+from spinepipe.studies.discrepancy.job import Results, searched
+from spinepipe.studies.discrepancy.search.beyond import tabulated
+from spinepipe.studies.discrepancy.search.gaps import whole_gap
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import DAMPING
+from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
+from spinepipe.studies.discrepancy.search.prediction import Simulated
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.verdict import Answer, Tabulated, plain_data, verdict_of
+from spinepipe.units import ROTATIONS
+
+
+def tables(at: Grounds) -> tuple[Grounds, Tabulated | None]:
+    lack = lack_of_fit(at, ROTATIONS, DRAWS, 0)
+    return tabulated(at, lack, found(at), FALSE_ALARM)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_springs_need_no_table(seed: int) -> None:
+    at = grounds(seed)
+    after, table = tables(at)
+    assert table is None
+    assert after is at
+
+
+def test_a_cube_at_one_joint_is_tabulated_there() -> None:
+    at = grounds(1, "flexion", 3, 4000.0, 1)
+    after, table = tables(at)
+    assert table is not None
+    assert table.place == "extension at L4L5"
+    assert whole_gap(at, at.fit).gap > 4.0
+    assert table.gap == pytest.approx(whole_gap(after, after.fit).gap)
+    assert table.gap < 0.4
+    assert table.held_out_closed is not None
+    assert table.held_out_closed > 0.9
+
+
+def test_waves_that_a_sweep_of_three_loads_cannot_show_are_not_tabulated() -> None:
+    """Every second load step left out leaves nothing to tell the waves in between by."""
+    at = search_cases.grounds_of(search_cases.readings(1, {"bending": search_cases.wavy}))
+    assert tables(at)[1] is None
+
+
+# A whole study: chains whose joints soften to one side, k q + c q^2, with no effect that says so
+
+SOFTER = -180.0
+"""N m/rad2."""
+STIFFNESS = {"a": 50.0, "b": 45.0}
+SIGN = {"flexion": -1.0, "extension": 1.0}
+
+
+def turned(moment: float, k: float) -> float:
+    """Radians at which k q + SOFTER q^2 is the moment."""
+    return float((-k + np.sqrt(k**2 + 4.0 * SOFTER * moment)) / (2.0 * SOFTER))
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("beyond")
+    linear = {name: np.array([[k, 60.0, 200.0]] * 3) for name, k in STIFFNESS.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(cases.MOMENT_OF, "extension", ("mz_nm", 1.0, "extension"))
+        tests = ("flexion", "extension", "left_lateral_bending")
+        made = cases.Chains(linear, tests, steps=8, step_nm=0.3, cycles=2, noise_deg=0.02)
+    for row in made.motion.itertuples():
+        if row.test in SIGN:
+            moment, k = SIGN[row.test] * made.step_nm * row.step, STIFFNESS[row.specimen]
+            away = np.rad2deg(turned(moment, k) - moment / k)
+            made.motion.loc[row.Index, "extension_deg"] += away
+    made.write(root)
+    return root
+
+
+@pytest.fixture(scope="module")
+def results(root: Path) -> Results:
+    study = Discrepancy.model_validate(
+        {
+            "study": "probe",
+            "kind": "discrepancy",
+            "cohort": "chains",
+            "base": {"stiffness": "per_specimen"},
+            "effects": ["load_offset"],
+            "bootstrap": 50,
+        }
+    )
+    folder = root / "config/cohorts/chains"
+    return searched(study, cohorts.read(folder), str(root), at_once)
+
+
+@pytest.mark.slow
+def test_the_verdict_hands_over_a_formula_and_no_name(results: Results) -> None:
+    verdict = results.verdict
+    assert verdict.verdict is Answer.UNKNOWN
+    assert verdict.effects == ()
+    assert verdict.unknown is not None
+    told = verdict.unknown.formula
+    assert told is not None
+    (term,) = told.terms
+    assert (term.joint, term.term) == ("*", "extension^2")
+    assert abs(term.coefficient - SOFTER) < 4.0 * term.sd
+    assert told.held_out_closed is not None
+    assert told.held_out_closed > 0.8
+    assert verdict_of(plain_data(verdict)) == verdict
+
+
+@pytest.mark.slow
+def test_the_model_file_carries_the_table_and_the_gap_shrinks(root: Path, results: Results) -> None:
+    """The file, solved afresh, against the readings themselves."""
+    verdict, file = results.verdict, results.model_with_effects
+    assert verdict.tabulated is not None
+    assert verdict.tabulated.place.startswith("extension at every joint")
+    assert verdict.tabulated.held_out_closed is not None
+    assert verdict.tabulated.held_out_closed > 0.7
+    assert [one.effect for one in file.effects] == ["linear_bushing", "tabulated_law"]
+    missed = {
+        name: missed_deg(root, model)
+        for name, model in (("base", results.model_base), ("table", file))
+    }
+    assert missed["table"] < 0.025  # the noise is 0.02 deg, the mean of two cycles 0.014
+    assert missed["table"] < 0.3 * missed["base"]
+
+
+def missed_deg(root: Path, file: ModelFile) -> float:
+    """RMS of extension in flexion and extension that a model file misses."""
+    cohort = cohorts.read(root / "config/cohorts/chains")
+    errors = []
+    for name in STIFFNESS:
+        one = measured_specimen(cohort, name, tuple(SIGN))
+        effects = effects_for(file, name, cohort.joint_names)
+        model = spine_model(cohort, name, one.frames, effects, DAMPING)
+        seen = Simulated(model, [cycle.case for cycle in one.tested], False, ()).at(np.zeros(0))
+        for cycle, predicted in zip(one.tested, seen.readings, strict=True):
+            errors.append(np.rad2deg(cycle.readings - predicted)[..., 3].ravel())
+    return float(np.sqrt(np.nanmean(np.concatenate(errors) ** 2)))
