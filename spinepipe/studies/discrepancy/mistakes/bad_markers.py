@@ -3,7 +3,7 @@
 With repeats the scatter is that between cycles of a test. Without, it is what a base fit leaves and
 no smooth curve over the load holds, one for each way the load goes. Corners of a joint's own law (a
 neutral zone, a stop) leave some too, where it is loaded: so only rotations that a test hardly loads
-count then, and all that were read must scatter.
+count then (translations where no rotation was read), and all that were read must scatter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,12 @@ from scipy.stats import f as f_distribution
 from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.suspected import (
-    joint_moments,
+    joint_loads,
     of_specimens,
 )
 from spinepipe.studies.discrepancy.search.noise import MAD_PER_SD
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.verdict import SuspectedError
-from spinepipe.units import COORDINATES, ROTATIONS
 
 MANY_TIMES = 3.0
 """Ratio of SDs from which scatter counts as a mistake; less may be a joint that is hard to see."""
@@ -33,7 +32,10 @@ USUAL_QUANTILE = 0.4
 """Of the places' scatter: the usual one, even where nearly half of the places are bad."""
 
 HARDLY = 0.1
-"""Share of a joint's squared moment in a test up to which a rotation counts as hardly loaded."""
+"""Share of a joint's squared load of a kind up to which a coordinate counts as hardly loaded."""
+
+
+_SHIFTS, _TURNS = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True)
@@ -134,21 +136,24 @@ def beside_the_curve(
     for one in readings:
         total = np.zeros((2, one.tests[0].cycles.shape[2], 6))
         for test, seen in zip(one.tests, predicted[one.specimen], strict=True):
-            total += _rough(test.mean - seen, joint_moments(one.frames, test.case))
+            total += _rough(test.mean - seen, joint_loads(one.frames, test.case))
         found.append(total)
     squares, freedom = np.stack(found, axis=1)
     sd = np.where(freedom > 0.0, np.sqrt(squares / np.maximum(freedom, 1.0)), np.nan)
     return Scatter(sd, freedom)
 
 
-def _rough(residual: Array, moments: Array) -> Array:
+def _rough(residual: Array, loads: Array) -> Array:
     """(2, J, 6) squares of a test's residual (T, J, 6) beside the curves, and their freedom."""
     found = np.zeros((2, *residual.shape[1:]))
+    turns = bool(np.isfinite(residual[..., _TURNS]).any())
+    kind = _TURNS if turns else _SHIFTS
     for joint in range(residual.shape[1]):
-        curves = _curves(moments[:, joint])
-        power = np.sum((moments[:, joint] - moments[:, joint].mean(axis=0)) ** 2, axis=0)
+        own = loads[:, joint, kind]
+        curves = _curves(loads[:, joint, _TURNS] if turns or not own.any() else own)
+        power = np.sum((own - own.mean(axis=0)) ** 2, axis=0)
         for number in np.flatnonzero(power <= HARDLY * power.sum()):
-            coordinate = COORDINATES.index(ROTATIONS[number])
+            coordinate = kind.start + number
             there = np.isfinite(residual[:, joint, coordinate])
             values, basis = residual[there, joint, coordinate], curves[there]
             solution, rank = lstsq(basis, values)
@@ -157,10 +162,10 @@ def _rough(residual: Array, moments: Array) -> Array:
     return found
 
 
-def _curves(moments: Array) -> Array:
-    """(T, 6) cubic over the largest moment, with a straight line of its own where it goes back."""
-    largest = int(np.argmax(np.ptp(moments, axis=0)))
-    size = max(float(np.abs(moments[:, largest]).max()), np.finfo(float).tiny)
-    u = moments[:, largest] / size
+def _curves(loads: Array) -> Array:
+    """(T, 6) cubic over the largest of loads (T, 3), with a line of its own where it goes back."""
+    largest = int(np.argmax(np.ptp(loads, axis=0)))
+    size = max(float(np.abs(loads[:, largest]).max()), np.finfo(float).tiny)
+    u = loads[:, largest] / size
     back = (np.diff(u, prepend=0.0) < 0.0).astype(float)
     return np.stack([np.ones_like(u), u, u**2, u**3, back, back * u], axis=1)

@@ -1,4 +1,4 @@
-"""How joints answer the loads that drive them: radians per newton metre, by plain least squares.
+"""How joints answer the loads that drive them: rad per N m, m per N, by plain least squares.
 
 No model is fitted and no stiffness supposed, so that a mistake in the files cannot drag anything
 along. The load is what a chain carries in its neutral pose; it needs the joint frames alone.
@@ -8,12 +8,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
+from spinepipe.studies.discrepancy.mistakes.published_range import middle
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
-from spinepipe.units import COORDINATES, ROTATIONS, less_step_0
+from spinepipe.units import COORDINATES, less_step_0
 
 ALL = "all specimens"
 
@@ -28,20 +30,28 @@ ABOUT = (2, 0, 1)
 """Axis of the joint frame about which each of `ROTATIONS` turns."""
 
 MAIN_SHARE = 0.5
-"""A rotation is driven in a test if it has this share of the joint's largest squared load."""
+"""A coordinate is driven in a test if it has this share of the joint's largest squared load.
+
+Forces are compared with forces, moments with moments.
+"""
 
 NEAR_OTHERS = 0.2
 """And this share of the largest load of any joint: a short lever arm may change its side."""
 
+UNSURE_M = 0.01
+"""Joint centres are known no better: a moment must be larger than the forces make over so much, and
+a force must move the joint by more than its rotation does over so much, at usual stiffness."""
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """How one rotation of one joint moves with the load that drives it in one test.
+    """How one coordinate of one joint moves with the load that drives it in one test.
 
     Attributes
     ----------
-    load, motion : (T,) N m and rad, as far as read, both without their mean (or from step 0).
-    slope : rad per N m. correlation : of load and motion.
+    load, motion : (T,) N m and rad, or N and m, as far as read, both without their mean (or from
+        step 0).
+    slope : rad per N m or m per N. correlation : of load and motion.
     """
 
     specimen: str
@@ -53,7 +63,7 @@ class Answer:
 
     @property
     def slope(self) -> float:
-        """Least squares, motion on load; rad per N m."""
+        """Least squares, motion on load; rad per N m or m per N."""
         return float(self.load @ self.motion / (self.load @ self.load))
 
     @property
@@ -66,7 +76,7 @@ class Answer:
 def answers(
     readings: Mapping[str, SpecimenReadings], zeroed: bool, sd: Array, clear: float
 ) -> list[Answer]:
-    """All driven rotations whose motion is clear of the noise.
+    """All driven coordinates whose motion is clear of the noise.
 
     Parameters
     ----------
@@ -75,39 +85,54 @@ def answers(
     found = []
     for name, one in readings.items():
         for test in one.tests:
-            found += _of_test(name, test, joint_moments(one.frames, test.case), zeroed)
+            found += _of_test(name, test, joint_loads(one.frames, test.case), zeroed)
     return [a for a in found if _rms(a.motion) > clear * sd[COORDINATES.index(a.coordinate)]]
 
 
-def joint_moments(frames: tuple[Pose, ...], case: LoadCase) -> Array:
-    """(T, J, 3) N m that the listed loads put on each of `ROTATIONS`, in the neutral pose."""
-    moments = np.zeros((len(case.steps), len(frames), 3))
-    for row, step in zip(moments, case.steps, strict=True):
+def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
+    """(T, J, 6) N and N m that the listed loads put on each coordinate, in the neutral pose."""
+    loads = np.zeros((len(case.steps), len(frames), len(COORDINATES)))
+    for row, step in zip(loads, case.steps, strict=True):
         for wrench in step.wrenches:
             for joint in range(wrench.body + 1):
+                back = frames[joint].rotation.T
                 arm = wrench.point - frames[joint].origin
                 about = wrench.moment + np.cross(arm, wrench.force)
-                row[joint] += (frames[joint].rotation.T @ about)[list(ABOUT)]
-    return moments
+                row[joint, :3] += back @ wrench.force
+                row[joint, 3:] += (back @ about)[list(ABOUT)]
+    return loads
 
 
-def _of_test(specimen: str, test: Repeats, moments: Array, zeroed: bool) -> list[Answer]:
-    centred = less_step_0(moments, True) if zeroed else moments - moments.mean(axis=0)
-    power = np.sum(centred**2, axis=0)
-    least = np.maximum(
-        MAIN_SHARE * power.max(axis=1, keepdims=True), NEAR_OTHERS**2 * power.max(initial=0.0)
-    )
+def _of_test(specimen: str, test: Repeats, loads: Array, zeroed: bool) -> list[Answer]:
+    centred = less_step_0(loads, True) if zeroed else loads - loads.mean(axis=0)
     found = []
-    for joint, number in np.argwhere((power > least) & (power > 0.0)):
-        name = ROTATIONS[number]
-        motion = test.mean[:, joint, COORDINATES.index(name)]
-        load = moments[:, joint, number]
+    for joint, number in np.argwhere(_driven(np.sum(centred**2, axis=0))):
+        motion = test.mean[:, joint, number]
+        load = loads[:, joint, number]
         there = np.isfinite(motion)
         load, motion = less_step_0(load, zeroed)[there], motion[there]
         if not zeroed and len(load):
             load, motion = load - load.mean(), motion - motion.mean()
         if load @ load > 0.0:
+            name = COORDINATES[number]
             found.append(Answer(specimen, test.case.test, int(joint), name, load, motion))
+    return found
+
+
+def _driven(power: Array) -> NDArray[np.bool_]:
+    """(J, 6) which coordinates a test drives, from the sums of squares (J, 6) of their loads."""
+    found = np.zeros(power.shape, dtype=bool)
+    for kind in (slice(0, 3), slice(3, 6)):
+        own = power[:, kind]
+        least = np.maximum(
+            MAIN_SHARE * own.max(axis=1, keepdims=True), NEAR_OTHERS**2 * own.max(initial=0.0)
+        )
+        found[:, kind] = (own > least) & (own > 0.0)
+    usual = np.array([middle(name) for name in COORDINATES])
+    forces = power[:, :3].sum(axis=1, keepdims=True)
+    turns = np.sum(power[:, 3:] / usual[3:] ** 2, axis=1, keepdims=True)
+    found[:, 3:] &= power[:, 3:] > UNSURE_M**2 * forces
+    found[:, :3] &= power[:, :3] / usual[:3] ** 2 > UNSURE_M**2 * turns
     return found
 
 

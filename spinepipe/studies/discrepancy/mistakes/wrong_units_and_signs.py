@@ -2,20 +2,21 @@
 
 Signs. A spring yields to its load. Where a joint answers as much as the others do, but the other
 way, its readings have the wrong sign; where most joints of a test do so, the sign of the load (or
-of the coordinate) has. Told of rotations that a test drives; not of translations, nor of rotations
-that only follow others.
+of the coordinate) has. Told of coordinates that a test drives, translations by forces and rotations
+by moments; not of those that only follow others.
 
-Units. Published stiffness of a joint spans a factor of 60 in a rotation (Gould 2024a, Table 1). A
-single rotation counts as impossible a decade beyond; several together sooner, as a wrong unit moves
-all. Units that leave the stiffness in that range (lbf in for N m: a factor of 8.85) cannot be told.
+Units. Published stiffness of a joint spans a factor of 60 in a rotation and 30 in a translation
+(Gould 2024a, Table 1). A single coordinate counts as impossible a decade beyond; several of a kind
+together sooner, as a wrong unit moves all. Units that leave the stiffness in that range (lbf in for
+N m: a factor of 8.85; lbf for N; cm for mm) cannot be told.
 """
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.anatomy.published import published
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.mistakes.published_range import middle, published_range
 from spinepipe.studies.discrepancy.mistakes.suspected import (
     ALL,
     Answer,
@@ -23,7 +24,7 @@ from spinepipe.studies.discrepancy.mistakes.suspected import (
     typical,
 )
 from spinepipe.studies.discrepancy.verdict import SuspectedError
-from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATES, MM_PER_M, ROTATIONS, TRANSLATIONS
 
 AGAINST = -0.9
 """Correlation of motion and load below which a joint moves against its load."""
@@ -32,18 +33,24 @@ LIKE = 5.0
 """Factor within which the size of an answer must be that of the other joints."""
 
 DECADES = 1.0
-"""Beyond the published range, for one rotation."""
+"""Beyond the published range, for one coordinate."""
 
 APART = 30.0
 """Factor between one specimen or test and the others that no anatomy and no preload makes."""
 
 MIX_UPS = {
-    1000.0: "loads in N mm taken for N m",
-    180.0 / np.pi: "motion in rad taken for deg",
-    np.pi / 180.0: "motion in deg taken for rad",
-    1e-3: "loads in kN m taken for N m",
+    ROTATIONS: {
+        1000.0: "loads in N mm taken for N m",
+        180.0 / np.pi: "motion in rad taken for deg",
+        np.pi / 180.0: "motion in deg taken for rad",
+        1e-3: "loads in kN m taken for N m",
+    },
+    TRANSLATIONS: {
+        1000.0: "motion in m taken for mm",
+        1e-3: "loads in kN taken for N, or motion in µm for mm",
+    },
 }
-"""Factor on the stiffness that each mistake makes."""
+"""Factor on the stiffness that each mistake makes, by the kind of coordinates."""
 
 NEAR = 5.0
 """Factor within which a mistake counts as the one."""
@@ -54,7 +61,7 @@ def wrong_signs(
 ) -> list[SuspectedError]:
     """Suspected signs, whole tests first; ``sd`` (6,) of a reading."""
     errors: list[SuspectedError] = []
-    for coordinate in ROTATIONS:
+    for coordinate in COORDINATES:
         of_coordinate = [a for a in found if a.coordinate == coordinate]
         whole, single = _split(of_coordinate)
         errors += _tests(whole, of_coordinate, specimens)
@@ -152,17 +159,25 @@ def _words_of_sign(chosen: Sequence[Answer], found: Sequence[Answer], sd: Array)
 
 
 def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
-    """Suspected units: of single specimens and tests, else of the whole cohort."""
+    """Suspected units: of single specimens and tests, else of the whole cohort.
+
+    Translations and rotations apart: a unit is of forces or of moments, of mm or of deg.
+    """
+    kinds = ([a for a in found if a.coordinate in kind] for kind in MIX_UPS)
+    return [error for of_kind in kinds for error in _of_kind(of_kind)]
+
+
+def _of_kind(found: Sequence[Answer]) -> list[SuspectedError]:
     single = _of_specimens(found) or _of_tests(found)
     if single:
         return single
     stiffness = _stiffness(found)
     if not _is_impossible(stiffness):
         return []
-    factors = [k / _middle(name) for name, k in stiffness.items()]
+    factors = [k / middle(name) for name, k in stiffness.items()]
     factor = float(np.exp(np.mean(np.log(factors))))
     evidence = f"{_words_of_unit(stiffness)}: {_times(factor)} the middle of the published range"
-    return [SuspectedError(ALL, _mix_up(factor), evidence)]
+    return [SuspectedError(ALL, _mix_up(factor, stiffness), evidence)]
 
 
 def _of_specimens(found: Sequence[Answer]) -> list[SuspectedError]:
@@ -176,45 +191,48 @@ def _of_specimens(found: Sequence[Answer]) -> list[SuspectedError]:
 def _apart(
     where: str, own: Sequence[Answer], others: Sequence[Answer], *, everywhere: bool
 ) -> list[SuspectedError]:
-    """An error where all rotations are far from the others', and further from the published."""
+    """An error where all are far from the others', and further from the published."""
     mine, theirs = _stiffness(own), _stiffness(others)
     shared = [name for name in mine if name in theirs]
     if not shared or (everywhere and len(shared) < len(mine)):
         return []
     logs = np.array([np.log(mine[name] / theirs[name]) for name in shared])
-    here = np.array([abs(np.log(mine[name] / _middle(name))) for name in shared])
-    there = np.array([abs(np.log(theirs[name] / _middle(name))) for name in shared])
+    here = np.array([abs(np.log(mine[name] / middle(name))) for name in shared])
+    there = np.array([abs(np.log(theirs[name] / middle(name))) for name in shared])
     if abs(logs.mean()) < np.log(APART) or np.ptp(logs) > np.log(APART) or here.sum() < there.sum():
         return []
     factor = float(np.exp(logs.mean()))
     evidence = f"{_words_of_unit(mine)}: {_times(factor)} that of the others"
-    return [SuspectedError(where, _mix_up(factor), evidence)]
+    return [SuspectedError(where, _mix_up(factor, mine), evidence)]
 
 
 def _stiffness(found: Sequence[Answer]) -> dict[str, float]:
-    """N m/rad by rotation: of most joints."""
+    """N/m or N m/rad by coordinate: of most joints."""
     names = dict.fromkeys(a.coordinate for a in found)
     return {n: 1.0 / typical([a.slope for a in found if a.coordinate == n]) for n in names}
 
 
-def _middle(coordinate: str) -> float:
-    low, high = published_range(coordinate)
-    return float(np.sqrt(low * high))
-
-
 def _words_of_unit(stiffness: Mapping[str, float]) -> str:
-    sizes = ", ".join(f"{k:.3g} N m/rad in {n.replace('_', ' ')}" for n, k in stiffness.items())
+    sizes = ", ".join(f"{_size(n, k)} in {n.replace('_', ' ')}" for n, k in stiffness.items())
     return f"stiffness about {sizes}"
+
+
+def _size(coordinate: str, stiffness: float) -> str:
+    """In the units that testers use."""
+    if coordinate in TRANSLATIONS:
+        return f"{stiffness / MM_PER_M:.3g} N/mm"
+    return f"{stiffness:.3g} N m/rad"
 
 
 def _times(factor: float) -> str:
     return f"{factor:.3g} times"
 
 
-def _mix_up(factor: float) -> str:
-    nearest = min(MIX_UPS, key=lambda known: abs(np.log(factor / known)))
+def _mix_up(factor: float, stiffness: Mapping[str, float]) -> str:
+    mix_ups = next(known for kind, known in MIX_UPS.items() if set(stiffness) & set(kind))
+    nearest = min(mix_ups, key=lambda known: abs(np.log(factor / known)))
     if abs(np.log(factor / nearest)) < np.log(NEAR):
-        return f"unit: {MIX_UPS[nearest]} (a factor of {nearest:.3g})"
+        return f"unit: {mix_ups[nearest]} (a factor of {nearest:.3g})"
     return "unit of loads or motion"
 
 
@@ -228,7 +246,7 @@ def _of_tests(found: Sequence[Answer]) -> list[SuspectedError]:
 
 
 def _is_impossible(stiffness: Mapping[str, float]) -> bool:
-    """Beyond the published range by a decade in one rotation, or all the same way by less."""
+    """Beyond the published range by a decade in one coordinate, or all the same way by less."""
     if not stiffness:
         return False
     ranges = [published_range(name) for name in stiffness]
@@ -238,10 +256,3 @@ def _is_impossible(stiffness: Mapping[str, float]) -> bool:
         return True
     least = DECADES / np.sqrt(len(stiffness))
     return any(min(side) > 0.0 and float(np.mean(side)) > least for side in (above, below))
-
-
-def published_range(coordinate: str) -> tuple[float, float]:
-    """Smallest and largest published stiffness of a rotation, N m/rad (Gould 2024a, Table 1)."""
-    column = STIFFNESS_COLUMNS[3 + ROTATIONS.index(coordinate)]
-    box = published("gould_2024a")["start_stiffness_box"]
-    return float(box["low"][column]), float(box["high"][column])

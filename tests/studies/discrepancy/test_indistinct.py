@@ -1,0 +1,60 @@
+"""Names that what was recorded cannot exclude: without times, and without a second preload."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from spinepipe.effects import Wrench
+from spinepipe.effects.registry import registered
+from spinepipe.model import LoadCase, LoadStep
+from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
+
+LEVELS = (0.0, 4.0, 8.0, 4.0, 0.0)
+TIMES = (0.0, 30.0, 60.0, 90.0, 120.0)
+NONE = (None,) * 5
+
+
+def case(times: Sequence[float | None] = TIMES, forces: Sequence[float] = (0.0,) * 5) -> LoadCase:
+    steps = tuple(
+        LoadStep(
+            number,
+            (Wrench(0, np.zeros(3), np.array([0.0, -force, 0.0]), np.array([0.0, 0.0, moment])),),
+            time,
+        )
+        for number, (moment, time, force) in enumerate(zip(LEVELS, times, forces, strict=True))
+    )
+    return LoadCase("flexion", 1, steps)
+
+
+def excluded(name: str, *cases: LoadCase) -> tuple[str, ...]:
+    return cannot_be_excluded(name, {"a": cases, "b": cases[:1]})
+
+
+@pytest.mark.parametrize("name", ["hysteresis", "neutral_pose_drift"])
+def test_without_time_a_loop_may_be_creep(name: str) -> None:
+    assert excluded(name, case()) == ()
+    assert excluded(name, case(NONE)) == ("creep",)
+    assert excluded(name, case((5.0,) * 5)) == ("creep",)  # a clock that stands
+    assert excluded(name, case(), case(NONE)) == ("creep",)  # time is known of a part only
+    assert excluded(name, case((0.0, 30.0, None, 90.0, 120.0))) == ("creep",)
+
+
+def test_one_compression_does_not_tell_levels_from_preload() -> None:
+    bare, pressed, harder = case(), case(forces=(300.0,) * 5), case(forces=(500.0,) * 5)
+    assert excluded("level_dependence", pressed) == ("preload_stiffening",)
+    assert excluded("level_dependence", bare) == ()  # nothing listed compresses
+    for two in ((bare, pressed), (pressed, harder)):
+        assert excluded("level_dependence", *two) == ()
+        assert excluded("preload_stiffening", *two) == ()
+    assert excluded("preload_stiffening", pressed) == ("level_dependence",)
+    growing = case(forces=(0.0, 200.0, 400.0, 200.0, 0.0))
+    assert excluded("preload_stiffening", growing) == ()
+    assert excluded("level_dependence", growing) == ()
+
+
+def test_other_effects_need_nothing_that_is_not_there() -> None:
+    told = {"hysteresis", "neutral_pose_drift", "level_dependence", "preload_stiffening"}
+    assert told <= set(registered())
+    for name in set(registered()) - told:
+        assert excluded(name, case(NONE)) == ()
