@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
 # Typical size and bound by the number of translations in the pair. Rotations: a fifth of the
 # stiffness in lateral bending (Gould 2024b Table 2: 69 N m/rad).
@@ -31,7 +31,7 @@ class BendingRotationCoupling:
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"pair": pair} for pair in combinations(ROTATIONS, 2)),
+        variants=tuple({"pair": pair} for pair in combinations(COORDINATES, 2)),
         spreads=PER_JOINT,
         told_by="motion measured in both coordinates while one of them is loaded",
     )

@@ -15,6 +15,9 @@ from spinepipe.units import COORDINATES, ROTATIONS
 ALL_ROTATIONS = "rotations"
 """Name of the three rotations together, where a law takes it for a coordinate."""
 
+ALL = "all"
+"""Name of all six coordinates together, likewise."""
+
 
 @dataclass(frozen=True)
 class Share:
@@ -32,10 +35,10 @@ class Share:
 
 
 class CarriedShare(ABC):
-    """A joint law that adds ``share * carried`` on one coordinate, or on the three rotations."""
+    """A joint law that adds ``share * carried`` on one coordinate, all rotations or all."""
 
     coordinate: str
-    """Its name, or `ALL_ROTATIONS`."""
+    """Its name, `ALL_ROTATIONS` or `ALL`."""
 
     @property
     def columns(self) -> list[int]:
@@ -65,10 +68,14 @@ class CarriedShare(ABC):
         return derivative
 
 
+def coordinates_of(coordinate: str) -> tuple[str, ...]:
+    """The coordinates that a name stands for: one of the six, `ALL_ROTATIONS` or `ALL`."""
+    return {ALL_ROTATIONS: ROTATIONS, ALL: COORDINATES}.get(coordinate, (coordinate,))
+
+
 def columns_of(coordinate: str) -> list[int]:
-    """Places of a coordinate, or of the three rotations, among the six."""
-    names = ROTATIONS if coordinate == ALL_ROTATIONS else (coordinate,)
-    return [COORDINATES.index(name) for name in names]
+    """Places of what a name stands for among the six."""
+    return [COORDINATES.index(name) for name in coordinates_of(coordinate)]
 
 
 def require(effect: str, option: str, given: str, allowed: tuple[str, ...]) -> None:

@@ -32,6 +32,10 @@ class Kind(StrEnum):
     MEASUREMENT = "measurement"
 
 
+TRIED = (-1.0, 0.0, 1.0)
+"""Prior SDs from its default at which a search tries a parameter of shape before it is fitted."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One declared parameter of an effect, in SI units.
@@ -44,6 +48,10 @@ class Parameter:
     logarithmic : whether fits work with the logarithm (positive, spread over decades).
     off : value of a strength at which the effect does nothing, to first order in which it acts;
         None for parameters of shape, which say nothing while the strengths are off.
+    family : whether it spans published forms of the same physics: both ends are forms of their own,
+        and a fit that ends there is as good as any.
+    tried : of a shape, prior SDs from its default at which a search tries it before it is fitted.
+    unsaid : what a model file means that does not name it, where that is not the default.
     """
 
     name: str
@@ -55,6 +63,14 @@ class Parameter:
     logarithmic: bool
     meaning: str
     off: float | None = None
+    family: bool = False
+    tried: tuple[float, ...] = TRIED
+    unsaid: float | None = None
+
+    @property
+    def in_a_file(self) -> float:
+        """Value where a model file does not name the parameter."""
+        return self.default if self.unsaid is None else self.unsaid
 
     @property
     def side(self) -> float:
@@ -131,10 +147,30 @@ class AppliedLoad:
 
 @dataclass(frozen=True)
 class Observation:
-    """Observed coordinates (J, 6) and their derivative (J, 6, 6) by the true ones."""
+    """Observed coordinates (J, 6) and their derivative (J, 6, 6) by the true ones.
+
+    ``by_above``, ``by_below`` : (J, 6, 6) by those of the joint above and below, or None for none.
+    """
 
     q: Array
     by_coordinate: Array
+    by_above: Array | None = None
+    by_below: Array | None = None
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What readings of joints may hang on besides their own motion.
+
+    Attributes
+    ----------
+    above, below : (J, 6) coordinates of the joint above and below each; zero where there is none.
+    passed : (J,) share of the test that has passed: of its time, else of its load steps.
+    """
+
+    above: Array
+    below: Array
+    passed: Array
 
 
 @dataclass(frozen=True)
@@ -297,4 +333,15 @@ class MeasurementEffect(Effect, Protocol):
         """Reported coordinates (J, 6) for true ones."""
 
     def by_parameter(self, q: Array, parameters: Array) -> Array:
+        """(J, 6, P) derivative of the reported coordinates by the parameters."""
+
+
+@runtime_checkable
+class MeasurementBeside(Effect, Protocol):
+    """Instruments that follow the neighbouring joints, or drift while a test goes on."""
+
+    def observe_beside(self, q: Array, parameters: Array, beside: Beside) -> Observation:
+        """Reported coordinates (J, 6) for true ones, and what stands beside them."""
+
+    def by_parameter_beside(self, q: Array, parameters: Array, beside: Beside) -> Array:
         """(J, 6, P) derivative of the reported coordinates by the parameters."""

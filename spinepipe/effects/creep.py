@@ -5,9 +5,17 @@ from typing import ClassVar
 
 import numpy as np
 
+from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Advance, Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES
+
+ELEMENTS = 5
+"""Retardation times, with equal parts: over three decades they are still less than one apart."""
+
+# Where their logarithms lie, evenly, with an SD of one.
+_DEVIATES = np.linspace(-1.0, 1.0, ELEMENTS)
+_DEVIATES = _DEVIATES / np.std(_DEVIATES)
 
 _FRACTION = Parameter(
     name="fraction",
@@ -30,7 +38,19 @@ _TIME = Parameter(
     logarithmic=True,
     meaning="time in which all but 1/e of that share is lost at constant motion",
 )
-
+_SPREAD = Parameter(
+    name="spread",
+    unit="1",
+    low=0.0,
+    high=2.5,
+    default=0.5,
+    prior_scale=0.75,
+    logarithmic=False,
+    meaning="SD of the logarithm of the times: 0 one time, 1 a stretched course, 2 one in log time",
+    family=True,
+    tried=(0.0,),
+    unsaid=0.0,
+)
 
 LOADS = ("held", "ramped")
 
@@ -38,16 +58,18 @@ LOADS = ("held", "ramped")
 @register("creep")
 @dataclass(frozen=True)
 class Creep:
-    """Holding load ``-fraction z``; z lags behind the load of the laws before, ``carried``.
+    """Five Kelvin-Voigt elements in line with what the laws before hold, ``carried``.
 
-    ``dz/dt = (carried - z) / time``: with a spring before it this is the standard linear solid,
-    whose stiffness is the spring's at once and ``1 - fraction`` of it in the end. z follows in
-    closed form to the end of a load step, x = seconds / time. Held: the load comes at once and
-    stays, ``carried - fraction z`` is constant, and
-    ``z (1 - fraction e) = (1 - fraction) e z0 + (1 - e) carried`` with e = exp(-(1 - fraction) x).
-    Ramped: carried grows in a straight line, and ``z = exp(-x) z0 + a carried0 + b carried`` with
-    b = 1 - (1 - exp(-x)) / x and a = 1 - exp(-x) - b. A step that takes no time moves nothing:
-    tests that record no time do not creep. Off: fraction 0.
+    At once the joint has their stiffness, in the end ``1 - fraction`` of it. The whole load, M, is
+    carried less what creep takes: ``carried = M + f / (1 - f) sum_i z_i / 5`` with the fraction f
+    and ``dz_i/dt = (M - z_i) / time_i``, the times around ``time / (1 - f)`` with ``spread`` as the
+    SD of their logarithm. Spread 0 is the standard linear solid (one element, relaxing in
+    ``time``); a wide one drifts by like amounts in each decade, as logarithmic and stretched creep
+    do (Prony series; Findley 1976, "Creep and relaxation of nonlinear viscoelastic materials").
+
+    z follows in closed form to the end of a load step. Held: the load comes at once and stays.
+    Ramped: it grows in a straight line. A step that takes no time moves nothing: tests that record
+    no time do not creep. Off: fraction 0.
 
     Options: ``coordinate``, the one whose load relaxes; ``load``, how it is applied in a step,
     ``held`` or ``ramped``.
@@ -58,113 +80,106 @@ class Creep:
     name: ClassVar[str] = "creep"
     kind: ClassVar[Kind] = Kind.PATH
     per_joint: ClassVar[bool] = True
-    n_states: ClassVar[int] = 2
-    parameters: ClassVar[tuple[Parameter, ...]] = (_FRACTION, _TIME)
+    n_states: ClassVar[int] = ELEMENTS + 1
+    parameters: ClassVar[tuple[Parameter, ...]] = (_FRACTION, _TIME, _SPREAD)
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": rotation} for rotation in ROTATIONS),
+        variants=tuple({"coordinate": c} for c in COORDINATES),
         spreads=PER_JOINT,
         told_by="recorded times, and a load that is held over several readings",
     )
 
     def __post_init__(self) -> None:
-        if self.coordinate not in COORDINATES:
-            raise ValueError(f"creep: coordinate {self.coordinate!r}; allowed: {COORDINATES}")
-        if self.load not in LOADS:
-            raise ValueError(f"creep: load {self.load!r}; allowed: {LOADS}")
+        require(self.name, "coordinate", self.coordinate, COORDINATES)
+        require(self.name, "load", self.load, LOADS)
 
     @property
     def _at(self) -> int:
         return COORDINATES.index(self.coordinate)
 
-    def _lag(
+    def _step(
         self, parameters: Array, state: Array, seconds: float | Array, carried: Array
-    ) -> "_Lag":
-        fraction, time = parameters.T
-        here = carried[:, self._at]
-        if self.load == "ramped":
-            return _ramped(time, state, seconds, here)
-        return _held(fraction, time, state, seconds, here)
+    ) -> "_Step":
+        here, ramped = carried[:, self._at], self.load == "ramped"
+        return _Step(parameters, state, np.asarray(seconds, dtype=float), here, ramped)
 
     def respond_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> JointResponse:
-        """Load (J, 6); state is (z, carried) of each joint at the end of the last step."""
-        at, lag = self._at, self._lag(parameters, state, seconds, carried)
+        """Load (J, 6); state is all z and M of each joint at the end of the last step."""
+        at, step = self._at, self._step(parameters, state, seconds, carried)
         load, by_carried = np.zeros_like(q), np.zeros((*q.shape, 6))
-        load[:, at] = -parameters[:, 0] * lag.z
-        by_carried[:, at, at] = -parameters[:, 0] * lag.by_carried
+        load[:, at] = step.whole - carried[:, at]
+        by_carried[:, at, at] = step.whole_by_carried - 1.0
         return JointResponse(load, np.zeros_like(by_carried), by_carried)
 
     def by_parameter_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
-        """(J, 6, 2): what lags, and its slope by the time."""
-        lag = self._lag(parameters, state, seconds, carried)
-        derivative = np.zeros((*q.shape, 2))
-        derivative[:, self._at, 0] = -lag.z - parameters[:, 0] * lag.by_fraction
-        derivative[:, self._at, 1] = -parameters[:, 0] * lag.by_time
+        """(J, 6, 3): by fraction, time and spread."""
+        derivative = np.zeros((*q.shape, 3))
+        step = self._step(parameters, state, seconds, carried)
+        derivative[:, self._at] = step.whole_by_parameter
         return derivative
 
     def by_state(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
-        """(J, 6, 2): by z and carried at the step's start."""
-        lag = self._lag(parameters, state, seconds, carried)
-        derivative = np.zeros((*q.shape, 2))
-        derivative[:, self._at] = -parameters[:, :1] * lag.by_state
+        """(J, 6, S): by all z and M at the step's start."""
+        derivative = np.zeros((*q.shape, self.n_states))
+        step = self._step(parameters, state, seconds, carried)
+        derivative[:, self._at] = step.whole_by_state
         return derivative
 
     def advance(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Advance:
-        """z and carried at the end of the step."""
-        here = carried[:, self._at]
-        lag = self._lag(parameters, state, seconds, carried)
-        by_parameter, by_state = np.zeros((2, len(q), 2, 2))
-        by_carried = np.zeros((len(q), 2, 6))
-        by_parameter[:, 0] = np.column_stack([lag.by_fraction, lag.by_time])
-        by_state[:, 0] = lag.by_state
-        by_carried[:, 0, self._at] = lag.by_carried
-        by_carried[:, 1, self._at] = 1.0
-        after = np.column_stack([lag.z, here])
+        """All z and M at the end of the step."""
+        step = self._step(parameters, state, seconds, carried)
+        towards = np.column_stack([step.now, np.ones(len(q))])  # (J, S) each state by M
+        by_carried = np.zeros((len(q), self.n_states, 6))
+        by_carried[:, :, self._at] = towards * step.whole_by_carried[:, None]
+        by_parameter = towards[:, :, None] * step.whole_by_parameter[:, None, :]
+        by_parameter[:, :-1] += step.z_by_parameter
+        by_state = towards[:, :, None] * step.whole_by_state[:, None, :]
+        own = np.arange(ELEMENTS)
+        by_state[:, own, own] += step.kept
+        by_state[:, :-1, -1] += step.before
+        after = np.column_stack([step.z, step.whole])
         return Advance(after, np.zeros_like(by_carried), by_parameter, by_state, by_carried)
 
 
-@dataclass(frozen=True)
-class _Lag:
-    """z (J,) at the end of a step and its derivatives; that by the state is (J, 2)."""
+class _Step:
+    """z (J, N) and M (J,) at the end of a step, and their derivatives.
 
-    z: Array
-    by_carried: Array
-    by_state: Array
-    by_fraction: Array
-    by_time: Array
+    ``z = kept z0 + before M0 + now M`` with kept = exp(-x), x = seconds / time_i; held: before = 0.
+    """
 
+    def __init__(
+        self, parameters: Array, state: Array, seconds: Array, carried: Array, ramped: bool
+    ) -> None:
+        fraction, time, spread = parameters.T
+        lost = fraction / (1.0 - fraction)
+        x = (seconds * (1.0 - fraction) / time)[:, None] * np.exp(-spread[:, None] * _DEVIATES)
+        self.kept = np.exp(-x)
+        mean = _mean(x) if ramped else self.kept
+        self.before, self.now = mean - self.kept, 1.0 - mean
+        z0, whole0 = state[:, :-1], state[:, -1:]
+        rest = self.kept * z0 + self.before * whole0
+        self.whole_by_carried = 1.0 / (1.0 + lost * self.now.mean(axis=1))
+        self.whole = (carried - lost * rest.mean(axis=1)) * self.whole_by_carried
+        self.z = rest + self.now * self.whole[:, None]
 
-def _held(
-    fraction: Array, time: Array, state: Array, seconds: float | Array, carried: Array
-) -> _Lag:
-    """What follows carried (J,) while the load is constant."""
-    x, z0 = seconds / time, state[:, 0]
-    kept = np.exp(-(1.0 - fraction) * x)
-    whole = 1.0 - fraction * kept
-    z = ((1.0 - fraction) * kept * z0 + (1.0 - kept) * carried) / whole
-    by_kept = ((1.0 - fraction) * z0 - carried + fraction * z) / whole
-    by_fraction = kept * (z - z0) / whole + by_kept * kept * x
-    by_state = np.column_stack([(1.0 - fraction) * kept / whole, np.zeros_like(z0)])
-    by_time = by_kept * kept * (1.0 - fraction) * x / time
-    return _Lag(z, (1.0 - kept) / whole, by_state, by_fraction, by_time)
-
-
-def _ramped(time: Array, state: Array, seconds: float | Array, carried: Array) -> _Lag:
-    """What follows a straight line to carried (J,) with a time constant."""
-    x = seconds / time
-    kept, mean, mean_slope = np.exp(-x), _mean(x), _mean_slope(x)
-    z0, carried0 = state.T
-    z = kept * z0 + (mean - kept) * carried0 + (1.0 - mean) * carried
-    by_x = kept * (carried0 - z0) + mean_slope * (carried0 - carried)
-    by_state = np.column_stack([kept, mean - kept])
-    return _Lag(z, 1.0 - mean, by_state, np.zeros_like(z), -x / time * by_x)
+        moved = -self.whole_by_carried * lost  # of M by the mean of z at fixed M
+        by_z0 = np.column_stack([self.kept, self.before.sum(axis=1)]) / ELEMENTS
+        self.whole_by_state = moved[:, None] * by_z0
+        slope = _mean_slope(x) if ramped else -self.kept
+        by_x = -self.kept * (z0 - whole0) + slope * (whole0 - self.whole[:, None])
+        by_logs = [-1.0 / (1.0 - fraction), -1.0 / time]
+        columns = [by_x * x * one[:, None] for one in by_logs] + [by_x * x * -_DEVIATES]
+        self.z_by_parameter = np.stack(columns, axis=2)
+        self.whole_by_parameter = moved[:, None] * self.z_by_parameter.mean(axis=1)
+        by_lost = -self.whole_by_carried * self.z.mean(axis=1)
+        self.whole_by_parameter[:, 0] += by_lost / (1.0 - fraction) ** 2
 
 
 def _mean(x: Array) -> Array:

@@ -9,7 +9,7 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import ramp
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
 SIDES = ("positive", "negative")
 
@@ -20,14 +20,23 @@ ROUNDED_RAD, ROUNDED_M = 3.5e-3, 2e-5
 # Hutton 1981, Spine 6:241); stiffness as large as that of the joint itself (Gould 2024b Table 2).
 _STOPS = {"extension": (2.0, 50.0), "right_bending": (2.0, 70.0), "left_rotation": (1.0, 290.0)}
 
+# Gap (mm) and stiffness (N/m), as large as that of a joint in shear and in compression.
+_STOPS_MM = {"anterior": (0.5, 1e5), "superior": (0.3, 5e5), "right": (0.5, 1e5)}
+
+REFERENCE_RAD, REFERENCE_M = float(np.deg2rad(2.0)), 5e-4
+"""How far beyond the gap the stop has the stated stiffness, whatever its exponent."""
+
 
 @register("facet_contact")
 @dataclass(frozen=True)
 class FacetContact:
-    """Adds ``side k ramp(side q - gap)`` on one coordinate; a stiffness k of zero is off.
+    """Adds ``side k over (over / reference)^(exponent - 1)`` on one coordinate; k of zero is off.
 
-    The ramp is zero inside the gap and straight beyond; a parabola over 0.2 deg (0.02 mm) to each
-    side of the gap joins the two.
+    ``over = ramp(side q - gap)`` is zero inside the gap and straight beyond; a parabola over
+    0.2 deg (0.02 mm) to each side of the gap joins the two. An exponent of 1 is a linear stop, 1.5
+    the contact of two curved faces (Hertz), and larger ones are near the exponentials that
+    cartilage is given in rigid-body models. At the reference of 2 deg (0.5 mm) beyond the gap all
+    of them have the stiffness k, as load over motion.
     """
 
     coordinate: str = "extension"
@@ -36,7 +45,7 @@ class FacetContact:
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c, "side": s} for c in ROTATIONS for s in SIDES),
+        variants=tuple({"coordinate": c, "side": s} for c in COORDINATES for s in SIDES),
         spreads=PER_JOINT,
         told_by="several load steps beyond the gap and within it, in both directions",
     )
@@ -50,36 +59,77 @@ class FacetContact:
         """The stop's stiffness, and the gap before it."""
         which = f"the stop to the {self.side} side of {self.coordinate}"
         hard, free = f"stiffness of {which}", f"motion before {which}"
+        exponent = Parameter(
+            "exponent",
+            "1",
+            1.0,
+            4.0,
+            1.25,
+            0.3,
+            True,
+            "how the stop hardens: 1 linear, 1.5 two curved faces, more near an exponential",
+            family=True,
+            tried=(0.0,),
+            unsaid=1.0,
+        )
         if self.coordinate in TRANSLATIONS:
+            gap_mm, size = _STOPS_MM[self.coordinate]
+            gap = gap_mm / 1e3
             return (
-                Parameter("stiffness", "N/m", 0.0, 1e10, 1e5, 1e5, False, hard, off=0.0),
-                Parameter("gap", "m", 0.0, 0.02, 5e-4, 5e-4, False, free),
+                Parameter("stiffness", "N/m", 0.0, 1e10, size, size, False, hard, off=0.0),
+                Parameter("gap", "m", 0.0, 0.02, gap, 0.5 * gap, False, free),
+                exponent,
             )
         gap_deg, size = _STOPS[self.coordinate]
         gap = float(np.deg2rad(gap_deg))
         return (
             Parameter("stiffness", "N m/rad", 0.0, 1e6, size, size, False, hard, off=0.0),
             Parameter("gap", "rad", 0.0, 0.5, gap, 0.5 * gap, False, free),
+            exponent,
         )
 
     def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:
         """Load (J, 6) and tangent (J, 6, 6) of the stop."""
-        at, side, over, slope = self._contact(q, parameters)
+        at, touch = self._at, self._contact(q, parameters)
         load, tangent = np.zeros_like(q), np.zeros((*q.shape, 6))
-        load[:, at] = side * parameters[:, 0] * over
-        tangent[:, at, at] = parameters[:, 0] * slope
+        load[:, at] = self._side * parameters[:, 0] * touch.value
+        tangent[:, at, at] = parameters[:, 0] * touch.by_motion
         return JointResponse(load, tangent)
 
     def by_parameter(self, q: Array, parameters: Array, carried: Array) -> Array:
-        """(J, 6, 2) by stiffness and gap."""
-        at, side, over, slope = self._contact(q, parameters)
-        derivative = np.zeros((*q.shape, 2))
-        derivative[:, at, 0] = side * over
-        derivative[:, at, 1] = -side * parameters[:, 0] * slope
+        """(J, 6, 3) by stiffness, gap and exponent."""
+        at, side, touch = self._at, self._side, self._contact(q, parameters)
+        derivative = np.zeros((*q.shape, 3))
+        derivative[:, at, 0] = side * touch.value
+        derivative[:, at, 1] = -side * parameters[:, 0] * touch.by_motion
+        derivative[:, at, 2] = side * parameters[:, 0] * touch.by_exponent
         return derivative
 
-    def _contact(self, q: Array, parameters: Array) -> tuple[int, float, Array, Array]:
-        """Column, direction of the stop, how far beyond the gap (J,) and its slope (J,)."""
-        at, side = COORDINATES.index(self.coordinate), 1.0 if self.side == "positive" else -1.0
-        width = ROUNDED_M if self.coordinate in TRANSLATIONS else ROUNDED_RAD
-        return at, side, *ramp(side * q[:, at] - parameters[:, 1], width)
+    @property
+    def _at(self) -> int:
+        return COORDINATES.index(self.coordinate)
+
+    @property
+    def _side(self) -> float:
+        return 1.0 if self.side == "positive" else -1.0
+
+    def _contact(self, q: Array, parameters: Array) -> "_Contact":
+        shift = self.coordinate in TRANSLATIONS
+        width, reference = (ROUNDED_M, REFERENCE_M) if shift else (ROUNDED_RAD, REFERENCE_RAD)
+        over, slope = ramp(self._side * q[:, self._at] - parameters[:, 1], width)
+        power = parameters[:, 2] - 1.0
+        log = np.log(np.maximum(over / reference, _LEAST))  # what is not over has no load
+        hard = np.where(over > 0.0, np.exp(power * log), 0.0)
+        return _Contact(over * hard, (1.0 + power) * hard * slope, over * hard * log)
+
+
+@dataclass(frozen=True)
+class _Contact:
+    """Load (J,) of a stop of stiffness 1, by motion to its side and by the exponent."""
+
+    value: Array
+    by_motion: Array
+    by_exponent: Array
+
+
+_LEAST = 1e-150

@@ -7,7 +7,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import sign
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
 ROUNDED_RAD, ROUNDED_M = 1.7e-3, 1e-5
 """Width of the smooth sign: 0.1 deg, or 0.01 mm."""
@@ -29,7 +29,7 @@ class FlexionExtensionAsymmetry(CarriedShare):
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c} for c in ROTATIONS),
+        variants=tuple({"coordinate": c} for c in COORDINATES),
         spreads=PER_JOINT,
         told_by="the same load in both directions",
     )

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import (
+    ALL,
     ALL_ROTATIONS,
     CarriedShare,
     Share,
@@ -13,13 +14,13 @@ from spinepipe.effects.carried_share import (
 )
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import Spread, Trial, register
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES
 
 
 @register("level_dependence")
 @dataclass(frozen=True)
 class LevelDependence(CarriedShare):
-    """Multiplies the carried load of one coordinate, or of all rotations, by ``ratio``; 1 is off.
+    """Multiplies the carried load of one coordinate, all rotations or all by ``ratio``; 1 is off.
 
     Levels T12L1 to L5S1 of Gould 2024b (Table 2) differ by a factor of two to six: the logarithm
     has an SD of 0.45 in extension, 0.7 in bending and 0.4 in rotation.
@@ -30,13 +31,13 @@ class LevelDependence(CarriedShare):
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
+        variants=tuple({"coordinate": c} for c in (*COORDINATES, ALL_ROTATIONS, ALL)),
         spreads=(Spread.BY_JOINT,),
         told_by="motion of every level, with a base that gives all levels the same stiffness",
     )
 
     def __post_init__(self) -> None:
-        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS))
+        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS, ALL))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import (
+    ALL,
     ALL_ROTATIONS,
     CarriedShare,
     Share,
@@ -13,13 +14,13 @@ from spinepipe.effects.carried_share import (
 )
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import Spread, Trial, register
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES
 
 
 @register("local_laxity")
 @dataclass(frozen=True)
 class LocalLaxity(CarriedShare):
-    """Takes ``fraction`` of the carried load of one coordinate, or of all rotations; 0 is off.
+    """Takes ``fraction`` of the carried load of one coordinate, all rotations or all; 0 is off.
 
     A cut ligament or a degenerate disc of one joint of one specimen, of any size up to the loss
     of nearly all resistance.
@@ -30,13 +31,13 @@ class LocalLaxity(CarriedShare):
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
+        variants=tuple({"coordinate": c} for c in (*COORDINATES, ALL_ROTATIONS, ALL)),
         spreads=(Spread.ONE,),
         told_by="motion of every level of several specimens, with a base that shares stiffness",
     )
 
     def __post_init__(self) -> None:
-        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS))
+        require(self.name, "coordinate", self.coordinate, (*COORDINATES, ALL_ROTATIONS, ALL))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -7,19 +7,23 @@ import numpy as np
 
 from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
+from spinepipe.effects.knee import chord, inside
 from spinepipe.effects.registry import PER_JOINT, Trial, register
-from spinepipe.effects.rounding import ramp
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
-ROUNDED = 0.1
-"""Share of the width, to each side of the corner, over which the corner is rounded."""
+ZONES = ("centred", "off_centre")
 
 WIDEST = 5.0
-"""Times the usual width at most: beyond, all motion lies inside and the joint is but softer."""
+"""Times the usual width at most, of rotations: beyond, all motion lies inside."""
+
+AS_BEFORE = 30.0
+"""Sharpness of files that do not name it: the corner was then rounded over a tenth of the width to
+each side, and the law is the same to 0.3 % of the width times the stiffness lost in the zone."""
 
 # Half widths near those of lumbar joints: Yamamoto 1989 (Spine 14:1256), 1 to 2 deg in bending
-# of either kind and less in axial rotation. Translations: a tenth of a millimetre.
+# of either kind and less in axial rotation. Shear and compression: zones of 0.3 to 1.2 mm.
 _HALF_WIDTH_DEG = {"extension": 1.5, "right_bending": 1.5, "left_rotation": 0.5}
+_HALF_WIDTH_MM = {"anterior": 0.3, "superior": 0.15, "right": 0.3}
 
 
 @register("neutral_zone")
@@ -27,55 +31,77 @@ _HALF_WIDTH_DEG = {"extension": 1.5, "right_bending": 1.5, "left_rotation": 0.5}
 class NeutralZone(CarriedShare):
     """Load ``carried (1 - (1 - ratio) g(q / width))`` on one coordinate; a ratio of 1 is off.
 
-    g is 1 within ±1 and 1/|u| beyond: a linear spring has ``ratio`` times its stiffness inside
-    the zone and runs parallel to its old line outside. The corner is rounded over a tenth of the
-    width to each side. Neutral zone: Panjabi 1992 (J Spinal Disord 5:390).
+    ``g(u) = (1 + |u|^n)^(-1/n)`` with the sharpness n: a linear spring has ``ratio`` times its
+    stiffness inside the zone and runs parallel to its old line outside. A small n is a smooth
+    change (2.7 follows ``k q - (1 - ratio) k w tanh(q / w)`` to 0.6 % of what the zone takes off),
+    a large one a corner. Neutral zone: Panjabi 1992 (J Spinal Disord 5:390).
+
+    A zone that is ``off_centre`` has its centre at ``offset`` widths from the neutral pose, and g
+    is the mean slope of u g(u) from the neutral pose on: there the load is zero still. With the
+    neutral pose at an end of the zone it would be an asymmetry by another name.
     """
 
     coordinate: str = "extension"
+    zone: str = "centred"
     name: ClassVar[str] = "neutral_zone"
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c} for c in ROTATIONS),
+        variants=tuple(
+            {"coordinate": c, **zone} for zone in ({}, {"zone": "off_centre"}) for c in COORDINATES
+        ),
         spreads=PER_JOINT,
         told_by="load steps small enough to stay near the neutral pose, and large ones",
     )
 
     def __post_init__(self) -> None:
         require(self.name, "coordinate", self.coordinate, COORDINATES)
+        require(self.name, "zone", self.zone, ZONES)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The stiffness ratio inside the zone, and the zone's half width."""
-        ratio = Parameter(
-            "stiffness_ratio",
+        """The stiffness ratio inside the zone, its half width, its sharpness, and its offset."""
+        inside_it = f"stiffness in {self.coordinate} inside the zone over that outside"
+        ratio = Parameter("stiffness_ratio", "1", 0.0, 1.0, 0.3, 0.5, False, inside_it, off=1.0)
+        sharp = "how sharp the ends of the zone are: 3 smooth, 30 a corner"
+        sharpness = Parameter(
+            "sharpness",
             "1",
-            0.0,
-            1.0,
-            0.3,
-            0.5,
-            False,
-            f"stiffness in {self.coordinate} inside the zone over that outside",
-            off=1.0,
+            2.0,
+            50.0,
+            12.0,
+            0.8,
+            True,
+            sharp,
+            family=True,
+            tried=(0.0,),
+            unsaid=AS_BEFORE,
         )
+        if self.zone == "centred":
+            return ratio, self._width, sharpness
+        beside = "where the zone's centre is, in half widths from the neutral pose"
+        offset = Parameter("offset", "1", -0.8, 0.8, 0.0, 0.4, False, beside, tried=(-1.0, 1.0))
+        return ratio, self._width, sharpness, offset
+
+    @property
+    def _width(self) -> Parameter:
         meaning = f"half width of the neutral zone in {self.coordinate}"
+        tried = (-1.0, 0.0, 1.0) if self.zone == "centred" else (0.0,)
         if self.coordinate in TRANSLATIONS:
-            return ratio, Parameter("width", "m", 1e-6, 0.02, 1e-4, 1.0, True, meaning)
-        width = float(np.deg2rad(_HALF_WIDTH_DEG[self.coordinate]))
-        return ratio, Parameter("width", "rad", 1e-4, WIDEST * width, width, 0.7, True, meaning)
+            unit, width, low, high = "m", _HALF_WIDTH_MM[self.coordinate] / 1e3, 1e-6, 0.02
+        else:
+            unit, width, low = "rad", float(np.deg2rad(_HALF_WIDTH_DEG[self.coordinate])), 1e-4
+            high = WIDEST * width
+        return Parameter("width", unit, low, high, width, 0.7, True, meaning, tried=tried)
 
     def share(self, q: Array, parameters: Array) -> Share:
-        """``(ratio - 1) g(q / width)``."""
-        ratio, width = parameters[:, :1], parameters[:, 1:]
-        g, by_u = _inside(q / width)
-        slope = (ratio - 1.0) * by_u / width
-        return Share((ratio - 1.0) * g, slope, np.stack([g, -slope * q / width], axis=2))
-
-
-def _inside(u: Array) -> tuple[Array, Array]:
-    """``min(1, 1 / |u|)`` with its corner rounded, and its slope."""
-    size = np.abs(u)
-    over, slope = ramp(size - 1.0, ROUNDED)
-    safe = np.maximum(size, 1.0 - ROUNDED)  # nothing is over nearer to zero
-    return 1.0 - over / safe, -np.sign(u) * (slope - over / safe) / safe
+        """``(ratio - 1) g``; derivatives by ratio, width, sharpness and offset."""
+        ratio, width, n = parameters[:, :1], parameters[:, 1:2], parameters[:, 2:3]
+        softer, u = ratio - 1.0, q / width
+        if self.zone == "centred":
+            g, by_u, by_n = inside(u, n)
+            columns = [g, -softer * by_u * u / width, softer * by_n]
+        else:
+            g, by_u, by_n, by_offset = chord(u, n, parameters[:, 3:4])
+            columns = [g, -softer * by_u * u / width, softer * by_n, softer * by_offset]
+        return Share(softer * g, softer * by_u / width, np.stack(columns, axis=2))

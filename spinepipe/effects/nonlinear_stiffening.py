@@ -10,10 +10,10 @@ from numpy.polynomial.polynomial import polyval
 from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
-from spinepipe.effects.rounding import magnitude
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.effects.rounding import magnitude, ramp
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
-SHAPES = ("exponential", "tangent", "cubic")
+SHAPES = ("exponential", "tangent", "cubic", "bilinear")
 
 STEEPEST_EXPONENT = 10.0
 """Exponent beyond which the exponential goes on straight: 22,000 times the stiffness at zero."""
@@ -23,6 +23,9 @@ STEEPEST_ANGLE = 1.4
 
 ROUNDED_RAD, ROUNDED_M = 1e-4, 1e-6
 """Width over which the exponential's |q| is rounded, for laws that carry load at zero."""
+
+ROUNDED = 0.1
+"""Share of the break, to each side of it, over which the corner of the bilinear law is rounded."""
 
 # Taylor series about 0 of (exp(v) - 1) / v and of tan(x) / x in v = x^2, from the term in v on,
 # and of their derivatives; exact to rounding below the limit.
@@ -46,6 +49,11 @@ _RISE_OF_TRANSLATION = {
     "cubic": (2e5, 1e10, "1/m^2"),
 }
 
+# The break, and the least that is one: within twice a usual neutral zone the same curve is that.
+_BREAK_DEG = {"extension": (4.0, 3.0), "right_bending": (4.0, 3.0), "left_rotation": (1.5, 1.0)}
+_BREAK_MM = {"anterior": (1.5, 0.6), "superior": (0.6, 0.3), "right": (1.5, 0.6)}
+_MOST_RAD, _MOST_M = 0.5, 0.03
+
 
 @register("nonlinear_stiffening")
 @dataclass(frozen=True)
@@ -54,12 +62,15 @@ class NonlinearStiffening(CarriedShare):
 
     - exponential: ``k sign(q) (exp(b |q|) - 1) / b``, rate b; straight on beyond b |q| = 10;
     - tangent: ``k tan(sqrt(g) q) / sqrt(g)``, growth g; straight on beyond sqrt(g) |q| = 1.4;
-    - cubic: ``k q (1 + g q^2)``, growth g.
+    - cubic: ``k q (1 + g q^2)``, growth g;
+    - bilinear: ``k q`` up to the break, with a slope of ``(1 + gain) k`` beyond; the corner is
+      rounded over a tenth of the break to each side.
 
-    Zero is off. Exponential: Wang 2021 eq. 3, ``A (exp(B q) - 1)`` with B = b, A = k / b, here the
-    same on both sides (DOI 10.1007/s10439-021-02774-3). Tangent: Jalalian 2017 eq. 1,
-    ``A (tan(B r + C) + D)`` with B = sqrt(g), A = k / B and equal ranges of motion, C = D = 0
-    (DOI 10.1007/s11517-016-1576-8).
+    Zero is off. A bilinear law and a corner of a neutral zone are one curve: it has the one name
+    where it breaks late, the other within about twice the usual zone. Exponential: Wang 2021 eq. 3,
+    ``A (exp(B q) - 1)`` with B = b, A = k / b, here the same on both sides (DOI
+    10.1007/s10439-021-02774-3). Tangent: Jalalian 2017 eq. 1, ``A (tan(B r + C) + D)`` with
+    B = sqrt(g), A = k / B and equal ranges of motion, C = D = 0 (DOI 10.1007/s11517-016-1576-8).
     """
 
     coordinate: str = "extension"
@@ -68,7 +79,7 @@ class NonlinearStiffening(CarriedShare):
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c, "shape": s} for c in ROTATIONS for s in SHAPES),
+        variants=tuple({"coordinate": c, "shape": s} for c in COORDINATES for s in SHAPES),
         spreads=PER_JOINT,
         told_by="several load steps up to a large motion, in both directions",
     )
@@ -79,15 +90,32 @@ class NonlinearStiffening(CarriedShare):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The rate of the exponential, or the growth of the other shapes."""
+        """The rate of the exponential, the growth of other shapes, or the gain and its break."""
+        if self.shape == "bilinear":
+            return self._gain_and_break
         sizes = _RISE_OF_TRANSLATION if self.coordinate in TRANSLATIONS else _RISE
         size, most, unit = sizes[self.shape]
         name = "rate" if self.shape == "exponential" else "growth"
         meaning = f"how fast resistance in {self.coordinate} grows with the motion"
         return (Parameter(name, unit, 0.0, most, size, size, False, meaning, off=0.0),)
 
+    @property
+    def _gain_and_break(self) -> tuple[Parameter, Parameter]:
+        gained = f"stiffness in {self.coordinate} gained beyond the break, as a share"
+        gain = Parameter("gain", "1", 0.0, 1e4, 1.0, 1.0, False, gained, off=0.0)
+        where, tried = f"motion in {self.coordinate} at which it stiffens", (-1.0, 1.0)
+        if self.coordinate in TRANSLATIONS:
+            unit, most = "m", _MOST_M
+            at, low = (mm / 1e3 for mm in _BREAK_MM[self.coordinate])
+        else:
+            unit, most = "rad", _MOST_RAD
+            at, low = (float(np.deg2rad(deg)) for deg in _BREAK_DEG[self.coordinate])
+        return gain, Parameter("break_at", unit, low, most, at, 0.4, True, where, tried=tried)
+
     def share(self, q: Array, parameters: Array) -> Share:
-        """``factor(strength * size(q)) - 1`` with size |q| or q^2."""
+        """``factor(strength * size(q)) - 1`` with size |q| or q^2; of the bilinear, its own."""
+        if self.shape == "bilinear":
+            return _beyond(q, parameters[:, :1], parameters[:, 1:])
         size, by_q = self._size(q)
         value, slope = _SHARES[self.shape](parameters * size)
         return Share(value, slope * parameters * by_q, (slope * size)[:, :, None])
@@ -123,6 +151,16 @@ def _tangent(v: Array) -> tuple[Array, Array]:
 
 def _cubic(v: Array) -> tuple[Array, Array]:
     return v, np.ones_like(v)
+
+
+def _beyond(q: Array, gain: Array, at: Array) -> Share:
+    """``gain (|q| - break) / |q|`` beyond the break, by gain and break."""
+    u = np.abs(q) / at
+    over, slope = ramp(u - 1.0, ROUNDED)
+    safe = np.maximum(u, 1.0 - ROUNDED)  # nothing is over nearer to zero
+    value, by_u = over / safe, (slope - over / safe) / safe
+    columns = [value, -gain * by_u * u / at]
+    return Share(gain * value, gain * by_u * np.sign(q) / at, np.stack(columns, axis=2))
 
 
 _SHARES: dict[str, Callable[[Array], tuple[Array, Array]]] = {

@@ -1,4 +1,4 @@
-"""Preload stiffening: a joint under compression resists rotation more."""
+"""Preload stiffening: a joint under compression resists rotation and shear more."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -8,20 +8,25 @@ import numpy as np
 from spinepipe.effects.carried_share import ALL_ROTATIONS, columns_of, require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES
 
 _SUPERIOR = COORDINATES.index("superior")
+
+STIFFENED = (*(c for c in COORDINATES if c != "superior"), ALL_ROTATIONS)
+"""Compression itself is not among them: it would stiffen by its own motion, which is
+`nonlinear_stiffening` in superior."""
 
 
 @register("preload_stiffening")
 @dataclass(frozen=True)
 class PreloadStiffening:
-    """Adds ``carried rise compression`` on one rotation or all; zero is off.
+    """Adds ``carried rise compression`` on one coordinate or all rotations; zero is off.
 
     Compression (N) is ``-carried[superior]``, the joint's own; under traction it is negative and
-    the joint resists less. Rotation gives no compression back, so the law has no potential: with
-    hardly any damping a strong rise can make a joint flutter. Stiffness about doubles under 500 N
-    (Gardner-Morse and Stokes 2003, J Orthop Res 21:547) to 2 kN (Janevic 1991, J Orthop Res 9:228).
+    the joint resists less. Other motion gives no compression back, so the law has no potential:
+    with hardly any damping a strong rise can make a joint flutter. Stiffness about doubles under
+    500 N (Gardner-Morse and Stokes 2003, J Orthop Res 21:547) to 2 kN (Janevic 1991, J Orthop Res
+    9:228).
     """
 
     coordinate: str = "extension"
@@ -29,13 +34,13 @@ class PreloadStiffening:
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     trial: ClassVar[Trial] = Trial(
-        variants=tuple({"coordinate": c} for c in (*ROTATIONS, ALL_ROTATIONS)),
+        variants=tuple({"coordinate": c} for c in STIFFENED),
         spreads=PER_JOINT,
         told_by="the same moments under two different compressive preloads",
     )
 
     def __post_init__(self) -> None:
-        require(self.name, "coordinate", self.coordinate, (*ROTATIONS, ALL_ROTATIONS))
+        require(self.name, "coordinate", self.coordinate, STIFFENED)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -206,7 +206,7 @@ def _values(
     """(R, P) values of the joints in scope; one row for effects that are not per joint."""
     names = [parameter.name for parameter in effect.parameters]
     rows = joints if effect.per_joint else ["*"]
-    values = np.tile([parameter.default for parameter in effect.parameters], (len(rows), 1))
+    values = np.tile([parameter.in_a_file for parameter in effect.parameters], (len(rows), 1))
     given = entry.values
     if left_out:  # the last row that fits counts
         given = tuple(sorted(given, key=lambda row: row.specimen == "*"))

@@ -13,7 +13,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import Field, fields
 from functools import cache, partial
 from math import inf
 from pathlib import Path
@@ -29,6 +29,7 @@ from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_form, every_kind
 from spinepipe.tables.schema import Column, Table
+from spinepipe.testing_machine.settings import MachineMapping
 
 _HEAD = ("parameter", "unit", "bounds", "off", "default", "prior SD", "meaning")
 
@@ -115,6 +116,7 @@ def generators() -> dict[str, Callable[[], str]]:
     }
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
+    parts["keys import"] = partial(key_table, MachineMapping)
     parts["keys model"] = partial(key_table, ModelFile)
     parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts
@@ -316,16 +318,18 @@ def _options(cls: type, trial: Trial | None) -> str:
     """Each option with its default and what a search tries."""
     told = []
     for field in fields(cls):
-        tried = _tried(trial, field.name)
+        tried = _tried(trial, field)
         others = f" (a search tries {', '.join(map(_typed, tried))})" if len(tried) > 1 else ""
         told.append(f"{code(field.name)}, by default {_typed(field.default)}{others}")
     return f"Options: {'; '.join(told)}." if told else ""
 
 
-def _tried(trial: Trial | None, option: str) -> list[Any]:
-    """The values of an option among the variants, each once."""
+def _tried(trial: Trial | None, option: Field[Any]) -> list[Any]:
+    """The values of an option among the variants, each once; its default where none is named."""
     variants = trial.variants if trial else ()
-    return list(dict.fromkeys(one[option] for one in variants if option in one))
+    if not any(option.name in one for one in variants):
+        return []
+    return list(dict.fromkeys(one.get(option.name, option.default) for one in variants))
 
 
 def _typed(value: Any) -> str:
@@ -355,7 +359,7 @@ def _other_options(name: str, trial: Trial | None) -> Iterator[tuple[str, tuple[
     """Parameters with one option at a time away from its default, among those that are tried."""
     effect_class = registered()[name]
     for field in fields(effect_class):
-        for value in _tried(trial, field.name):
+        for value in _tried(trial, field):
             if value != field.default:
                 options: Mapping[str, Any] = {field.name: value}
                 yield f"{field.name}: {value}", create(name, options).parameters

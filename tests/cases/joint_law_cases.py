@@ -1,4 +1,4 @@
-"""The joint laws a search may try, in every variant, and some on translations."""
+"""The joint laws a search may try, in every variant."""
 
 from typing import Any
 
@@ -19,20 +19,6 @@ NAMES = (
     "preload_stiffening",
 )
 
-ON_TRANSLATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
-    *(
-        ("nonlinear_stiffening", {"coordinate": "superior", "shape": shape})
-        for shape in ("exponential", "tangent", "cubic")
-    ),
-    ("neutral_zone", {"coordinate": "anterior"}),
-    ("flexion_extension_asymmetry", {"coordinate": "right"}),
-    ("bending_rotation_coupling", {"pair": ("anterior", "extension")}),
-    ("bending_rotation_coupling", {"pair": ("anterior", "superior")}),
-    ("facet_contact", {"coordinate": "anterior", "side": "negative"}),
-    ("level_dependence", {"coordinate": "right"}),
-    ("local_laxity", {"coordinate": "superior"}),
-)
-
 VARIANTS = tuple((name, dict(v)) for name in NAMES for v in registered()[name].trial.variants)
 
 
@@ -41,8 +27,7 @@ def title(variant: tuple[str, dict[str, Any]]) -> str:
     return "-".join([name, *map(str, options.values())])
 
 
-SEARCHED = pytest.mark.parametrize("variant", VARIANTS, ids=title)
-EVERY = pytest.mark.parametrize("variant", [*VARIANTS, *ON_TRANSLATIONS], ids=title)
+EVERY = pytest.mark.parametrize("variant", VARIANTS, ids=title)
 DEFAULT = pytest.mark.parametrize("name", NAMES)
 
 

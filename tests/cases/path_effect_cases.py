@@ -17,11 +17,19 @@ EXTENSION_SPRING = 41.0
 
 
 def friction(
-    n: int, moment: float = 0.5, yield_deg: float = 1.0, coordinate: str = "extension"
+    n: int,
+    moment: float = 0.5,
+    yield_deg: float = 1.0,
+    coordinate: str = "extension",
+    spread: float | None = None,
 ) -> ScopedEffect:
-    """Hysteresis in all n joints."""
-    effect = create("hysteresis", {"coordinate": coordinate})
-    return scoped(effect, tuple(range(n)), (moment, np.deg2rad(yield_deg)))
+    """Hysteresis in all n joints, by Dahl's law; by Jenkins elements where they have a spread."""
+    values = (moment, np.deg2rad(yield_deg))
+    if spread is None:
+        effect = create("hysteresis", {"coordinate": coordinate})
+        return scoped(effect, tuple(range(n)), values)
+    effect = create("hysteresis", {"coordinate": coordinate, "law": "jenkins"})
+    return scoped(effect, tuple(range(n)), (*values, spread))
 
 
 def creeping(
@@ -30,10 +38,11 @@ def creeping(
     time: float = 3.0,
     coordinate: str = "extension",
     load: str = "held",
+    spread: float = 0.0,
 ) -> ScopedEffect:
     """Creep in all n joints."""
     effect = create("creep", {"coordinate": coordinate, "load": load})
-    return scoped(effect, tuple(range(n)), (fraction, time))
+    return scoped(effect, tuple(range(n)), (fraction, time, spread))
 
 
 def turning(

@@ -31,14 +31,15 @@ Add = Callable[[Any], None]
 EXPONENTIAL = "k*#*(exp(b*s)-1)/(b*s); s=sqrt(#^2+{rounded}^2); b={0}"
 TANGENT = "k*tan(sqrt(g)*#)/sqrt(g); g={0}"
 CUBIC = "k*#*(1+g*#^2); g={0}"
-NEUTRAL_ZONE = (
-    "k*(#-(1-r)*w*side*(u-over)); over=t^2/(4*d)+max(u-1-d,0); t=min(max(u-1+d,0),2*d);"
-    "u=abs(#)/w; side=2*step(#)-1; d=0.1; r={0}; w={1}"
-)
+NEUTRAL_ZONE = "k*#*(1-(1-r)*(1+u^n)^(-1/n)); u=abs(#)/w; r={0}; w={1}; n={2}"
 ASYMMETRY = "k*#*(1+a*(1-2/(exp(2*#/{rounded})+1))); a={0}"
+BILINEAR = (
+    "k*(#+gain*at*side*(t^2/(4*d)+max(u-1-d,0))); t=min(max(u-1+d,0),2*d); u=abs(#)/at;"
+    "side=2*step(#)-1; d=0.1; gain={0}; at={1}"
+)
 STOP = (
-    "k*#+side*c*(t^2/(4*d)+max(x-d,0)); t=min(max(x+d,0),2*d); x=side*#-gap;"
-    "c={0}; gap={1}; d={rounded}; side={side}"
+    "k*#+side*c*over*(max(over,1e-12)/{reference})^(p-1); over=t^2/(4*d)+max(x-d,0);"
+    "t=min(max(x+d,0),2*d); x=side*#-gap; c={0}; gap={1}; p={2}; d={rounded}; side={side}"
 )
 SCALED = "k*#*{0}"
 LAX = "k*#*(1-{0})"
@@ -49,7 +50,11 @@ def on(
 ) -> Any:
     options = {"coordinate": coordinate, **more}
     sides = {"positive": 1, "negative": -1}
-    numbers = {"rounded": rounded, "side": sides.get(more.get("side", ""), 0)}
+    numbers = {
+        "rounded": rounded,
+        "side": sides.get(more.get("side", ""), 0),
+        "reference": np.deg2rad(2.0),
+    }
     label = "-".join([name, coordinate, *more.values()])
     return pytest.param(name, options, values, law, numbers, id=label)
 
@@ -83,10 +88,22 @@ ONE_COORDINATE = [
         shape="exponential",
     ),
     *(
-        on("neutral_zone", c, ((0.3, 0.03), (0.6, 0.04), (0.1, 0.01)), NEUTRAL_ZONE)
+        on("neutral_zone", c, ((0.3, 0.03, 6.0), (0.6, 0.04, 2.0), (0.1, 0.01, 30.0)), NEUTRAL_ZONE)
         for c in COORDINATES[3:]
     ),
-    on("neutral_zone", "anterior", ((0.3, 1e-4), (0.6, 2e-4), (0.4, 1e-3)), NEUTRAL_ZONE),
+    on(
+        "neutral_zone",
+        "anterior",
+        ((0.3, 1e-4, 2.7), (0.6, 2e-4, 6.0), (0.4, 1e-3, 12.0)),
+        NEUTRAL_ZONE,
+    ),
+    on(
+        "nonlinear_stiffening",
+        "left_rotation",
+        ((1.0, 0.018), (3.0, 0.0176), (5.0, 0.02)),
+        BILINEAR,
+        shape="bilinear",
+    ),
     *(
         on("flexion_extension_asymmetry", c, ((0.2,), (-0.4,), (0.7,)), ASYMMETRY, 1.7e-3)
         for c in COORDINATES[3:]
@@ -95,7 +112,7 @@ ONE_COORDINATE = [
         on(
             "facet_contact",
             c,
-            ((100.0, 0.01), (300.0, 0.005), (50.0, 0.0)),
+            ((100.0, 0.01, 1.0), (300.0, 0.005, 1.5), (50.0, 0.0, 3.0)),
             STOP,
             3.5e-3,
             side=side,

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -65,12 +67,52 @@ class TestOneJoint:
         (expected,) = roots[np.abs(roots.imag) < 1e-9].real
         assert found[3] == pytest.approx(expected, abs=1e-14)
 
-    def test_neutral_zone(self, moment: float) -> None:
-        found = angle(moment, "neutral_zone", {}, 0.4, 0.06)
+    def test_bilinear(self, moment: float) -> None:
+        found = angle(moment, "nonlinear_stiffening", {"shape": "bilinear"}, 1.5, 0.08)
+        beyond = (abs(moment) - K * 0.08) / (2.5 * K)
+        expected = moment / K if beyond < 0.0 else np.sign(moment) * (0.08 + beyond)
+        assert found[3] == pytest.approx(expected, abs=1e-14)
+
+    @pytest.mark.parametrize("sharpness", [2.0, 2.7, 6.0, 30.0])
+    def test_neutral_zone(self, moment: float, sharpness: float) -> None:
+        found = angle(moment, "neutral_zone", {}, 0.4, 0.06, sharpness)
+
+        def left(q: float) -> float:
+            taken = 0.6 * K * q / (1.0 + abs(q / 0.06) ** sharpness) ** (1.0 / sharpness)
+            return K * q - taken - moment
+
+        assert found[3] == pytest.approx(brentq(left, -0.5, 0.5, xtol=1e-15), abs=1e-13)
+
+    def test_neutral_zone_with_a_corner(self, moment: float) -> None:
+        found = angle(moment, "neutral_zone", {}, 0.4, 0.06, 50.0)
         inside = moment / (0.4 * K)
         outside = np.sign(moment) * (abs(moment) / K + 0.6 * 0.06)
-        expected = inside if abs(inside) < 0.054 else outside
-        assert found[3] == pytest.approx(expected, abs=1e-14)
+        # the corner is felt by (5/6)^50 / 50 of the motion inside, by 3^-50 outside
+        assert found[3] == pytest.approx(inside if abs(inside) < 0.06 else outside, abs=1e-6)
+
+    def test_a_smooth_zone_is_nearly_the_hyperbolic_tangent(self, moment: float) -> None:
+        """Within 2 % of what the zone takes off in all: load = k q - lost w tanh(q / w)."""
+        found = angle(moment, "neutral_zone", {}, 0.4, 0.04, 2.7)
+
+        def left(q: float) -> float:
+            return K * q - 0.6 * K * 0.04 * np.tanh(q / 0.04) - moment
+
+        expected = brentq(left, -0.5, 0.5, xtol=1e-15)
+        assert found[3] == pytest.approx(expected, abs=0.02 * 0.6 * 0.04 / 0.4)
+
+    @pytest.mark.parametrize("offset", [-0.8, 0.3, 0.8])
+    def test_neutral_zone_off_centre(self, moment: float, offset: float) -> None:
+        values = (0.4, 0.06, 2.7, offset)
+        found = angle(moment, "neutral_zone", {"zone": "off_centre"}, *values)
+
+        def taken(q: float) -> float:  # the integral of the stiffness that the zone takes off
+            return quad(lambda at: 0.6 * K * lost(at / 0.06 - offset), 0.0, q, limit=200)[0]
+
+        def lost(u: float) -> float:  # slope of u / (1 + |u|^n)^(1/n)
+            return float((1.0 + abs(u) ** 2.7) ** (-1.0 / 2.7 - 1.0))
+
+        expected = brentq(lambda q: K * q - taken(q) - moment, -0.5, 0.5, xtol=1e-14)
+        assert found[3] == pytest.approx(expected, abs=1e-10)
 
     def test_asymmetry(self, moment: float) -> None:
         found = angle(moment, "flexion_extension_asymmetry", {}, 0.2)
@@ -80,10 +122,19 @@ class TestOneJoint:
 
     @pytest.mark.parametrize(("side", "way"), [("positive", 1.0), ("negative", -1.0)])
     def test_stop(self, moment: float, side: str, way: float) -> None:
-        found = angle(moment, "facet_contact", {"side": side}, 100.0, 0.05)
+        found = angle(moment, "facet_contact", {"side": side}, 100.0, 0.05, 1.0)
         free, stopped = moment / K, (moment + way * 100.0 * 0.05) / (K + 100.0)
         expected = stopped if way * free > 0.05 else free
         assert found[3] == pytest.approx(expected, abs=1e-14)
+
+    def test_a_stop_of_two_curved_faces(self, moment: float) -> None:
+        """Hertz: load over the power 3/2 of how far they approach."""
+        found = angle(moment, "facet_contact", {"side": "positive"}, 100.0, 0.05, 1.5)
+
+        def left(q: float) -> float:
+            return K * q + 100.0 / np.deg2rad(2.0) ** 0.5 * max(q - 0.05, 0.0) ** 1.5 - moment
+
+        assert found[3] == pytest.approx(brentq(left, -0.5, 0.5, xtol=1e-15), abs=1e-13)
 
     def test_level_and_laxity(self, moment: float) -> None:
         stiff, lax = (

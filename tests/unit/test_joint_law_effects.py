@@ -5,7 +5,7 @@ import pytest
 from joint_law_cases import DEFAULT, EVERY, law_of
 
 from spinepipe.effects import JointLaw, Kind, Spread, create, registered
-from spinepipe.units import COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATES
 
 
 def column(coordinate: str) -> int:
@@ -58,13 +58,39 @@ def test_cube_of_a_spring() -> None:
 
 def test_a_spring_with_a_neutral_zone() -> None:
     law = law_of(("neutral_zone", {}))
-    assert of_a_spring(law, 0.01, 0.3, 0.02) == pytest.approx(0.15)
-    assert of_a_spring(law, -0.01, 0.3, 0.02) == pytest.approx(-0.15)
+    corner = (0.3, 0.02, 50.0)  # far from a corner its sharpness says nothing: 0.5^50
+    assert of_a_spring(law, 0.01, *corner) == pytest.approx(0.15)
+    assert of_a_spring(law, -0.01, *corner) == pytest.approx(-0.15)
     # parallel to 50 q, lower by the 0.7 * 50 * 0.02 that the zone has not held
-    assert of_a_spring(law, 0.1, 0.3, 0.02) == pytest.approx(5.0 - 0.7)
-    assert of_a_spring(law, -0.2, 0.3, 0.02) == pytest.approx(-10.0 + 0.7)
-    # the corner is cut by a quarter of a tenth of the width
-    assert of_a_spring(law, 0.02, 0.3, 0.02) == pytest.approx(1.0 - 0.7 * 0.975)
+    assert of_a_spring(law, 0.1, *corner) == pytest.approx(5.0 - 0.7)
+    assert of_a_spring(law, -0.2, *corner) == pytest.approx(-10.0 + 0.7)
+    # n = 2: u / sqrt(1 + u^2)
+    assert of_a_spring(law, 0.02, 0.3, 0.02, 2.0) == pytest.approx(1.0 - 0.7 / np.sqrt(2.0))
+    assert of_a_spring(law, 0.04, 0.3, 0.02, 2.0) == pytest.approx(2.0 - 0.7 * 2.0 / np.sqrt(5.0))
+
+
+def test_a_zone_beside_the_neutral_pose() -> None:
+    """From -0.01 to 0.03: 15 N m/rad in it, 50 beyond, and no load at rest."""
+    law = law_of(("neutral_zone", {"zone": "off_centre"}))
+    values = (0.3, 0.02, 50.0, 0.5)
+    assert of_a_spring(law, 0.0, *values) == 0.0
+    assert of_a_spring(law, 0.01, *values) == pytest.approx(0.15, rel=1e-6)
+    assert of_a_spring(law, 0.1, *values) == pytest.approx(15 * 0.03 + 50 * 0.07, rel=1e-6)
+    assert of_a_spring(law, -0.1, *values) == pytest.approx(-15 * 0.01 - 50 * 0.09, rel=1e-6)
+    mirrored = of_a_spring(law, -0.1, 0.3, 0.02, 50.0, -0.5)
+    assert mirrored == pytest.approx(-of_a_spring(law, 0.1, *values), rel=1e-12)
+    # at rest its slope is that of u / sqrt(1 + u^2) at half a width
+    at_rest = of_a_spring(law, 1e-9, 0.3, 0.02, 2.0, 0.5) / 1e-9
+    assert at_rest == pytest.approx(50.0 * (1.0 - 0.7 * 1.25**-1.5), rel=1e-6)
+
+
+def test_a_spring_with_a_break() -> None:
+    law = law_of(("nonlinear_stiffening", {"shape": "bilinear"}))
+    assert of_a_spring(law, 0.06, 1.5, 0.08) == pytest.approx(3.0)
+    assert of_a_spring(law, 0.1, 1.5, 0.08) == pytest.approx(4.0 + 0.02 * 125.0)
+    assert of_a_spring(law, -0.2, 1.5, 0.08) == pytest.approx(-4.0 - 0.12 * 125.0)
+    # the corner is cut by a quarter of a tenth of the break
+    assert of_a_spring(law, 0.08, 1.5, 0.08) == pytest.approx(4.0 + 75.0 * 0.0020)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +101,7 @@ def test_a_neutral_zone_is_no_wider_than_five_usual_ones(
     coordinate: str, widest_deg: float
 ) -> None:
     """Wider, all motion would lie inside: a softer joint by another name."""
-    _, width = create("neutral_zone", {"coordinate": coordinate}).parameters
+    _, width, _ = create("neutral_zone", {"coordinate": coordinate}).parameters
     assert np.rad2deg(width.high) == pytest.approx(widest_deg)
     assert np.rad2deg(width.default) == pytest.approx(widest_deg / 5.0)
 
@@ -90,14 +116,25 @@ def test_a_spring_that_is_stiffer_to_one_side() -> None:
 
 def test_a_stop_beyond_a_gap() -> None:
     law = law_of(("facet_contact", {"side": "positive"}))
-    assert added(law, "extension", 0.1, 3.0, 100.0, 0.05) == pytest.approx(5.0)
-    assert added(law, "extension", 0.045, 3.0, 100.0, 0.05) == 0.0
-    assert added(law, "extension", -0.1, 3.0, 100.0, 0.05) == 0.0
+    stop = (100.0, 0.05, 1.0)
+    assert added(law, "extension", 0.1, 3.0, *stop) == pytest.approx(5.0)
+    assert added(law, "extension", 0.045, 3.0, *stop) == 0.0
+    assert added(law, "extension", -0.1, 3.0, *stop) == 0.0
     # a parabola over 3.5 mrad to each side: a quarter of that at the gap
-    assert added(law, "extension", 0.05, 3.0, 100.0, 0.05) == pytest.approx(0.0875)
+    assert added(law, "extension", 0.05, 3.0, *stop) == pytest.approx(0.0875)
     other = law_of(("facet_contact", {"side": "negative"}))
-    assert added(other, "extension", -0.1, 3.0, 100.0, 0.05) == pytest.approx(-5.0)
-    assert added(other, "extension", 0.1, 3.0, 100.0, 0.05) == 0.0
+    assert added(other, "extension", -0.1, 3.0, *stop) == pytest.approx(-5.0)
+    assert added(other, "extension", 0.1, 3.0, *stop) == 0.0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 3.0])
+def test_stops_of_any_exponent_meet_two_degrees_beyond_the_gap(exponent: float) -> None:
+    law = law_of(("facet_contact", {"side": "positive"}))
+    two = np.deg2rad(2.0)
+    found = added(law, "extension", 0.05 + two, 3.0, 100.0, 0.05, exponent)
+    assert found == pytest.approx(100.0 * two)
+    twice = added(law, "extension", 0.05 + 2.0 * two, 3.0, 100.0, 0.05, exponent)
+    assert twice == pytest.approx(100.0 * two * 2.0**exponent)
 
 
 def test_a_level_of_another_stiffness_and_a_lax_one() -> None:
@@ -119,6 +156,15 @@ def test_all_rotations_at_once(name: str, value: float, share: float) -> None:
     found = law.respond(np.zeros((1, 6)), np.array([[value]]), carried).load
     expected = share * np.array([[0.0, 0.0, 0.0, 5.0, -3.0, 2.0]])
     np.testing.assert_allclose(found, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["level_dependence", "local_laxity"])
+def test_all_coordinates_at_once(name: str) -> None:
+    carried = np.array([[7.0, -400.0, 9.0, 5.0, -3.0, 2.0]])
+    law = law_of((name, {"coordinate": "all"}))
+    found = law.respond(np.zeros((1, 6)), np.array([[0.25]]), carried).load
+    share = -0.75 if name == "level_dependence" else -0.25
+    np.testing.assert_allclose(found, share * carried, rtol=1e-14)
 
 
 def test_compression_stiffens_and_traction_softens() -> None:
@@ -161,11 +207,14 @@ def test_what_a_search_may_try(name: str) -> None:
     assert trial.told_by
     only = {"level_dependence": (Spread.BY_JOINT,), "local_laxity": (Spread.ONE,)}
     assert trial.spreads == only.get(name, tuple(s for s in Spread if s is not Spread.BY_TEST))
-    places = {o.get("coordinate", o.get("pair")) for o in trial.variants} - {"rotations"}
-    pairs = {
-        (a, b) for a in ROTATIONS for b in ROTATIONS if ROTATIONS.index(a) < ROTATIONS.index(b)
-    }
-    assert places == (pairs if name == "bending_rotation_coupling" else set(ROTATIONS))
+    places = {o.get("coordinate", o.get("pair")) for o in trial.variants} - {"rotations", "all"}
+    if name == "bending_rotation_coupling":
+        assert {frozenset(pair) for pair in places} == {
+            frozenset((a, b)) for a in COORDINATES for b in COORDINATES if a != b
+        }
+    else:
+        lost = {"superior"} if name == "preload_stiffening" else set()
+        assert places == set(COORDINATES) - lost
 
 
 @EVERY
@@ -198,12 +247,12 @@ def test_declared_numbers_make_sense(variant) -> None:
         ("bending_rotation_coupling", {"pair": ["right", "left"]}, "pair 'left' is not one of"),
         ("facet_contact", {"side": "left"}, "side 'left' is not one of positive, negative"),
         ("facet_contact", {"coordinate": "x"}, "coordinate 'x' is not one of"),
-        ("level_dependence", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
-        ("local_laxity", {"coordinate": "all"}, "is not one of anterior, .*, rotations"),
+        ("level_dependence", {"coordinate": "twist"}, "is not one of anterior, .*, rotations, all"),
+        ("local_laxity", {"coordinate": "twist"}, "is not one of anterior, .*, rotations, all"),
         (
             "preload_stiffening",
             {"coordinate": "superior"},
-            "is not one of extension, .*, rotations",
+            "is not one of anterior, right, .*, rotations",
         ),
     ],
 )

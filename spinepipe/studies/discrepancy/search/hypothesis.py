@@ -5,7 +5,7 @@ a form: which variant, and how its values may differ where. Unknowns are shared 
 of one; each moves rows of an effect's values.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -15,13 +15,13 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import spine_model
 from spinepipe.effects import Effect, Parameter, Spread, Trial, create, registered
-from spinepipe.effects.carried_share import ALL_ROTATIONS
+from spinepipe.effects.carried_share import coordinates_of
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.statics import FreeParameter, declared, free_parameters
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 BUSHING, PER_SPECIMEN = "linear_bushing", "per_specimen"
 DAMPING = np.array([2000.0] * 3 + [10.0] * 3)
@@ -71,9 +71,6 @@ def bushing_stiffness(model: SpineModel) -> Array:
     return total
 
 
-SHAPE_SDS = (-1.0, 0.0, 1.0)
-"""Prior SDs from its default at which a parameter of shape is tried before it is fitted."""
-
 Options = tuple[tuple[str, Any], ...]
 
 
@@ -90,11 +87,15 @@ class Variant:
 
     def coordinates(self, read: Sequence[str]) -> tuple[str, ...]:
         """Those of the read coordinates that it loads by its options; all, if it names none."""
+        return tuple(name for name in read if name in self.acts_on) or tuple(read)
+
+    @property
+    def acts_on(self) -> tuple[str, ...]:
+        """Coordinates that it loads by its options; none, if it names none."""
         options = dict(self.options)
-        named = {options.get("coordinate"), *options.get("pair", ())}
-        if ALL_ROTATIONS in named:
-            named |= set(ROTATIONS)
-        return tuple(name for name in read if name in named) or tuple(read)
+        if "coordinate" in options:
+            return coordinates_of(options["coordinate"])
+        return tuple(options.get("pair", ()))
 
     @property
     def strengths(self) -> tuple[int, ...]:
@@ -157,8 +158,12 @@ def shape_at(parameter: Parameter, sds: float) -> float:
 
 
 def shape_grid(variant: Variant) -> list[tuple[float, ...]]:
-    """Prior SDs of the shapes at which a variant is tried; one empty point without shapes."""
-    return list(product(SHAPE_SDS, repeat=len(variant.shapes)))
+    """Prior SDs of the shapes at which a variant is tried; one empty point without shapes.
+
+    Each shape says at how many: those that span published forms are told apart by the refit.
+    """
+    parameters = variant.create().parameters
+    return list(product(*(parameters[column].tried for column in variant.shapes)))
 
 
 def trials(
@@ -188,10 +193,18 @@ def trials(
 
 
 def _is_read(variant: Variant, coordinates: Sequence[str]) -> bool:
-    """Whether a variant acts on coordinates with readings, as far as it says on which."""
-    options = dict(variant.options)
-    named = [c for c in (options.get("coordinate"), *options.get("pair", ())) if c in COORDINATES]
-    return not named or bool(set(named) & set(coordinates))
+    """Whether a variant acts on coordinates with readings, as far as it says on which.
+
+    Of a kind, one that is read will do; what rotation and translation do to each other is of second
+    order where one of the two is hidden.
+    """
+    read = [coordinate for coordinate in variant.acts_on if coordinate in coordinates]
+    return _kinds(read) == _kinds(variant.acts_on)
+
+
+def _kinds(coordinates: Iterable[str]) -> set[bool]:
+    """Of rotations, of translations, or of both."""
+    return {coordinate in TRANSLATIONS for coordinate in coordinates}
 
 
 def _options(options: Mapping[str, Any]) -> Options:

@@ -227,9 +227,14 @@ def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
 def _degenerate(fit: JointFit, number: int) -> bool:
     """Whether a shape has run to its bound: the effect is then no more what its name says.
 
-    A neutral zone as wide as the motion is a softer joint, a stop without a gap an asymmetry.
+    A neutral zone as wide as the motion is a softer joint, a stop without a gap an asymmetry. Where
+    a shape spans a family of laws, both its ends are laws of that name.
     """
-    shapes = [u.supposed == number and not u.is_strength for u in fit.hypothesis.unknowns]
+    parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
+    shapes = [
+        u.supposed == number and not u.is_strength and not parameters[u.column].family
+        for u in fit.hypothesis.unknowns
+    ]
     return bool(fit.at_bound[shapes].any())
 
 
