@@ -17,10 +17,20 @@ LoadUnit = Literal["N", "kN", "N m", "N mm", "N cm", "Nm", "Nmm", "Ncm"]
 MotionUnit = Literal["deg", "rad", "mm", "um", "m"]
 TimeUnit = Literal["s", "ms", "min"]
 
-Turn = Literal[
-    "flexion", "extension", "right_bending", "left_bending", "right_rotation", "left_rotation"
+Towards = Literal[
+    "flexion",
+    "extension",
+    "right_bending",
+    "left_bending",
+    "right_rotation",
+    "left_rotation",
+    "anterior",
+    "posterior",
+    "superior",
+    "inferior",
+    "right",
+    "left",
 ]
-Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left"]
 
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 

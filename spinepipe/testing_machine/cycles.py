@@ -87,7 +87,9 @@ class Cut:
         return tuple((number, cycle) for number, cycle in numbered if number not in dropped)
 
 
-def cut(load: Array, smallest_reversal: float, preconditioning: int) -> Cut:
+def cut(
+    load: Array, smallest_reversal: float, preconditioning: int, asked: float | None = None
+) -> Cut:
     """Cycles of a recording.
 
     Parameters
@@ -95,11 +97,14 @@ def cut(load: Array, smallest_reversal: float, preconditioning: int) -> Cut:
     load : (N,) the driving load.
     smallest_reversal : share of its range by which it must turn back.
     preconditioning : so many cycles at the beginning are left out.
+    asked : size of the load at which cycles begin, on the side on which the load mostly is.
     """
     low, high = float(load.min()), float(load.max())
     least = smallest_reversal * (high - low)
     turns = reversals(load, least)
-    if low - least <= 0.0 <= high + least:
+    if asked is not None:
+        reference = float(np.copysign(asked, low + high))
+    elif low - least <= 0.0 <= high + least:
         reference = 0.0
     else:
         reference = low if abs(load[0] - low) < abs(load[0] - high) else high

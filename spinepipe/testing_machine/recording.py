@@ -89,7 +89,11 @@ def read_recording(
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         found = f"letters that are not {mapping.form.encoding}"
         return None, [Problem(file, None, None, found, "the encoding of the YAML", remedy)]
-    cells, problems = _cells(text, file, mapping.form)
+    try:
+        cells, problems = _cells(text, file, mapping.form)
+    except csv.Error as error:
+        found, allowed = f"no table ({error})", f"cells separated by a {mapping.form.delimiter}"
+        return None, [Problem(file, None, None, found, allowed, "look at `form.delimiter`")]
     if cells is None:
         return None, problems
     return _understood(cells, of, mapping, problems)

@@ -14,9 +14,8 @@ from spinepipe.testing_machine.channels import (
     FORCES,
     LoadUnit,
     MotionUnit,
-    Shift,
     TimeUnit,
-    Turn,
+    Towards,
     words_that_fit,
 )
 
@@ -74,7 +73,7 @@ class LoadChannel(BaseModel):
 
     column: _Column = Field(description="name or number of the column")
     unit: LoadUnit = Field(description="unit of its numbers")
-    positive: Turn | Shift = Field(description="where a positive number pushes or turns")
+    positive: Towards = Field(description="where a positive number pushes or turns")
 
 
 class MotionChannel(BaseModel):
@@ -85,7 +84,7 @@ class MotionChannel(BaseModel):
     column: _Column = Field(description="name or number of the column")
     unit: MotionUnit = Field(description="unit of its numbers")
     joint: _Text = Field(description="which joint moves")
-    positive: Turn | Shift = Field(description="where a positive number moves the upper vertebra")
+    positive: Towards = Field(description="where a positive number moves the upper vertebra")
 
 
 class TestFile(BaseModel):
@@ -124,6 +123,13 @@ class LoadSteps(BaseModel):
         strict=False,
         description="sizes of the driving load instead, N or N m, without zero",
     )
+    reference: float | None = Field(
+        default=None,
+        ge=0,
+        le=20_000,
+        description="size of the driving load at which cycles begin and end, N or N m; null: "
+        "zero, or the end of its range at which it starts if it never comes near zero",
+    )
     smallest_reversal: float = Field(
         default=0.2,
         gt=0,
@@ -150,9 +156,11 @@ class MachineMapping(BaseModel):
     loaded: str | None = Field(
         default=None, description="vertebra on which the load acts; null: the most cranial"
     )
-    load_point_mm: tuple[_Millimetres, _Millimetres, _Millimetres] | None = Field(
+    load_point_mm: tuple[_Millimetres, ...] | None = Field(
         default=None,
         strict=False,
+        min_length=3,
+        max_length=3,
         description="where forces act on it: anterior, superior, to the right in ground, neutral "
         "pose; needed with forces",
     )

@@ -65,7 +65,7 @@ def thinned_test(
     ----------
     zeroed : whether readings count from those of step 0 of their cycle.
     """
-    problems = [found for one in recordings for found in _still(one)]
+    problems = [found for one in recordings for found in _out_of_range(one, steps)]
     if problems:
         return None, problems
     cuts = [_cut(one, steps) for one in recordings]
@@ -105,16 +105,26 @@ def thinned_test(
     return made, []
 
 
-def _still(one: Recording) -> Iterator[Problem]:
+def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[Problem]:
     load = one.loads[one.driving]
-    if load.min() == load.max():
+    low, high = float(load.min()), float(load.max())
+    if low == high:
         found, remedy = "a driving load that never changes", "look whether it is the right column"
         yield Problem(one.file, None, one.driving, found, "a load that goes up and down", remedy)
+    elif steps.reference is not None:
+        start = float(np.copysign(steps.reference, low + high))
+        slack = BEYOND * (high - low)
+        if not low - slack <= start <= high + slack:
+            found, allowed = (
+                f"a reference of {start:g}",
+                f"{low:.3g} to {high:.3g}, what it reaches",
+            )
+            yield Problem(one.file, None, one.driving, found, allowed, "correct `steps.reference`")
 
 
 def _cut(one: Recording, steps: LoadSteps) -> Cut:
     load = one.loads[one.driving]
-    return cut(load, steps.smallest_reversal, one.of.preconditioning_cycles)
+    return cut(load, steps.smallest_reversal, one.of.preconditioning_cycles, steps.reference)
 
 
 def _cut_problems(one: Recording, found: Cut, first: Cut) -> Iterator[Problem]:

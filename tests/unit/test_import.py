@@ -23,6 +23,7 @@ from spinepipe.statics import free_parameters
 from spinepipe.testing_machine import folder as folders
 from spinepipe.testing_machine.cycles import cut
 from tests.generators.testing_machine import Rig, german, record
+from tests.generators.testing_machine import main as write_example
 
 NOISY = Rig(cycles=3, hertz=10.0, friction_nm=0.4, noise_deg=0.05, noise_nm=0.03)
 STIFFNESS = 1.7
@@ -166,6 +167,39 @@ def test_loads_to_one_side(tmp_path: Path, way: float) -> None:
     np.testing.assert_allclose(loads[2], [-way * x for x in [*there, *there[-2::-1]]], atol=1e-9)
 
 
+@pytest.mark.parametrize(("asked", "sizes"), [(100.0, [100, 300, 500]), (None, [97, 300, 500])])
+def test_cycles_on_a_preload(tmp_path: Path, asked: float | None, sizes: list[float]) -> None:
+    """Compression between 100 and 500 N: the load never comes near zero."""
+    rig = replace(NOISY, both_sides=False, peak_nm=400.0, friction_nm=0.0, noise_nm=1.0)
+    time, force, moved = record(lambda load: load / 1000.0, rig, seed=9)
+    text = german(time, (force + 100.0) / 1000.0, moved, 0.3)  # the table has thousands in it
+    changes = {
+        "loads": [{"column": "Moment", "unit": "N", "positive": "inferior"}],
+        "motion": [{"column": "Winkel", "unit": "mm", "joint": "L4L5", "positive": "inferior"}],
+        "load_point_mm": [0, 20, 0],
+        "steps": {"per_side": 2, "reference": asked},
+    }
+    (test,) = folders.read(written(tmp_path, text, **changes)).tests
+    assert len(test.cycles) == 3
+    expected = [-size for size in [*sizes, sizes[1], sizes[0]]]
+    np.testing.assert_allclose(test.cycles[1].loads[:, 1], expected, atol=3.0)
+    reached = test.cycles[1].motion[:, 0] * 1000.0
+    np.testing.assert_allclose(reached, np.array(expected) - expected[0], atol=60.0)  # 3 SD
+
+
+def test_a_load_held_at_each_level(tmp_path: Path) -> None:
+    """Ten seconds at each level, a jump between them: the reading is the mean over the hold."""
+    sizes = [0, 2.5, 5, 7.5, 5, 2.5, 0, -2.5, -5, -7.5, -5, -2.5, 0]
+    rng = np.random.default_rng(1)
+    moment = np.repeat(sizes * 3, 50) + rng.normal(0.0, 0.02, 50 * 39)
+    time = np.arange(len(moment)) / 5.0
+    text = german(time, moment, linear(moment), 0.0)
+    changes = {"steps": {"levels": [2.5, 5, 7.5]}}
+    motion, loads = motion_and_loads(folders.read(written(tmp_path, text, **changes)))
+    np.testing.assert_allclose(loads, [[-size for size in sizes]] * 3, atol=1e-9)
+    np.testing.assert_allclose(motion, loads / STIFFNESS, atol=0.03)
+
+
 def test_a_load_that_only_rises_is_half_a_cycle(tmp_path: Path) -> None:
     time, moment, turned = (part[:101] for part in record(linear, NOISY, seed=6))
     imported = folders.read(written(tmp_path, german(time, moment, turned, 0.0)))
@@ -260,6 +294,7 @@ FILE = DOCUMENT["files"][0]
         ({"form": {**DOCUMENT["form"], "decimal": "point"}}, "set `form: {decimal: comma}`"),
         ({"form": {**DOCUMENT["form"], "delimiter": "tab"}}, "is `form.delimiter` right?"),
         ({"form": {**DOCUMENT["form"], "first_line": 4}}, "line 4, Zeit: found 's'"),
+        ({"steps": {"reference": 9.0}}, "a reference of 9; allowed: -7.5"),
         ({"steps": {"levels": [2.5, 10]}}, "load steps at 10; allowed: at most 7."),
         ({"files": [{**FILE, "preconditioning_cycles": 3}]}, "3 cycles, of which none is kept"),
     ],
@@ -283,3 +318,23 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     told = [(p.row, p.column) for p in caught.value.problems]
     assert told == [(31, "Zeit"), (11, "Moment"), (21, "Winkel")]
     assert "an empty cell and 1 more such lines" in str(caught.value)
+
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLE = ROOT / "docs" / "examples" / "testing_machine"
+
+
+def test_the_example_is_that_of_the_generator(tmp_path: Path) -> None:
+    write_example(tmp_path)
+    made = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert made == {path.name: path.read_text() for path in EXAMPLE.glob("*.csv")}
+
+
+def test_the_example_of_the_tutorial_is_what_comes_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--root", str(tmp_path), "import", str(EXAMPLE / "rig.yaml")]) == 0
+    told = capsys.readouterr().out.splitlines()
+    page = (ROOT / "docs" / "tutorial.md").read_text().replace("1 281", "1\u2009281").splitlines()
+    assert all("    " + line in page for line in told[:3]), told[:3]
+    assert main(["--root", str(tmp_path), "check", "example_rig"]) == 0
