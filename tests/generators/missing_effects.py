@@ -17,7 +17,7 @@ RECIPES = {
     "stiffening_spines": replace(
         SMALL,
         gap=1.0,
-        hidden=(Hidden("nonlinear_stiffening", "extension", shape={"shape": "tangent"}),),
+        hidden=(Hidden("nonlinear_stiffening", "extension", shape={"formula": "tangent"}),),
     ),
     "linear_spines": SMALL,
     "cross_coupled_spines": replace(

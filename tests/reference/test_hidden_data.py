@@ -17,9 +17,6 @@ from spinepipe.model import ScopedEffect
 from spinepipe.problems import InputError
 from spinepipe.statics import System, follow
 from spinepipe.world import Chain as LoadedChain
-from tests.reference.peers.chain import Chain, Load
-
-pytest.importorskip("opensim")
 from tests.generators.hidden import (
     CATALOGUE,
     KNOWN,
@@ -32,10 +29,12 @@ from tests.generators.hidden import (
     recipe_from,
 )
 from tests.generators.hidden.noise import drawn
-from tests.generators.hidden.rigid import Spine
+from tests.generators.hidden.rigid import Spine, together
 from tests.generators.hidden.scene import scene
+from tests.generators.hidden.scene import with_effect as with_the_effect
 from tests.generators.hidden.solve import solve
-from tests.reference.peers import opensim_peer
+from tests.generators.hidden.world import Now
+from tests.reference.peers.chain import Chain, Load
 
 VOCABULARY = {
     *("nonlinear_stiffening", "neutral_zone", "flexion_extension_asymmetry"),
@@ -82,7 +81,8 @@ def test_spinepipe_finds_the_same_null_motion_from_the_files(
 
 
 def test_opensims_own_forces_hold_the_same_pose() -> None:
-    """Weight, springs and loads by OpenSim's force elements, not by its Jacobian."""
+    """Weight, springs and loads by OpenSim's force elements."""
+    opensim_peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     stage = scene(replace(SMALL, preload_n=150.0))
     world = stage.plain(0)
     found = solve(world, Spine(world.bones), np.zeros((6, 7, 6, 6))).q
@@ -95,6 +95,67 @@ def test_opensims_own_forces_hold_the_same_pose() -> None:
         loads.append(Load(5, moment=case.moments[step]))
         expected = opensim_peer.equilibrium(chain.with_loads(*loads))
         np.testing.assert_allclose(found[test, step], expected, rtol=0, atol=1e-10)
+
+
+def test_opensim_has_the_same_poses_and_jacobian() -> None:
+    opensim = pytest.importorskip("opensim")
+    from tests.reference.peers import opensim_peer
+
+    bones = scene(SMALL).bones[0]
+    free = np.zeros((6, 6))
+    built = opensim_peer.build(Chain(**vars(bones), stiffness=free, damping=free))
+    q = np.random.default_rng(4).uniform(-0.2, 0.2, (6, 6)) * ([0.02] * 3 + [1.0] * 3)
+    opensim_peer._set_q(built, q.ravel())
+    built.model.realizePosition(built.state)
+    matrix = opensim.Matrix()
+    built.model.getMatterSubsystem().calcSystemJacobian(built.state, matrix)
+    bodies = [built.model.getBodySet().get(b) for b in range(6)]
+    rows = [body.getMobilizedBodyIndex() for body in bodies]
+    jacobian = matrix.to_numpy().reshape(-1, 6, 36)[rows][..., built.slots]
+    pose = Spine(bones).at(q[None])
+    columns = np.concatenate([pose.angular[0], pose.linear[0]], axis=-1)
+    close = 1e-11  # frames are rounded to 1e-12, each joint's anew
+    np.testing.assert_allclose(columns, np.swapaxes(jacobian, 1, 2), rtol=0, atol=close)
+    for body, place in zip(bodies, pose.places[0], strict=True):
+        there = body.getTransformInGround(built.state).p().to_numpy()
+        np.testing.assert_allclose(place, there, rtol=0, atol=close)
+
+
+def test_the_tangent_of_loads_is_their_slope() -> None:
+    """Of a follower and listed loads: both turn with the spine, against central differences."""
+    recipe = with_effect("follower_load", replace(SMALL, preload_n=150.0))
+    stage = scene(recipe)
+    world = with_the_effect(stage.plain(0), recipe.hidden[0], 300.0)
+    spine, now = Spine(world.bones), Now(np.array([3]), np.array([2]), 0.0)
+    q = np.random.default_rng(4).uniform(-0.05, 0.05, (1, 6, 6)) * ([0.02] * 3 + [1.0] * 3)
+
+    def load(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose = spine.at(at)
+        return pose.applied(together(world.wrenches(pose, now)))
+
+    moves = 1e-6 * np.eye(36).reshape(36, 1, 6, 6)
+    slopes = np.stack([load(q + move)[0] - load(q - move)[0] for move in moves], axis=-1) / 2e-6
+    np.testing.assert_allclose(load(q)[1], slopes, rtol=0, atol=1e-5)
+
+
+def test_a_short_specimen_in_shear_is_read_in_one_coordinate(tmp_path: Path) -> None:
+    recipe = Recipe(
+        seed=6,
+        region="cervical",
+        joints=1,
+        design="shear",
+        peak_n=60.0,
+        noise="none",
+        only=("anterior",),
+    )
+    truth = make(recipe, tmp_path / "shear")
+    cohort = read(tmp_path / "shear")
+    assert cohort.joint_names == ("C6C7",)
+    measured = cohort.motion
+    assert measured is not None
+    assert measured["extension_deg"].isna().all()
+    peak = measured.query("specimen == 's01' and step == 3 and cycle == 1")["anterior_mm"]
+    assert peak.item() == pytest.approx(60e3 / truth.stiffness[0, 0], rel=0.02)  # it also tilts
 
 
 @pytest.mark.parametrize("name", ["facet_contact", "follower_load", "marker_bias"])
@@ -136,6 +197,7 @@ def test_every_effect_makes_a_readable_cohort(tmp_path: Path, name: str) -> None
     told = json.loads((tmp_path / name / "truth.json").read_text("utf-8"))
     assert told["effects"][0]["name"] == name
     assert recipe_from(told["recipe"]) == truth.recipe
+    assert told["effects"][0]["formula"] in CATALOGUE[name].formulas
     assert truth.gap == pytest.approx(0.5, rel=0.1) or truth.gap < 0.5
     assert told["effects"][0]["reached"] == (abs(truth.gap - 0.5) <= 0.025)
 

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-pytest.importorskip("opensim")
 from tests.generators.hidden import turns
 from tests.generators.hidden.contacts import OffDiagonals
 from tests.generators.hidden.foreign import OrderDrift, SoftTissue
 from tests.generators.hidden.scope import scope
 from tests.generators.hidden.world import Now, Place
 
-NOW = Now(0, 0, 0.0)
+NOW = Now(np.array([0]), np.array([0]), 0.0)
 
 
 def test_a_tilted_marker_frame_tells_a_turned_motion() -> None:

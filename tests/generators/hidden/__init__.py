@@ -15,8 +15,14 @@ files: ``ERRORS`` (names) and ``LOAD_UNIT``.
 
 Designs: the defaults are the small one (3 specimens x 3 sweeps of 0, +1/3 .. +1, -1/3 .. -1 of
 7.5 N m); ``unloading=True`` makes it 13 steps; ``preload_n=200`` repeats every test under a
-preload (400 brings soft spines near buckling); the full one is ``Recipe(seed, n_specimens=6,
-design="directions", steps=10, unloading=True)``.
+preload (400 brings soft spines near buckling); ``joints`` and ``lowest`` cut a short specimen out
+of a ``region``; ``design="shear"`` pushes the upper vertebra forth and back with ``peak_n``, read
+as ``only=("anterior",)``; the full one is ``Recipe(seed, n_specimens=6, design="directions",
+steps=10, unloading=True)``.
+
+Formulas: each effect has several (`Entry.formulas`), the library's own (SAME) and others of the
+same physics (OTHER), judged by the formula as it is written. ``draw_hidden(..., other=True)`` draws
+one that the library does not have, `is_other` tells.
 
 A gap that no plausible strength reaches (a hysteresis of 4 N m in a stiff axial rotation, a
 preload effect without preloads) ends at the largest strength: see ``reached`` and ``gap``, and
@@ -27,12 +33,12 @@ truth.json: ``recipe`` (with the strengths used), ``effects`` (name, kind, known
 parameters in SI and border units, gap alone, whether the wanted gap was reached), ``gap`` of all
 effects together, ``stiffness`` (P, 6), ``errors``.
 
-Mechanics: OpenSim gives poses and Jacobians of the rigid spine (`rigid.py`), every law and load
-is a small numpy function of this package, Newton (`solve.py`) finds the static poses. Nothing
-here knows spinepipe. The gap is defined in `gap.py`.
+Mechanics: poses and Jacobians of the rigid spine in closed form (`rigid.py`, held against
+OpenSim by a test), every law and load a small numpy function of this package, Newton (`solve.py`)
+finds the static poses. Nothing here knows spinepipe. The gap is defined in `gap.py`.
 """
 
-from .catalogue import CATALOGUE, KNOWN, UNKNOWN, draw_hidden
+from .catalogue import CATALOGUE, KNOWN, UNKNOWN, draw_hidden, is_other
 from .dirt import DIRT, USUAL
 from .errors import ERRORS, LOAD_UNIT
 from .make import Truth, draw, make
@@ -53,6 +59,7 @@ __all__ = [
     "Truth",
     "draw",
     "draw_hidden",
+    "is_other",
     "make",
     "recipe_from",
 ]

@@ -1,4 +1,4 @@
-"""The tests of a recipe: names, moment directions and the path of load steps."""
+"""The tests of a recipe: names, directions of moments and forces, and the path of load steps."""
 
 from dataclasses import dataclass
 
@@ -6,20 +6,32 @@ import numpy as np
 
 from .recipe import Recipe
 
+Axis = tuple[float, float, float]
+ZERO: Axis = (0.0, 0.0, 0.0)
+
 SWEEPS = {
-    "flexion_extension": (0.0, 0.0, 1.0),
-    "lateral_bending": (1.0, 0.0, 0.0),
-    "axial_rotation": (0.0, 1.0, 0.0),
+    "flexion_extension": (ZERO, (0.0, 0.0, 1.0)),
+    "lateral_bending": (ZERO, (1.0, 0.0, 0.0)),
+    "axial_rotation": (ZERO, (0.0, 1.0, 0.0)),
 }
+SHEAR = {"anterior_posterior_shear": ((1.0, 0.0, 0.0), ZERO)}
 DIRECTIONS = {
-    "flexion": (0.0, 0.0, -1.0),
-    "extension": (0.0, 0.0, 1.0),
-    "right_bending": (1.0, 0.0, 0.0),
-    "left_bending": (-1.0, 0.0, 0.0),
-    "left_rotation": (0.0, 1.0, 0.0),
-    "right_rotation": (0.0, -1.0, 0.0),
+    "flexion": (ZERO, (0.0, 0.0, -1.0)),
+    "extension": (ZERO, (0.0, 0.0, 1.0)),
+    "right_bending": (ZERO, (1.0, 0.0, 0.0)),
+    "left_bending": (ZERO, (-1.0, 0.0, 0.0)),
+    "left_rotation": (ZERO, (0.0, 1.0, 0.0)),
+    "right_rotation": (ZERO, (0.0, -1.0, 0.0)),
 }
-"""Direction of the moment in ground: x anterior, y superior, z right."""
+DESIGNS: dict[str, dict[str, tuple[Axis, Axis]]] = {
+    "sweeps": SWEEPS,
+    "directions": DIRECTIONS,
+    "flexion_extension": {"flexion_extension": SWEEPS["flexion_extension"]},
+    "shear": SHEAR,
+    "two_shears": SHEAR | {"lateral_shear": ((0.0, 0.0, 1.0), ZERO)},
+}
+"""Directions of force and moment on the uppermost body in ground: x anterior, y superior, z right.
+Sweeps go to both sides, directions to one. Forces act at the uppermost joint's centre."""
 
 
 @dataclass(frozen=True)
@@ -28,27 +40,37 @@ class Test:
 
     Attributes
     ----------
-    moments : (S, 3) N m on T12, step 0 is zero. preload : N, compressive, in every step.
-    seconds : (S,) time at the end of each step.
+    moments, forces : (S, 3) N m and N on the uppermost body, step 0 is zero.
+    preload : N, compressive, in every step. seconds : (S,) time at the end of each step.
     """
 
     name: str
     moments: np.ndarray
     preload: float
     seconds: np.ndarray
+    forces: np.ndarray
 
 
 def tests(recipe: Recipe) -> tuple[Test, ...]:
     """All tests in the order in which they are done."""
-    directions = {"sweeps": SWEEPS, "directions": DIRECTIONS}[recipe.design]
-    levels = recipe.peak_nm * path(recipe.steps, recipe.design == "sweeps", recipe.unloading)
+    levels = path(recipe.steps, recipe.design != "directions", recipe.unloading)
     seconds = recipe.hold_s * np.arange(len(levels))
     preloads = {"": 0.0, "_preloaded": recipe.preload_n} if recipe.preload_n else {"": 0.0}
     return tuple(
-        Test(name + suffix, np.round(np.outer(levels, axis), 9) + 0.0, preload, seconds)
+        Test(
+            name + suffix,
+            _along(recipe.peak_nm * levels, moment),
+            preload,
+            seconds,
+            _along(recipe.peak_n * levels, force),
+        )
         for suffix, preload in preloads.items()
-        for name, axis in directions.items()
+        for name, (force, moment) in DESIGNS[recipe.design].items()
     )
+
+
+def _along(levels: np.ndarray, axis: Axis) -> np.ndarray:
+    return np.round(np.outer(levels, axis), 9) + 0.0
 
 
 def path(steps: int, both_sides: bool, unloading: bool) -> np.ndarray:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .anatomy import COORDINATES, N_JOINTS
+from .anatomy import COORDINATES
 
 Table = np.ndarray
 """Readings (P, T, C, S, J, 6), mm and deg, in the order of `COORDINATES`."""
@@ -22,7 +22,7 @@ def swapped_specimens(table: Table, clean: Table, rng: np.random.Generator, opti
 def flipped_sign(table: Table, clean: Table, rng: np.random.Generator, options: Any):
     """One coordinate of one joint has the wrong sign, in all specimens or in one."""
     coordinate = options.get("coordinate") or str(rng.choice(COORDINATES[3:]))
-    joint = options.get("joint", int(rng.integers(N_JOINTS)))
+    joint = options.get("joint", int(rng.integers(table.shape[-2])))
     specimen = options.get("specimen")
     chosen = slice(None) if specimen is None else slice(specimen, specimen + 1)
     flipped = table.copy()
@@ -33,7 +33,7 @@ def flipped_sign(table: Table, clean: Table, rng: np.random.Generator, options: 
 def bad_markers(table: Table, clean: Table, rng: np.random.Generator, options: Any):
     """The noise of one joint is ``factor`` times as large, in all specimens or in one."""
     factor = options.get("factor", 10.0)
-    joint = options.get("joint", int(rng.integers(N_JOINTS)))
+    joint = options.get("joint", int(rng.integers(table.shape[-2])))
     specimen = options.get("specimen")
     chosen = slice(None) if specimen is None else slice(specimen, specimen + 1)
     place = (chosen, ..., joint, slice(None))

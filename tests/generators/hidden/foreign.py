@@ -75,7 +75,7 @@ class NeutralWalk:
     walk: np.ndarray
 
     def __call__(self, q, carried, memory, now: Now):
-        shift = -self.scope.of(self.stiffness) * self.walk[now.test]
+        shift = -self.scope.of(self.stiffness) * self.walk[now.tests]
         return self.scope.into(carried, np.broadcast_to(shift, self.scope.of(q).shape))
 
 

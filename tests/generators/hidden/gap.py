@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .anatomy import N_JOINTS
+from .anatomy import COORDINATES
 from .recipe import Hidden, Recipe
 from .rigid import Spine
 from .scene import Scene, with_effect
@@ -24,10 +24,15 @@ LOG_SD = 3.0
 
 
 def readings(q: np.ndarray, recipe: Recipe) -> np.ndarray:
-    """(..., S, J, 3 or 6) in noise SD, of motion (..., S, J, 6) in SI; step 0 off if zeroed."""
+    """(..., S, J, coordinates read) in noise SD, of motion in SI; step 0 off if zeroed."""
     sd = np.array([recipe.noise_sd_mm / 1000.0] * 3 + [np.deg2rad(recipe.noise_sd_deg)] * 3)
-    told = (q / sd)[..., 0 if recipe.translations else 3 :]
+    told = (q / sd)[..., read_columns(recipe)]
     return told[..., 1:, :, :] - told[..., :1, :, :] if recipe.zeroed else told
+
+
+def read_columns(recipe: Recipe) -> np.ndarray:
+    """Indices of the coordinates that are read."""
+    return np.array([COORDINATES.index(name) for name in recipe.read])
 
 
 @dataclass
@@ -59,7 +64,7 @@ class Base:
         """Errors and their derivative by the free log stiffnesses."""
         stiffness = self.scene.stiffness[self.number] * np.exp(self.log_factors)
         world = self.scene.plain(self.number, stiffness)
-        solved = solve(world, self.spine, self.q, with_tangents=True)
+        solved = solve(world, self.spine, self.q)
         self.q = solved.q
         loads = np.einsum("tsjc,c,cd->tsjcd", solved.q, stiffness, np.eye(6))
         shape = solved.q.shape
@@ -69,7 +74,7 @@ class Base:
         return target - readings(solved.q, self.recipe), told
 
     def _step(self, error, by_log):
-        free = np.arange(0 if self.recipe.translations else 3, 6)
+        free = read_columns(self.recipe)
         matrix = by_log.reshape(-1, 6)[:, free]
         pull = np.eye(len(free)) / LOG_SD
         rows = np.vstack([matrix, pull])
@@ -86,7 +91,7 @@ class Meter:
         self.scene, self.recipe = scene, recipe
         numbers = range(len(scene.bones))
         steps = len(scene.tests[0].moments)
-        self.rest = np.zeros((len(scene.tests), steps, N_JOINTS, 6))
+        self.rest = np.zeros((len(scene.tests), steps, recipe.joints, 6))
         self.spines = [Spine(bones) for bones in scene.bones]
         self.plain = [self._plain(number) for number in numbers]
         self.bases = [self._base(number) for number in numbers]

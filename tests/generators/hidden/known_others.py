@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from . import pushes, turns
 from .anatomy import COORDINATES
-from .entry import Entry, joints_of, value
+from .entry import OTHER, SAME, Entry, formula, joints_of, reach, value
 from .recipe import Hidden, Recipe
 from .world import World
 
@@ -33,19 +33,48 @@ def _migration(world: World, hidden: Hidden, strength: float) -> World:
     direction = strength * np.array(value(hidden, "direction"))
     rates = joints_of(world, hidden)[:, None] * direction
     coordinate = COORDINATES.index(hidden.coordinate or "extension")
-    return world.with_place(partial(turns.moving_centre, direction=rates, coordinate=coordinate))
+    far = value(hidden, "reach") if formula(hidden) == "saturating" else 0.0
+    return world.with_place(
+        partial(turns.moving_centre, direction=rates, coordinate=coordinate, reach=far)
+    )
+
+
+def _draw_migration(rng, recipe: Recipe, coordinate):
+    far = float(rng.uniform(0.5, 1.0) * reach("extension", recipe))
+    return _draw_sagittal(rng, recipe, coordinate) | {"reach": far}
 
 
 def _weight(world: World, hidden: Hidden, strength: float) -> World:
-    return world.with_push(pushes.Weight(world.bones, joints_of(world, hidden), strength))
+    """The same mass on each segment, or masses that fall evenly from below to above."""
+    masses = strength * joints_of(world, hidden)
+    if formula(hidden, "each") == "tapering":
+        masses = masses * np.linspace(1.5, 0.5, len(masses))
+    return world.with_push(pushes.Weight(world.bones, masses))
+
+
+OFFSET_M = 0.008
+"""How far behind the joints' centres the guides of another follower load lie."""
 
 
 def _follower(world: World, hidden: Hidden, strength: float) -> World:
-    return world.with_push(pushes.Follower(world.bones, strength))
+    """Through the centres of mass, which lie midway between joints here, or behind the joints.
+
+    The ground's own guide lies as far below the lowest joint as the lowest segment's centre lies
+    above it; or as far behind it as the others.
+    """
+    bones = world.bones
+    guides, anchor = bones.centres, 2.0 * bones.origins[0] - bones.centres[0]
+    if formula(hidden, "centres") == "behind":
+        behind = -OFFSET_M * bones.rotations[:, :, 0]
+        guides, anchor = bones.centres + behind, anchor + behind[0]
+    return world.with_push(pushes.Follower(guides, anchor, strength))
 
 
 def _misalignment(world: World, hidden: Hidden, strength: float) -> World:
     axis = np.array(value(hidden, "axis"))
+    if formula(hidden, "frame") == "growing":
+        moments = np.stack([case.moments for case in world.tests])
+        return world.with_push(pushes.Growing(moments, axis, strength))
     tilt = Rotation.from_rotvec(strength * axis).as_matrix()
     return replace(world, turn_load=tilt @ world.turn_load)
 
@@ -57,7 +86,16 @@ def _draw_tilt(rng, recipe: Recipe, coordinate):
 
 
 def _load_offset(world: World, hidden: Hidden, strength: float) -> World:
-    return world.with_push(pushes.Constant(strength * np.array(value(hidden, "axis"))))
+    """A constant moment, or a cable that pulls sideways with a constant force."""
+    moment, force = strength * np.array(value(hidden, "axis")), np.zeros(3)
+    if formula(hidden, "moment") == "cable":
+        x, _, z = moment
+        moment, force = np.zeros(3), np.array([-z, 0.0, x]) / CABLE_M
+    return world.with_push(pushes.Constant(moment, force, world.bones.centres[-1]))
+
+
+CABLE_M = 0.1
+"""Arm by which a strength in N m is a cable's force."""
 
 
 def _draw_axis(rng, recipe: Recipe, coordinate):
@@ -82,20 +120,66 @@ def _draw_marker(rng, recipe: Recipe, coordinate):
 PLACE, LOAD, READING = "geometry", "load", "measurement"
 ENTRIES = {
     "joint_centre_offset": Entry(
-        PLACE, "distance", "m", 0.003, 0.03, _centre_offset, _draw_sagittal, ()
+        PLACE, "distance", "m", 0.003, 0.03, _centre_offset, _draw_sagittal, {"fixed": SAME}, ()
     ),
     "joint_centre_migration": Entry(
-        PLACE, "rate", "m/rad", 0.05, 0.6, _migration, _draw_sagittal, ("extension",)
+        PLACE,
+        "rate",
+        "m/rad",
+        0.05,
+        0.6,
+        _migration,
+        _draw_migration,
+        {"linear": SAME, "saturating": OTHER},
+        ("extension",),
     ),
-    "segment_weight": Entry(LOAD, "mass", "kg", 0.1, 5.0, _weight, coordinates=(), joints="all"),
+    "segment_weight": Entry(
+        LOAD,
+        "mass",
+        "kg",
+        0.1,
+        5.0,
+        _weight,
+        formulas={"each": SAME, "tapering": OTHER},
+        coordinates=(),
+        joints="all",
+    ),
     "follower_load": Entry(
-        LOAD, "tension", "N", 20.0, 800.0, _follower, coordinates=(), joints="all"
+        LOAD,
+        "tension",
+        "N",
+        20.0,
+        800.0,
+        _follower,
+        formulas={"centres": SAME, "behind": OTHER},
+        coordinates=(),
+        joints="all",
     ),
     "load_misalignment": Entry(
-        LOAD, "tilt", "rad", 0.03, 0.5, _misalignment, _draw_tilt, (), joints="all"
+        LOAD,
+        "tilt",
+        "rad",
+        0.03,
+        0.5,
+        _misalignment,
+        _draw_tilt,
+        {"frame": SAME, "growing": OTHER},
+        (),
+        joints="all",
     ),
     "load_offset": Entry(
-        LOAD, "moment", "N m", 0.1, 5.0, _load_offset, _draw_axis, (), joints="all"
+        LOAD,
+        "moment",
+        "N m",
+        0.1,
+        5.0,
+        _load_offset,
+        _draw_axis,
+        {"moment": SAME, "cable": OTHER},
+        (),
+        joints="all",
     ),
-    "marker_bias": Entry(READING, "tilt", "rad", 0.03, 0.5, _marker_bias, _draw_marker, ()),
+    "marker_bias": Entry(
+        READING, "tilt", "rad", 0.03, 0.5, _marker_bias, _draw_marker, {"frame": SAME}, ()
+    ),
 }

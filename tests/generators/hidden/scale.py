@@ -51,7 +51,8 @@ class Trials:
 def scaled(meter: Meter, hidden: Hidden, wanted: float, entry: Entry) -> tuple[float, float]:
     """Strength whose gap is the wanted one, or the best that is plausible; and its gap."""
     trials = Trials(meter, hidden, wanted)
-    ends = _bracket(trials, np.log(entry.start), np.log(entry.top))
+    size = entry.size(hidden.coordinate, meter.recipe)
+    ends = _bracket(trials, np.log(size * entry.start), np.log(size * entry.top))
     if ends is not None:
         brentq(trials.excess, *ends, xtol=1e-4, maxiter=MOST_TRIALS, disp=False)
     return trials.best()

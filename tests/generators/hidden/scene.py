@@ -40,6 +40,7 @@ class Scene:
             tests=self.tests,
             weight=self.weight,
             preload_points=preload_points(bones),
+            load_point=np.round(bones.origins[-1], 9),
             turn_load=np.tile(np.eye(3), (len(self.tests), 1, 1)),
             gain=np.ones(len(self.tests)),
         )
@@ -50,8 +51,8 @@ def scene(recipe: Recipe) -> Scene:
     shapes, springs = stream(recipe, ANATOMY), stream(recipe, STIFFNESS)
     numbers = range(recipe.n_specimens)
     return Scene(
-        bones=tuple(anatomy.bones(shapes) for _ in numbers),
-        stiffness=np.array([anatomy.stiffness(springs, recipe.translations) for _ in numbers]),
+        bones=tuple(anatomy.bones(shapes, recipe) for _ in numbers),
+        stiffness=np.array([anatomy.stiffness(springs, recipe) for _ in numbers]),
         tests=tests(recipe),
         weight=recipe.gravity,
     )

@@ -1,4 +1,4 @@
-"""Static poses of a world along its load paths: Newton on what OpenSim and the laws say."""
+"""Static poses of a world along its load paths: Newton on what the spine and the laws say."""
 
 from typing import NamedTuple
 
@@ -21,34 +21,48 @@ class NoEquilibriumError(RuntimeError):
 
 
 class Solved(NamedTuple):
-    """Poses q (T, S, J, 6) and, if asked for, tangents (T, S, n, n)."""
+    """Poses q (T, S, J, 6) and tangents (T, S, n, n)."""
 
     q: np.ndarray
-    tangents: np.ndarray | None
+    tangents: np.ndarray
 
 
-def solve(world: World, spine: Spine, start: np.ndarray, with_tangents: bool = False) -> Solved:
-    """All steps of all tests, each from ``start`` (T, S, J, 6) or, if zero, the step before."""
-    poses, tangents = np.zeros_like(start), []
-    for test, case in enumerate(world.tests):
-        memories = tuple(np.zeros((2, *world.stiffness.shape)) for _ in world.laws)
-        before = poses[test, 0]
-        for step in range(len(case.moments)):
-            seconds = case.seconds[step] - case.seconds[step - 1] if step else 0.0
-            now = Now(test, step, seconds)
-            guess = start[test, step] if start[test, step].any() else before
-            before, tangent = equilibrium(world, spine, guess, memories, now)
-            memories = _renewed(world, before, memories, now)
-            poses[test, step] = before
-            tangents.append(tangent)
-    stacked = np.array(tangents).reshape(*poses.shape[:2], poses[0, 0].size, -1)
-    return Solved(poses, stacked if with_tangents else None)
+def solve(world: World, spine: Spine, start: np.ndarray) -> Solved:
+    """All steps of all tests from ``start`` (T, S, J, 6).
+
+    Tests are solved side by side, each step from the one before it where the start is zero. A
+    world without laws of its own knows no path: from another start all steps are solved at once.
+    """
+    if start.any() and not world.laws:
+        return _at_once(world, spine, start)
+    poses = np.zeros_like(start)
+    tangents = []
+    tests = np.arange(len(world.tests))
+    seconds = world.tests[0].seconds
+    memories = tuple(np.zeros((getattr(law, "cells", 0), *start[:, 0].shape)) for law in world.laws)
+    before = poses[:, 0]
+    for step in range(start.shape[1]):
+        spent = float(seconds[step] - seconds[step - 1]) if step else 0.0
+        now = Now(tests, np.full(len(tests), step), spent)
+        guess = np.where(start[:, step].any(axis=(1, 2), keepdims=True), start[:, step], before)
+        before, tangent = equilibrium(world, spine, guess, memories, now)
+        memories = _renewed(world, before, memories, now)
+        poses[:, step] = before
+        tangents.append(tangent)
+    return Solved(poses, np.stack(tangents, axis=1))
+
+
+def _at_once(world: World, spine: Spine, start: np.ndarray) -> Solved:
+    tests, steps = (grid.ravel() for grid in np.indices(start.shape[:2]))
+    flat = start.reshape(-1, *start.shape[2:])
+    q, tangents = equilibrium(world, spine, flat, (), Now(tests, steps, 0.0))
+    return Solved(q.reshape(start.shape), tangents.reshape(*start.shape[:2], *tangents.shape[1:]))
 
 
 def equilibrium(
     world: World, spine: Spine, guess: np.ndarray, memories: tuple[np.ndarray, ...], now: Now
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pose (J, 6) and the tangent (n, n) one Newton step before it.
+    """Poses (T, J, 6) and the tangents (T, n, n) one Newton step before them.
 
     Raises
     ------
@@ -56,28 +70,41 @@ def equilibrium(
         When the steps do not get small.
     """
     q = guess.copy()
+    moving = np.ones(len(q), dtype=bool)
     for iteration in range(MOST_ITERATIONS):
         missing, tangent = residual(world, spine, q, memories, now)
-        move = np.linalg.solve(tangent, missing)
-        size = np.abs(move).max()
+        move = np.linalg.solve(tangent, missing[..., None])[..., 0]
+        size = np.abs(move).max(axis=-1)
         damping = 0.5 if iteration >= DAMPED_AFTER else 1.0
-        q = q - min(damping, LARGEST_STEP / max(size, LARGEST_STEP)) * move.reshape(q.shape)
-        if size < TOLERANCE:
+        share = np.minimum(damping, LARGEST_STEP / np.maximum(size, LARGEST_STEP)) * moving
+        q = q - share[:, None, None] * move.reshape(q.shape)
+        moving &= ~(size < TOLERANCE)
+        if not moving.any():
             return q, tangent
-    raise NoEquilibriumError(f"specimen {world.number}, {now}: last step {size:.1e}")
+        if not np.isfinite(q).all():
+            break
+    raise NoEquilibriumError(f"specimen {world.number}, {now}: last step {size.max():.1e}")
 
 
 def residual(
     world: World, spine: Spine, q: np.ndarray, memories: tuple[np.ndarray, ...], now: Now
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Generalised load (n,) missing for equilibrium at q, and its tangent."""
-    n = q.size
-    moves = DIFFERENCE * np.eye(n).reshape(n, *q.shape)
-    held = world.holding(np.concatenate([q[None], q + moves]), memories, now).reshape(n + 1, n)
-    missing, tangent = held[0], (held[1:] - held[0]).T / DIFFERENCE
+    """Generalised loads (T, n) missing for equilibrium at q (T, J, 6), and tangents (T, n, n)."""
+    held, tangent = _held(world, q, memories, now)
     pose = spine.at(q)
-    load, by_q = pose.applied(together(world.wrenches(pose, now.test, now.step)))
-    return missing - load, tangent - by_q
+    load, by_q = pose.applied(together(world.wrenches(pose, now)))
+    return held - load, tangent - by_q
+
+
+def _held(world, q, memories, now):
+    """What the joints hold, and its tangent by differences; springs alone have it at once."""
+    count, n = len(q), q[0].size
+    if not world.laws and not world.places:
+        return (world.stiffness * q).reshape(count, n), np.diag(world.stiffness.ravel())
+    moves = DIFFERENCE * np.eye(n).reshape(n, 1, *q.shape[1:])
+    held = world.holding(np.concatenate([q[None], q + moves]), memories, now)
+    held = held.reshape(n + 1, count, n)
+    return held[0], np.moveaxis(held[1:] - held[0], 0, -1) / DIFFERENCE
 
 
 def _renewed(

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .anatomy import JOINTS
+from .anatomy import TRANSLATIONS, joints_of_recipe
 from .catalogue import CATALOGUE
 from .recipe import Hidden, Recipe
 
@@ -20,29 +20,41 @@ BORDER = {
 }
 """SI unit -> unit of tables and the factor to it; other units stay."""
 
-SUFFIXES = {"_rad": "rad", "_m": "m", "_s": "s"}
+SUFFIXES = {"_m": "m", "_s": "s"}
+LENGTHS = ("half_width", "centre", "width", "gap", "reach", "fades", "period", "angle")
+"""Shape parameters in the unit of the effect's coordinate."""
 
 
 def effect_told(hidden: Hidden, gap: float, recipe: Recipe) -> dict[str, Any]:
     """Name, kind, scope in names, parameters in SI and in border units, and the gap."""
     entry = CATALOGUE[hidden.name]
-    strength = _parameter(entry.strength, float(hidden.strength or 0.0), entry.unit)
+    strength = _parameter(
+        entry.strength, float(hidden.strength or 0.0), entry.unit_of(hidden.coordinate)
+    )
     return {
         "name": hidden.name,
         "kind": entry.kind,
         "known": entry.known,
         "scope": {
-            "joints": ["*"] if hidden.joint is None else [JOINTS[hidden.joint]],
+            "joints": ["*"] if hidden.joint is None else [joints_of_recipe(recipe)[hidden.joint]],
             "coordinates": ["*"] if hidden.coordinate is None else [hidden.coordinate],
             "specimens": ["*"] if hidden.specimen is None else [f"s{hidden.specimen + 1:02d}"],
         },
-        "parameters": [strength, *(_shape(key, value) for key, value in hidden.shape.items())],
+        "formula": hidden.shape.get("formula", next(iter(entry.formulas))),
+        "parameters": [strength, *_shapes(hidden)],
         "gap": gap,
         "reached": bool(abs(gap - recipe.gap) <= REACHED * recipe.gap),
     }
 
 
-def _shape(key: str, value: Any) -> dict[str, Any]:
+def _shapes(hidden: Hidden) -> list[dict[str, Any]]:
+    length = "m" if hidden.coordinate in TRANSLATIONS else "rad"
+    return [_shape(key, value, length) for key, value in hidden.shape.items() if key != "formula"]
+
+
+def _shape(key: str, value: Any, length: str) -> dict[str, Any]:
+    if key in LENGTHS:
+        return _parameter(key, value, length)
     for suffix, unit in SUFFIXES.items():
         if key.endswith(suffix):
             return _parameter(key.removesuffix(suffix), value, unit)

@@ -67,14 +67,17 @@ def as_xyz(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def moving_centre(
-    q: np.ndarray, direction: np.ndarray, coordinate: int
+    q: np.ndarray, direction: np.ndarray, coordinate: int, reach: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Laws act at the point ``direction * q[coordinate]`` (m) of the joint frame.
+    """Laws act at the point ``direction * f(q[coordinate])`` (m) of the joint frame.
 
-    Its displacement from neutral is d + (R - 1) c; ``direction`` (J, 3) m/rad.
+    f is the angle itself or, with a reach, ``reach tanh(angle / reach)``. The point's displacement
+    from neutral is d + (R - 1) c; ``direction`` (J, 3) m/rad.
     """
-    turn = matrices(q)
-    centre = direction * q[..., coordinate, None]
+    turn, angle = matrices(q), q[..., coordinate]
+    moved = reach * np.tanh(angle / reach) if reach else angle
+    slope = 1.0 / np.cosh(angle / reach) ** 2 if reach else np.ones_like(angle)
+    centre = direction * moved[..., None]
     shift = q[..., :3] + np.einsum("...ij,...j->...i", turn - np.eye(3), centre)
     derivative = np.zeros((*q.shape, 6))
     derivative[...] = np.eye(6)
@@ -83,5 +86,6 @@ def moving_centre(
     derivative[..., :3, 3:] = np.swapaxes(
         np.cross(np.swapaxes(axes, -1, -2), arm[..., None, :]), -1, -2
     )
-    derivative[..., :3, coordinate] += np.einsum("...ij,...j->...i", turn - np.eye(3), direction)
+    along = np.einsum("...ij,...j->...i", turn - np.eye(3), direction)
+    derivative[..., :3, coordinate] += slope[..., None] * along
     return np.concatenate([shift, q[..., 3:]], axis=-1), derivative

@@ -18,17 +18,18 @@ GRAVITY_M_PER_S2 = 9.81
 
 
 class Now(NamedTuple):
-    """Where in the tests we are: numbers from 0, and the seconds this step takes."""
+    """Where in the tests the states are: numbers from 0, one per state, and this step's seconds."""
 
-    test: int
-    step: int
+    tests: np.ndarray
+    steps: np.ndarray
     seconds: float
 
 
 class Law(Protocol):
     """A joint law: what it adds to the load that holds the joints.
 
-    ``q`` and ``carried`` (the sum of the laws before it) are (..., J, 6); so is the answer.
+    ``q`` and ``carried`` (the sum of the laws before it) are (..., T, J, 6) for states of T tests
+    (T of `Now`); so is the answer.
     """
 
     def __call__(
@@ -37,7 +38,10 @@ class Law(Protocol):
 
 
 class PathLaw(Law, Protocol):
-    """A law with a memory (2, J, 6), which starts at zero and is renewed after every step."""
+    """A law with a memory (cells, T, J, 6), zero at first and renewed after every step."""
+
+    @property
+    def cells(self) -> int: ...
 
     def renewed(self, q: np.ndarray, memory: np.ndarray, now: Now) -> np.ndarray: ...
 
@@ -45,8 +49,8 @@ class PathLaw(Law, Protocol):
 Place = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """q (..., J, 6) -> the coordinates at which the laws act, and their derivative (..., J, 6, 6)."""
 
-Push = Callable[[Pose, Test, int], Wrenches]
-"""Wrenches in a pose of the spine, in a test's step."""
+Push = Callable[[Pose, Now], Wrenches]
+"""Wrenches in poses of the spine, one of each state."""
 
 View = Callable[[np.ndarray], np.ndarray]
 """True motion (T, S, J, 6) -> reported motion."""
@@ -61,7 +65,8 @@ class World:
     number : of the specimen. bones : true geometry. stiffness : (J, 6) of the linear springs.
     tests : load cases as listed in the files.
     weight : whether bodies have weight.
-    turn_load : (T, 3, 3) applied to each test's moment; gain (T,) to its moment and force.
+    load_point : (3,) m, neutral, of the uppermost body: where its force acts.
+    turn_load : (T, 3, 3) applied to each test's moment and force; gain (T,) to all its loads.
     laws, places, pushes, views : effects, in the order in which they act.
     """
 
@@ -71,6 +76,7 @@ class World:
     tests: tuple[Test, ...]
     weight: bool
     preload_points: np.ndarray
+    load_point: np.ndarray
     turn_load: np.ndarray
     gain: np.ndarray
     laws: tuple[Law, ...] = ()
@@ -108,18 +114,17 @@ class World:
         return load
 
     def seen(self, q: np.ndarray) -> np.ndarray:
-        """(J, 6) coordinates at which the laws act."""
+        """(..., J, 6) coordinates at which the laws act."""
         for place in self.places:
             q, _ = place(q)
         return q
 
-    def wrenches(self, pose: Pose, test: int, step: int) -> list[Wrenches]:
+    def wrenches(self, pose: Pose, now: Now) -> list[Wrenches]:
         """Weight, listed loads and hidden loads."""
-        case = self.tests[test]
-        found = [_listed(self, pose, test, step)]
+        found = [_listed(self, pose, now)]
         if self.weight:
             found.append(weights(pose, self.bones.centres, self.bones.masses))
-        return found + [push(pose, case, step) for push in self.pushes]
+        return found + [push(pose, now) for push in self.pushes]
 
     def reported(self, q: np.ndarray) -> np.ndarray:
         """(T, S, J, 6) what an instrument without noise says of the true motion."""
@@ -131,16 +136,30 @@ class World:
 def weights(pose: Pose, centres: np.ndarray, masses: np.ndarray) -> Wrenches:
     """Weight of masses (J,) kg at neutral points (J, 3) m of all bodies."""
     bodies = np.arange(len(masses))
-    down = np.zeros((len(masses), 3))
-    down[:, 1] = -GRAVITY_M_PER_S2 * masses
-    return Wrenches(bodies, pose.point(bodies, centres), down, np.zeros_like(down))
+    points = pose.point(bodies, centres)
+    down = np.zeros_like(points)
+    down[..., 1] = -GRAVITY_M_PER_S2 * masses
+    return Wrenches(bodies, points, down, np.zeros_like(down))
 
 
-def _listed(world: World, pose: Pose, test: int, step: int) -> Wrenches:
-    """The moment on the uppermost body, and an equal share of the preload on each."""
-    case, gain = world.tests[test], world.gain[test]
+def _listed(world: World, pose: Pose, now: Now) -> Wrenches:
+    """Moment and force on the uppermost body, and an equal share of the preload on each."""
     bodies = np.arange(len(world.bones.masses))
-    forces, moments = np.zeros((2, len(bodies), 3))
-    forces[:, 1] = -gain * case.preload / len(bodies)
-    moments[-1] = gain * world.turn_load[test] @ case.moments[step]
-    return Wrenches(bodies, pose.point(bodies, world.preload_points), forces, moments)
+    gain = world.gain[now.tests][:, None]
+    turn = world.turn_load[now.tests]
+    told = [_told(world, part, now) for part in ("moments", "forces")]
+    moment, force = (gain * (turn @ one[:, :, None])[..., 0] for one in told)
+    preloads = np.array([case.preload for case in world.tests])[now.tests]
+    points = pose.point(bodies, world.preload_points)
+    forces, moments = np.zeros_like(points), np.zeros_like(points)
+    forces[..., 1] = -gain * preloads[:, None] / len(bodies)
+    moments[..., -1, :] = moment
+    at = np.concatenate([points, pose.point(bodies[-1:], world.load_point[None])], axis=-2)
+    both = np.concatenate([forces, force[..., None, :]], axis=-2)
+    extra = np.concatenate([moments, np.zeros_like(force)[..., None, :]], axis=-2)
+    return Wrenches(np.append(bodies, bodies[-1]), at, both, extra)
+
+
+def _told(world: World, part: str, now: Now) -> np.ndarray:
+    """(T, 3) moments or forces of these steps of these tests."""
+    return np.stack([getattr(case, part) for case in world.tests])[now.tests, now.steps]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .anatomy import JOINTS, VERTEBRAE, Bones
+from .anatomy import COORDINATES, Bones, joints_of_recipe, vertebrae_of_recipe
 from .design import Test
 from .errors import load_factor
 from .recipe import Recipe
@@ -32,8 +32,8 @@ HEADERS = {
 
 COHORT_YAML = """\
 cohort: "{name}"
-title: Made-up T12-S1 specimens
-source: no measurement; tests/generators/hidden, seed {seed}; statics by OpenSim
+title: Made-up {ends} specimens
+source: no measurement; tests/generators/hidden, seed {seed}
 vertebrae: [{vertebrae}]
 gravity: {gravity}
 zeroed_at_step_0: {zeroed}
@@ -53,8 +53,8 @@ def write_cohort(recipe: Recipe, scene: Scene, table: np.ndarray, folder: Path) 
     (folder / "cohort.yaml").write_text(_yaml(recipe, folder.resolve().name), encoding="utf-8")
     rows = {
         "specimens.csv": ([name] for name in names(scene)),
-        "joints.csv": _joints(scene),
-        "bodies.csv": _bodies(scene),
+        "joints.csv": _joints(recipe, scene),
+        "bodies.csv": _bodies(recipe, scene),
         "loads.csv": _loads(recipe, scene),
         "motion.csv": _motion(recipe, scene, table),
     }
@@ -86,10 +86,12 @@ def names(scene: Scene) -> list[str]:
 
 
 def _yaml(recipe: Recipe, name: str) -> str:
+    vertebrae = vertebrae_of_recipe(recipe)
     header = COHORT_YAML.format(
         name=name,
         seed=recipe.seed,
-        vertebrae=", ".join(VERTEBRAE),
+        vertebrae=", ".join(vertebrae),
+        ends=f"{vertebrae[-1]}-{vertebrae[0]}",
         gravity=str(recipe.gravity).lower(),
         zeroed=str(recipe.zeroed).lower(),
     )
@@ -97,47 +99,57 @@ def _yaml(recipe: Recipe, name: str) -> str:
     return header + (sd if recipe.state_sd else "")
 
 
-def _joints(scene: Scene) -> Rows:
+def _joints(recipe: Recipe, scene: Scene) -> Rows:
+    joints = joints_of_recipe(recipe)
     for name, bones in zip(names(scene), scene.bones, strict=True):
         angles = Rotation.from_matrix(bones.rotations).as_euler("ZXY", degrees=True)
-        for joint, origin, zxy in zip(JOINTS, bones.origins, angles, strict=True):
+        for joint, origin, zxy in zip(joints, bones.origins, angles, strict=True):
             yield [name, joint, *_cells(1000.0 * origin, 9), *_cells(zxy, 10)]
 
 
-def _bodies(scene: Scene) -> Rows:
+def _bodies(recipe: Recipe, scene: Scene) -> Rows:
+    vertebrae = vertebrae_of_recipe(recipe)[1:]
     for name, bones in zip(names(scene), scene.bones, strict=True):
-        segments = zip(VERTEBRAE[1:], bones.masses, bones.centres, bones.inertias, strict=True)
+        segments = zip(vertebrae, bones.masses, bones.centres, bones.inertias, strict=True)
         for vertebra, mass, centre, inertia in segments:
             six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
             yield [name, vertebra, mass, *_cells(1000.0 * centre, 9), *(f"{i:.9e}" for i in six)]
 
 
 def _loads(recipe: Recipe, scene: Scene) -> Rows:
-    factor = load_factor(recipe.errors)
+    vertebrae, factor = vertebrae_of_recipe(recipe)[1:], load_factor(recipe.errors)
     for name, bones in zip(names(scene), scene.bones, strict=True):
         for test in scene.tests:
-            for step, (moment, time) in enumerate(zip(test.moments, test.seconds, strict=True)):
-                for body, *cells in _wrenches(test, factor * moment, bones):
-                    yield [name, test.name, step, VERTEBRAE[body + 1], *cells, time]
+            for step, time in enumerate(test.seconds):
+                for body, *cells in _wrenches(test, step, factor, bones):
+                    yield [name, test.name, step, vertebrae[body], *cells, time]
 
 
-def _wrenches(test: Test, moment: np.ndarray, bones: Bones) -> Rows:
+def _wrenches(test: Test, step: int, factor: float, bones: Bones) -> Rows:
     """Body, force, moment and point: all bodies where there is a preload, else the top alone."""
     points, top = preload_points(bones), len(bones.masses) - 1
+    if test.forces.any():
+        force, moment = test.forces[step], factor * test.moments[step]
+        place = _cells(1000.0 * np.round(bones.origins[-1], 9), 6)
+        yield [top, *_cells(force, 9), *_cells(moment, 9), *place]
+        return
     share = test.preload / len(bones.masses)
     for body in range(0 if test.preload else top, top + 1):
         force = [0, f"{-share:.9f}" if share else 0, 0]
-        moments = _cells(moment, 9) if body == top else [0, 0, 0]
+        moments = _cells(factor * test.moments[step], 9) if body == top else [0, 0, 0]
         yield [body, *force, *moments, *_cells(1000.0 * points[body], 6)]
 
 
 def _motion(recipe: Recipe, scene: Scene, table: np.ndarray) -> Rows:
-    specimens = names(scene)
+    specimens, joints = names(scene), joints_of_recipe(recipe)
+    blank = np.array([name not in recipe.read for name in COORDINATES])
     for place in np.ndindex(table.shape[:-1]):
         number, test, cycle, step, joint = place
-        angles, shifts = _cells(table[place][3:], 9), _cells(table[place][:3], 9)
-        key = [specimens[number], scene.tests[test].name, cycle + 1, step, JOINTS[joint]]
-        yield [*key, *angles, *(shifts if recipe.translations else ("", "", ""))]
+        cells = [
+            "" if off else cell for off, cell in zip(blank, _cells(table[place], 9), strict=True)
+        ]
+        key = [specimens[number], scene.tests[test].name, cycle + 1, step, joints[joint]]
+        yield [*key, *cells[3:], *cells[:3]]
 
 
 def _cells(values: np.ndarray, digits: int) -> list[str]:

@@ -3,9 +3,10 @@
 Each function takes a hidden effect and returns values by parameter name. Where definitions differ
 the map is exact: a share that is lost against a ratio that is left, growth g = rate^2 of tangent
 and cubic, relaxation at constant motion against retardation at constant load. Without counterpart,
-and left out: a follower load or weight of another form, one misalignment for all tests (ours turns
-about axes that depend on the test; by test it is the same), marker offsets, forms of another
-coordinate or shape. Widths over which spinepipe rounds corners are no parameters.
+and left out: formulas that spinepipe does not have, a follower load or weight of another form, one
+misalignment for all tests (ours turns about axes that depend on the test; by test it is the same),
+marker offsets, forms of another coordinate or shape. Widths over which spinepipe rounds corners are
+no parameters.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +18,11 @@ from scipy.spatial.transform import Rotation
 Hidden = Mapping[str, Any]
 Options = Mapping[str, Any]
 Values = dict[str, float]
+
+TRANSLATIONS = ("anterior", "superior", "right")
+
+FACET_REFERENCE = {"rad": float(np.deg2rad(2.0)), "m": 5e-4}
+"""How far beyond the gap spinepipe states the stiffness of a stop."""
 
 AXES = {
     "flexion_extension": 2,
@@ -32,24 +38,38 @@ AXES = {
 """Ground axis of a test's moment, x y z."""
 
 
+def formula(hidden: Hidden, usual: str) -> str:
+    """The formula of a hidden effect."""
+    return str(hidden["shape"].get("formula", usual))
+
+
 def _stiffening(hidden: Hidden, options: Options) -> Values | None:
-    if options["shape"] != hidden["shape"]["shape"]:
+    named, rate = formula(hidden, "exponential"), hidden["strength"]
+    if options["shape"] != named:
         return None
-    rate = hidden["strength"]
-    return {"rate": rate} if options["shape"] == "exponential" else {"growth": rate**2}
+    if named == "bilinear":
+        knee = hidden["shape"]["knee"]
+        return {"gain": 1.0 / knee, "break_at": knee / rate}
+    return {"rate": rate} if named == "exponential" else {"growth": rate**2}
 
 
 def _neutral_zone(hidden: Hidden, options: Options) -> Values | None:
-    width = hidden["shape"]["half_width_rad"]
+    if formula(hidden, "corner") != "corner" or options.get("zone", "centred") != "centred":
+        return None
+    width = hidden["shape"]["half_width"]
     return {"stiffness_ratio": 1.0 - hidden["strength"], "width": width}
 
 
 def _asymmetry(hidden: Hidden, options: Options) -> Values | None:
+    if formula(hidden, "sharp") != "sharp":
+        return None
     return {"asymmetry": hidden["shape"]["sign"] * hidden["strength"]}
 
 
 def _coupling(hidden: Hidden, options: Options) -> Values | None:
     if set(options["pair"]) != {"right_bending", "left_rotation"}:
+        return None
+    if formula(hidden, "linear") != "linear":
         return None
     return {"coupling": hidden["shape"]["sign"] * hidden["strength"]}
 
@@ -57,23 +77,39 @@ def _coupling(hidden: Hidden, options: Options) -> Values | None:
 def _facet(hidden: Hidden, options: Options) -> Values | None:
     if options["side"] != ("positive" if hidden["shape"]["side"] > 0 else "negative"):
         return None
-    return {"stiffness": hidden["strength"], "gap": hidden["shape"]["gap_rad"]}
+    named, gap = formula(hidden, "linear"), hidden["shape"]["gap"]
+    if named == "linear":
+        return {"stiffness": hidden["strength"], "gap": gap, "exponent": 1.0}
+    if named == "hertz":
+        deep = FACET_REFERENCE["m" if hidden["coordinate"] in TRANSLATIONS else "rad"]
+        stiffness = hidden["strength"] * np.sqrt(deep / hidden["shape"]["width"])
+        return {"stiffness": float(stiffness), "gap": gap, "exponent": 1.5}
+    return None
 
 
 def _laxity(hidden: Hidden, options: Options) -> Values | None:
+    if formula(hidden, "share") != "share":
+        return None
     return {"fraction": hidden["strength"]}
 
 
 def _preload(hidden: Hidden, options: Options) -> Values | None:
-    return {"rise": hidden["strength"]}
+    return {"rise": hidden["strength"]} if formula(hidden, "linear") == "linear" else None
 
 
 def _hysteresis(hidden: Hidden, options: Options) -> Values | None:
-    return {"moment": hidden["strength"], "yield_angle": hidden["shape"]["width_rad"]}
+    if formula(hidden, "dahl") != "dahl" or options.get("law", "dahl") != "dahl":
+        return None
+    force, far = hidden["strength"], hidden["shape"]["width"]
+    if hidden["coordinate"] in TRANSLATIONS:
+        return {"force": force, "yield_distance": far}
+    return {"moment": force, "yield_angle": far}
 
 
 def _creep(hidden: Hidden, options: Options) -> Values | None:
     """Compliance grows by f over time T; stiffness falls by f / (1 + f) over T / (1 + f)."""
+    if formula(hidden, "kelvin") != "kelvin":
+        return None
     grown = 1.0 + hidden["strength"]
     time = hidden["shape"]["time_s"] / grown
     return {"fraction": hidden["strength"] / grown, "time": time}
@@ -85,19 +121,25 @@ def _centre(hidden: Hidden, options: Options) -> Values | None:
 
 
 def _migration(hidden: Hidden, options: Options) -> Values | None:
+    if formula(hidden, "linear") != "linear":
+        return None
     vector = hidden["strength"] * np.array(hidden["shape"]["direction"])
     return {"anterior": float(vector[0]), "superior": float(vector[1])}
 
 
 def _weight(hidden: Hidden, options: Options) -> Values | None:
-    return {"mass": hidden["strength"]} if options["where"] == "each" else None
+    same = options["where"] == "each" and formula(hidden, "each") == "each"
+    return {"mass": hidden["strength"]} if same else None
 
 
 def _follower(hidden: Hidden, options: Options) -> Values | None:
-    return {"force": hidden["strength"]} if options["guides"] == "centres" else None
+    same = options["guides"] == "centres" and formula(hidden, "centres") == "centres"
+    return {"force": hidden["strength"]} if same else None
 
 
 def _offset(hidden: Hidden, options: Options) -> Values | None:
+    if formula(hidden, "moment") != "moment":
+        return None
     moment = hidden["strength"] * np.array(hidden["shape"]["axis"])
     return {f"moment_{axis}": float(one) for axis, one in zip("xyz", moment, strict=True)}
 
@@ -151,4 +193,5 @@ VECTORS = (
 
 def levels(hidden: Hidden) -> list[float]:
     """Ratio of each joint to the geometric mean of all."""
-    return [float(np.exp(hidden["strength"] * step)) for step in hidden["shape"]["pattern"]]
+    key = "trend" if formula(hidden, "drawn") == "trend" else "pattern"
+    return [float(np.exp(hidden["strength"] * step)) for step in hidden["shape"][key]]
