@@ -170,7 +170,8 @@ class ForwardCost(Evaluator):
             poses = [end for end in ends if end is not None]
             if len(poses) < len(ends):
                 return LOST
-            residual = self._residual(number, np.stack([observe(there, q) for q in poses]))
+            seen = np.stack([observe(there, q, place) for place, q in enumerate(poses)])
+            residual = self._residual(number, seen)
             total += float(residual @ residual)
         return min(total, LOST)
 

@@ -167,7 +167,7 @@ class Evaluator:
             return None
         chain = self._systems[0].chain
         seen = [
-            np.stack([observe(System(chain, model, case), q) for q in ends])
+            np.stack([observe(System(chain, model, case), q, k) for k, q in enumerate(ends)])
             for case, ends in zip(cases, poses, strict=True)
         ]
         residual = np.concatenate([self._residual(n, one) for n, one in enumerate(seen)])

@@ -10,6 +10,7 @@ from spinepipe.model.spine import (
     RefusedModel,
     ScopedEffect,
     SpineModel,
+    Support,
 )
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "RefusedModel",
     "ScopedEffect",
     "SpineModel",
+    "Support",
 ]

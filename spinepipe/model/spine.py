@@ -72,12 +72,39 @@ class ScopedEffect:
 
 
 @dataclass(frozen=True)
+class Support:
+    """A joint coordinate that a rig fixes during a load step, with whatever load that takes.
+
+    Attributes
+    ----------
+    joint, coordinate : places, the coordinate in the order of `spinepipe.units.COORDINATES`.
+    value : m or rad, where it is fixed.
+    read_as : m per N or rad per N m by which the rig's load on it counts as a reading; None where
+        that load was not measured. See `spinepipe.statics.many.reactions`.
+    """
+
+    joint: int
+    coordinate: int
+    value: float
+    read_as: float | None = None
+
+    @property
+    def place(self) -> int:
+        """Its number among the coordinates of a model."""
+        return 6 * self.joint + self.coordinate
+
+
+@dataclass(frozen=True)
 class LoadStep:
-    """Loads of one step of a test; ``time`` in s where the test records it."""
+    """Loads of one step of a test; ``time`` in s where the test records it.
+
+    ``supports`` : joint coordinates that are fixed, the same ones in all steps of a test.
+    """
 
     step: int
     wrenches: tuple[Wrench, ...]
     time: float | None = None
+    supports: tuple[Support, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,6 +120,18 @@ class LoadCase:
             for load in step.wrenches:
                 if not np.isfinite([*load.point, *load.force, *load.moment]).all():
                     raise RefusedModel(f"test {self.test}, step {step.step}: a load is not finite")
+            places = [support.place for support in step.supports]
+            if places != self.fixed or len(set(places)) < len(places):
+                told = "coordinates are fixed once each, the same ones in all steps"
+                raise RefusedModel(f"test {self.test}, step {step.step}: {told}")
+            if not np.isfinite([support.value for support in step.supports]).all():
+                told = "a coordinate is fixed at no finite value"
+                raise RefusedModel(f"test {self.test}, step {step.step}: {told}")
+
+    @property
+    def fixed(self) -> list[int]:
+        """Places of the coordinates that a rig fixes, among the n of a model."""
+        return [support.place for step in self.steps[:1] for support in step.supports]
 
 
 @dataclass(frozen=True)

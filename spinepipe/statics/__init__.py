@@ -3,6 +3,7 @@
 from spinepipe.statics.equilibrium import Equilibrium
 from spinepipe.statics.given_sensitivity import LoadSensitivity, by_joint_pose, by_load
 from spinepipe.statics.path import SolvedStep, carried_over, follow
+from spinepipe.statics.reactions import reaction, reactions_by
 from spinepipe.statics.sensitivity import (
     FreeParameter,
     by_parameters,
@@ -51,6 +52,8 @@ __all__ = [
     "no_settling",
     "observe",
     "observed_by_parameters",
+    "reaction",
+    "reactions_by",
     "retrace",
     "settle",
 ]

@@ -19,7 +19,7 @@ from scipy.linalg import eigvals
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotri
 from scipy.optimize import brentq
 
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.holding import States
 from spinepipe.statics.system import Loading, System
 from spinepipe.status import Status
@@ -170,7 +170,7 @@ def _newton(system: System, start: Array, loading: Loading, states: States) -> _
 
     A step beyond the ends of a law, where it carries without limit, is halved.
     """
-    q, last = start, np.inf
+    q, last = system.start(start, loading), np.inf
     step: Array | None = None
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
@@ -198,12 +198,12 @@ def _beyond_motion(q: Array) -> bool:
 
 
 def _stability(system: System, found: _Newton) -> Stability:
-    return stability(system.chain, found.q, found.tangent, found.factored.sign)
+    return stability(system.chain, found.q, found.tangent, found.factored.sign, system.free)
 
 
 def approach(system: System, start: Array, loading: Loading, states: States) -> Array | None:
     """Pose (n,) next to the equilibrium under a loading, or None when the way there is lost."""
-    q = start
+    q = system.start(start, loading)
     for _ in range(MOST_STEPS):
         balance = system.balance(q, loading, states)
         try:
@@ -251,8 +251,12 @@ def factor(tangent: Array) -> Factored:
     return Factored(lu, pivots, -1 if (swaps + negative) % 2 else 1)
 
 
-def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
+def stability(
+    chain: Chain, q: Array, tangent: Array, sign: int, free: Indices | None = None
+) -> Stability:
     """Stability of the equilibrium at q (n,) with tangent K (n, n), its determinant's sign.
+
+    Only the motion of the coordinates that are free counts; None for all.
 
     An odd number of growing modes shows as a negative determinant. With K = S + A (symmetric and
     skew parts) and in coordinates where the damping is the identity, the motion decays for sure
@@ -260,6 +264,8 @@ def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
     then obeys m l^2 + l + (s + i a) = 0 with a^2 m < s, whose roots have negative real parts.
     """
     damping = chain.model.damping.ravel()
+    if free is not None:
+        damping, tangent = damping[free], tangent[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(damping)
     scaled = tangent * scale[:, None] * scale
     skew = 0.5 * (scaled - scaled.T)
@@ -271,7 +277,10 @@ def stability(chain: Chain, q: Array, tangent: Array, sign: int) -> Stability:
     if np.array_equal(tangent, tangent.T):  # then inertia and damping decide nothing
         return Stability(stable=positive, symmetric_part_positive=positive)
     twist = 0.5 * float(np.sum(skew * skew))  # |A|^2: a skew matrix's singular values are pairs
-    mass = chain.mass_matrix(q) * scale[:, None] * scale
+    mass = chain.mass_matrix(q)
+    if free is not None:
+        mass = mass[np.ix_(free, free)]
+    mass = mass * scale[:, None] * scale
     if positive and twist * np.linalg.norm(mass) < smallest:
         return Stability(stable=True, symmetric_part_positive=True)
     return Stability(decays(mass, scaled), positive)

@@ -48,10 +48,17 @@ def by_load(system: System, step: SolvedStep, slot: int) -> LoadSensitivity:
     # A point's velocity is linear in the point: unit shifts give the exact derivative.
     shifted = [motion.velocities(body, point + shift) - velocities for shift in np.eye(3)]
     return LoadSensitivity(
-        by_force=factored.solve(velocities),
-        by_moment=factored.solve(motion.angular(body)),
-        by_point=factored.solve(np.stack([v @ force for v in shifted], axis=1)),
+        by_force=factored.solve(_unfixed(system, velocities)),
+        by_moment=factored.solve(_unfixed(system, motion.angular(body))),
+        by_point=factored.solve(_unfixed(system, np.stack([v @ force for v in shifted], axis=1))),
     )
+
+
+def _unfixed(system: System, change: Array) -> Array:
+    """(n, m) changes of load, which move no coordinate that a rig fixes."""
+    found = change.copy()
+    found[system.fixed] = 0.0
+    return found
 
 
 def by_joint_pose(system: System, step: SolvedStep) -> Array:
@@ -84,7 +91,7 @@ def by_joint_pose(system: System, step: SolvedStep) -> Array:
                     moved = _load_change(motion.axes, load, 6 * (carrier + 1), omega, base)
                     change[:, joint, component] += sign * moved
     # The residual is holding less applied load, so dr/dxi = -change and dq/dxi = K^-1 change.
-    return factored.solve(change.reshape(n, -1)).reshape(n, n_joints, 6)
+    return factored.solve(_unfixed(system, change.reshape(n, -1))).reshape(n, n_joints, 6)
 
 
 def _twists(frame: Pose) -> list[tuple[Array, Array]]:

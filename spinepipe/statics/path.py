@@ -59,10 +59,10 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
     guesses : (n,) poses close to the solutions, one per step, from a neighbouring problem.
     """
     solved: list[SolvedStep] = []
-    q, before, states = np.zeros(system.chain.n), system.slots.unloaded(), system.initial_states()
+    q, before, states = np.zeros(system.chain.n), system.unloaded(), system.initial_states()
     clock = 0.0
     for number, step in enumerate(system.case.steps):
-        loading = system.slots.loading(step.wrenches)
+        loading = system.loading(step)
         time = clock if step.time is None else step.time
         states, clock = replace(states, seconds=time - clock), time
         if solved and not solved[-1].usable:

@@ -5,17 +5,18 @@ them together. Every derivative is taken at the solved pose with the tangent's L
 Newton left.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from spinepipe.effects import Parameter
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Beside
 from spinepipe.model import SpineModel
 from spinepipe.statics.holding import ActivePath, Law
+from spinepipe.statics.instruments import beside, followed, passed, read, read_by
 from spinepipe.statics.path import SolvedStep
-from spinepipe.statics.system import System
+from spinepipe.statics.system import ActiveMeasurement, System
 
 
 @dataclass(frozen=True)
@@ -106,15 +107,20 @@ def by_parameters(
     ValueError
         When a step has no equilibrium.
     """
+    return [dq for _, dq, _ in step_by_step(system, solved, free)]
+
+
+def step_by_step(
+    system: System, solved: Sequence[SolvedStep], free: Sequence[FreeParameter]
+) -> Iterator[tuple[SolvedStep, Array, dict[int, Array]]]:
+    """Each step, the derivative (n, m) of its pose, and those of the states that it began with."""
     starts = system.initial_states().of
     state_by_x = {index: np.zeros((*s.shape, len(free))) for index, s in starts.items()}
-    result = []
     for step in solved:
         residual = residual_by_parameters(system, step, free, state_by_x)
         dq = -step.factored.solve(residual)
-        result.append(dq)
+        yield step, dq, state_by_x
         state_by_x = _advance(system, step, free, dq, state_by_x)
-    return result
 
 
 def residual_by_parameters(
@@ -123,7 +129,19 @@ def residual_by_parameters(
     free: Sequence[FreeParameter],
     state_by_x: dict[int, Array],
 ) -> Array:
-    """(n, m) derivative of the residual at fixed pose by the unknowns."""
+    """(n, m) derivative of the residual at fixed pose; zero where a rig fixes a coordinate."""
+    columns = unsupported_by_parameters(system, step, free, state_by_x)
+    columns[system.fixed] = 0.0
+    return columns
+
+
+def unsupported_by_parameters(
+    system: System,
+    step: SolvedStep,
+    free: Sequence[FreeParameter],
+    state_by_x: dict[int, Array],
+) -> Array:
+    """(n, m) derivative, at fixed pose, of what the joints hold less what is applied."""
     q = step.equilibrium.q
     derivatives = system.derivatives(q, step.states)
     table = {
@@ -221,25 +239,51 @@ def _placement_by_x(
     return result
 
 
-def observe(system: System, q: Array) -> Array:
-    """Reported coordinates (J, 6) at pose q (n,): what the measurement effects make of it."""
+def observe(system: System, q: Array, place: int | None = None) -> Array:
+    """Reported coordinates (J, 6) at pose q (n,): what the measurement effects make of it.
+
+    Parameters
+    ----------
+    place : of the load step in its test, for instruments that drift or follow other joints.
+
+    Raises
+    ------
+    ValueError
+        Where such an instrument is not told the load step.
+    """
     joints = q.reshape(-1, 6).copy()
     for active in system.measurement:
-        joints[active.joints] = active.effect.observe(joints[active.joints], active.values).q
+        around = _beside(system, active, joints, place)
+        here = joints[active.joints]
+        joints[active.joints] = read(active.effect, here, active.values, around).q
     return joints
 
 
+def _beside(
+    system: System, active: ActiveMeasurement, joints: Array, place: int | None
+) -> Beside | None:
+    """What stands beside the joints in scope (J, 6); None where no load step is told."""
+    if place is None:
+        return None
+    every = beside(joints, passed(system.case)[place])
+    at = active.joints
+    return Beside(every.above[at], every.below[at], every.passed[at])
+
+
 def observed_by_parameters(
-    system: System, q: Array, dq: Array, free: Sequence[FreeParameter]
+    system: System, q: Array, dq: Array, free: Sequence[FreeParameter], place: int | None = None
 ) -> Array:
     """(J, 6, m) derivative of the reported coordinates by the unknowns, at pose q (n,)."""
     joints = q.reshape(-1, 6).copy()
     by_x = dq.reshape(len(joints), 6, dq.shape[1]).copy()
     for active in system.measurement:
-        here = joints[active.joints]
-        seen = active.effect.observe(here, active.values)
-        own = active.effect.by_parameter(here, active.values)
-        by_x[active.joints] = seen.by_coordinate @ by_x[active.joints]
+        here, around = joints[active.joints], _beside(system, active, joints, place)
+        seen = read(active.effect, here, active.values, around)
+        own = read_by(active.effect, here, active.values, around)
+        neighbours = np.zeros((2, len(joints), *by_x.shape[1:]))
+        neighbours[0, :-1], neighbours[1, 1:] = by_x[1:], by_x[:-1]
+        above, below = neighbours[:, active.joints]
+        by_x[active.joints] = followed(seen, by_x[active.joints], (above, below))
         for column, parameter in enumerate(free):
             if parameter.effect == active.index:
                 rows = _joints_moved(parameter, active.per_joint)

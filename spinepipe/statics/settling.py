@@ -240,6 +240,10 @@ def retrace(system: System, program: Program, sizes: Sequence[float]) -> Array |
 
 def no_settling(system: System) -> str | None:
     """Why the chain cannot move in time, or None when it can."""
+    if len(system.fixed):
+        return (
+            "a rig that fixes joint coordinates holds no spine that moves: use equilibrium loading"
+        )
     if system.paths:
         return "path effects advance by load step, not in time: use equilibrium loading"
     _, singular = dpotrf(system.chain.mass_matrix(np.zeros(system.chain.n)), lower=True)

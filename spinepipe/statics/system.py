@@ -1,11 +1,12 @@
 """A model under one test, ready to be solved: residual and exact tangent at any pose.
 
-What acts on the chain at one moment is a `Loading`: the listed wrenches, and how much of the
-weight.
+What acts on the chain at one moment is a `Loading`: the listed wrenches, how much of the weight,
+and where a rig fixes joint coordinates. The balance of such a coordinate is q = value, whatever
+load that takes; that load, the reaction, is what its balance misses then.
 """
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar, cast
 
 import numpy as np
@@ -16,12 +17,11 @@ from spinepipe.effects import (
     JointLaw,
     Kind,
     LoadEffect,
-    MeasurementEffect,
     PathLaw,
     Wrench,
 )
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics.holding import (
     ActiveLaw,
     ActivePath,
@@ -32,6 +32,7 @@ from spinepipe.statics.holding import (
     hold,
 )
 from spinepipe.statics.holding import differentiate as differentiate_holding
+from spinepipe.statics.instruments import Instrument
 from spinepipe.statics.motion import ChainMotion, cross_matrix
 from spinepipe.statics.placement import ActiveGeometry, Placed, place
 from spinepipe.world import Chain
@@ -45,16 +46,19 @@ class Loading:
     ----------
     forces, moments : (S, 3) N and N m, fixed in ground.
     share : 0 (weightless, load effects off) to 1.
+    fixed : (k,) m and rad, value of each coordinate that the case fixes.
     """
 
     forces: Array
     moments: Array
     share: float
+    fixed: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def key(self) -> bytes:
         """The same for the same loading of the same slots."""
-        return self.forces.tobytes() + self.moments.tobytes() + np.float64(self.share).tobytes()
+        numbers = (self.forces, self.moments, np.float64(self.share), self.fixed)
+        return b"".join(one.tobytes() for one in numbers)
 
     def towards(self, other: "Loading", fraction: float) -> "Loading":
         """The loading that far on the straight way to another."""
@@ -62,6 +66,7 @@ class Loading:
             self.forces + fraction * (other.forces - self.forces),
             self.moments + fraction * (other.moments - self.moments),
             self.share + fraction * (other.share - self.share),
+            self.fixed + fraction * (other.fixed - self.fixed),
         )
 
 
@@ -128,7 +133,7 @@ class ActiveLoad:
 class ActiveMeasurement:
     """A measurement effect at work: its place in the model's effects, its joints and values."""
 
-    effect: MeasurementEffect
+    effect: Instrument
     index: int
     joints: Indices
     values: Array
@@ -154,6 +159,7 @@ class System:
         ones = np.ones((chain.n, chain.n))
         self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
         self._diagonal = np.diag_indices(chain.n)
+        self.fixed: Indices = np.array(case.fixed, dtype=np.int64)
 
     def _activate(self, index: int, scoped: ScopedEffect) -> None:
         effect, joints, values = scoped.effect, np.array(scoped.joints), scoped.values
@@ -168,8 +174,7 @@ class System:
             case Kind.LOAD:
                 self.load_effects.append(ActiveLoad(cast(LoadEffect, effect), *shared))
             case Kind.MEASUREMENT:
-                measurement = cast(MeasurementEffect, effect)
-                self.measurement.append(ActiveMeasurement(measurement, *shared))
+                self.measurement.append(ActiveMeasurement(cast(Instrument, effect), *shared))
             case _:
                 raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
 
@@ -194,8 +199,44 @@ class System:
             {law.index: np.zeros((len(law.joints), law.effect.n_states)) for law in self.paths}
         )
 
+    @property
+    def free(self) -> Indices | None:
+        """Places of the coordinates that no rig fixes; None for all."""
+        if not len(self.fixed):
+            return None
+        return np.setdiff1d(np.arange(self.chain.n), self.fixed)
+
+    def unloaded(self) -> Loading:
+        """No wrench, no weight, and fixed coordinates where they are in the neutral pose."""
+        return replace(self.slots.unloaded(), fixed=np.zeros(len(self.fixed)))
+
+    def loading(self, step: LoadStep) -> Loading:
+        """What acts in a step of the case."""
+        values = np.array([support.value for support in step.supports])
+        return replace(self.slots.loading(step.wrenches), fixed=values)
+
+    def start(self, q: Array, loading: Loading) -> Array:
+        """The pose q (n,) with fixed coordinates where the loading has them."""
+        if not len(self.fixed):
+            return q
+        there = q.copy()
+        there[self.fixed] = loading.fixed
+        return there
+
     def balance(self, q: Array, loading: Loading, states: States) -> Balance:
-        """Residual and tangent at q (n,)."""
+        """Residual and tangent at q (n,); those of a fixed coordinate are of q - value.
+
+        Nothing hangs on a fixed coordinate: steps start where it is fixed, see `start`.
+        """
+        found = self.unsupported(q, loading, states)
+        if len(self.fixed):
+            found.residual[self.fixed] = q[self.fixed] - loading.fixed
+            found.tangent[self.fixed] = found.tangent[:, self.fixed] = 0.0
+            found.tangent[self.fixed, self.fixed] = 1.0
+        return found
+
+    def unsupported(self, q: Array, loading: Loading, states: States) -> Balance:
+        """Residual and tangent at q (n,) without any support: what supports hold is missing."""
         motion = ChainMotion(self.chain, q)
         holding = self._hold(q, states)
         applied, tangent = self._apply(motion, loading)
@@ -216,8 +257,12 @@ class System:
     def residual(self, q: Array, loading: Loading, states: States) -> Array:
         """Residual alone at q (n,), at half the price of a balance."""
         motion = ChainMotion(self.chain, q)
-        weightless = self.weightless_residual(motion, loading, states)
-        return weightless - self._weight(motion, loading) if self._heavy else weightless
+        found = self.weightless_residual(motion, loading, states)
+        if self._heavy:
+            found = found - self._weight(motion, loading)
+        if len(self.fixed):
+            found[self.fixed] = q[self.fixed] - loading.fixed
+        return found
 
     def weightless_residual(self, motion: ChainMotion, loading: Loading, states: States) -> Array:
         """Residual (n,) but for the weight, for callers that get it with the inertial loads."""

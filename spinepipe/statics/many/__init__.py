@@ -1,6 +1,13 @@
 """Many runs at once: stacks of models and tests, and spines that differ in numbers alone."""
 
-from spinepipe.statics.many.derive import answered, poses_by, readings, readings_by
+from spinepipe.statics.many.derive import (
+    answered,
+    poses_by,
+    reactions,
+    reactions_by,
+    readings,
+    readings_by,
+)
 from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.given import by_joint_pose, by_load
 from spinepipe.statics.many.idle import Acting, Answering
@@ -24,6 +31,8 @@ __all__ = [
     "by_joint_pose",
     "by_load",
     "poses_by",
+    "reactions",
+    "reactions_by",
     "readings",
     "readings_by",
     "settle",

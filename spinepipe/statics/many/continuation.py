@@ -41,6 +41,7 @@ class Increment:
             np.concatenate([before.points, after.points], axis=1),
             np.concatenate([before.forces, after.forces], axis=1),
             np.concatenate([before.moments, after.moments], axis=1),
+            before.supports.towards(after.supports, reached),
         )
         own = Chains(*(numbers[self.after.chain[lanes]] for numbers in chains))
         weight = own.gravity * self.share(lanes, reached)[:, None]

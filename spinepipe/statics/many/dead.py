@@ -76,6 +76,7 @@ def _and(loads: Loads, lanes: Indices, added: Wrenches) -> Loads:
         np.concatenate([loads.points, points], axis=1),
         np.concatenate([loads.forces, forces], axis=1),
         np.concatenate([loads.moments, moments], axis=1),
+        loads.supports,
     )
 
 

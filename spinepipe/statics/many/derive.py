@@ -1,22 +1,28 @@
-"""Derivatives of a stack's poses and readings by unknowns, exact, at solved poses.
+"""What is read of a stack at solved poses, and exact derivatives of poses and readings by unknowns.
+
+An instrument reads a coordinate; where a rig fixes that and its load is measured, it reads the
+reaction instead, in the coordinate's own unit (`Support.read_as`).
 
 Unknowns are a model's own, `FreeParameter`; arrays have as many columns as the model with most of
 them, and the columns that a model does not have stay zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from spinepipe.effects import MeasurementEffect
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array, Beside, Indices, MeasurementBeside
+from spinepipe.statics.instruments import Instrument, beside, followed, passed, read, read_by
 from spinepipe.statics.many.bound import Bound, Slopes
 from spinepipe.statics.many.dead import pushes
-from spinepipe.statics.many.elimination import Changes, answers
+from spinepipe.statics.many.elimination import NONE, Changes, answers, missing
 from spinepipe.statics.many.lanes import Acting
 from spinepipe.statics.many.stack import Stack
-from spinepipe.statics.many.survey import part, survey
+from spinepipe.statics.many.survey import Survey, part, survey
 from spinepipe.statics.path import follow
+from spinepipe.statics.reactions import reaction
+from spinepipe.statics.reactions import reactions_by as engine_reactions_by
 from spinepipe.statics.sensitivity import FreeParameter, by_parameters
 from spinepipe.statics.system import System
 from spinepipe.world import Chain
@@ -26,9 +32,9 @@ Unknowns = Sequence[Sequence[FreeParameter]]
 
 
 def answered(stack: Stack, q: Array, sources: Array) -> Array:
-    """(L, J, 6, m) how poses q (L, J, 6) answer loads on the joints' axes (L, J, 6, m).
+    """(L, J, 6, m) how what is read at poses q (L, J, 6) answers loads on the axes (L, J, 6, m).
 
-    States of laws that remember are as at the start.
+    States of laws that remember are as at the start; nothing is between poses and instruments.
     """
     found = np.zeros(sources.shape)
     for runs in stack.chunks(np.arange(len(stack.remembers))):
@@ -37,7 +43,76 @@ def answered(stack: Stack, q: Array, sources: Array) -> Array:
         tangents = bound.held(q[lanes]).tangent
         seen = survey(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
         found[lanes], _ = answers(seen, Changes(sources[lanes]))
+        if stack.loads.supports.there:
+            held = missing(seen, found[lanes]) - sources[lanes]
+            found[lanes] = _with_reactions(stack, lanes, found[lanes], held)
     return found
+
+
+def _with_reactions(stack: Stack, lanes: Indices, read: Array, reactions: Array) -> Array:
+    """What is read on lanes (N, J, 6, ...), with reactions where they are read."""
+    read_as = stack.loads.supports.read_as[lanes]
+    read_as = read_as.reshape(read_as.shape + (1,) * (read.ndim - 3))
+    return np.where(read_as > 0.0, read_as * reactions, read)
+
+
+def _supported(stack: Stack) -> Iterator[Indices]:
+    """Lanes of runs whose rigs fix anything, in portions in which states may be advanced."""
+    if not stack.loads.supports.there:
+        return
+    fixed = np.logical_or.reduceat(stack.loads.supports.fixed.any(axis=(1, 2)), stack.first[:-1])
+    runs = fixed & ~stack.alone
+    for some in stack.chunks(np.flatnonzero(runs & ~stack.remembers)):
+        yield stack.lanes(some)
+    for some in stack.chunks(np.flatnonzero(runs & stack.remembers), stepwise=True):
+        for _, lanes in stack.steps(some):
+            yield lanes
+
+
+def reactions(stack: Stack, q: Array) -> Array:
+    """(L, J, 6) N and N m of rigs on what they fix at poses q (L, J, 6), zero elsewhere.
+
+    Positive in the direction of the coordinate.
+    """
+    found, states = np.zeros(q.shape), stack.initial_states()
+    for lanes in _supported(stack):
+        bound = stack.bound(lanes, states)
+        held = bound.held(q[lanes])
+        seen = survey(stack.chains, part(stack.loads, lanes), q[lanes], held.tangent)
+        found[lanes] = np.where(seen.fixed, held.load - seen.applied, 0.0)
+        stack.remember(states, bound, bound.after(q[lanes]))
+    for run in np.flatnonzero(stack.alone).tolist():
+        system = _system(stack, run)
+        for lane, step in enumerate(follow(system), int(stack.first[run])):
+            found[lane] = reaction(system, step).reshape(stack.joints, 6)
+    return found
+
+
+def reactions_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
+    """(L, J, 6, m) derivative of the reactions, from that of the poses (L, J, 6, m)."""
+    moved = _Moved(stack, unknowns)
+    found = np.zeros(dq.shape)
+    states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
+    for lanes in _supported(stack):
+        bound = stack.bound(lanes, states)
+        slopes = moved.on(bound)
+        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        found[lanes] = moved.reactions(lanes, bound, (q[lanes], dq[lanes]), slopes, before)
+        after = bound.after_by(q[lanes], dq[lanes], slopes, before)
+        stack.remember(states_by_x, bound, after)
+        stack.remember(states, bound, bound.after(q[lanes]))
+    for run in np.flatnonzero(stack.alone).tolist():
+        system, free = _system(stack, run), unknowns[int(stack.loads.chain[stack.first[run]])]
+        every = engine_reactions_by(system, follow(system), free)
+        for lane, by_x in enumerate(every, int(stack.first[run])):
+            found[lane, ..., : len(free)] = by_x.reshape(stack.joints, 6, len(free))
+    return found
+
+
+def _system(stack: Stack, run: int) -> System:
+    """A run as the engine of record takes it."""
+    model = stack.model(int(stack.loads.chain[stack.first[run]]))
+    return System(Chain(model), model, stack.case(run))
 
 
 def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
@@ -59,9 +134,8 @@ def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
 
 def _by_engine(stack: Stack, run: int, unknowns: Unknowns, found: Array) -> None:
     """Enter the derivatives of a run with an effect that takes no stack."""
-    owner = int(stack.loads.chain[stack.first[run]])
-    model, free = stack.model(owner), unknowns[owner]
-    system = System(Chain(model), model, stack.case(run))
+    free = unknowns[int(stack.loads.chain[stack.first[run]])]
+    system = _system(stack, run)
     by_x = by_parameters(system, follow(system), free)
     for lane, dq in enumerate(by_x, int(stack.first[run])):
         found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
@@ -117,17 +191,60 @@ class _Moved:
         stack = self.stack
         sources = np.negative(bound.held_by(q, slopes, states_by_x))
         seen = survey(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
+        return answers(seen, Changes(sources, self._pushes(lanes, seen)))[0]
+
+    def _pushes(self, lanes: Indices, seen: Survey) -> Array:
+        """(N, J, 6, m) derivative of the wrench on each vertebra, or none."""
         if not self.dead:
-            return answers(seen, Changes(sources))[0]
+            return NONE
+        stack = self.stack
         run, listed = stack.run[lanes], part(stack.listed, lanes)
-        pushed = pushes(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
-        return answers(seen, Changes(sources, pushed))[0]
+        return pushes(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
+
+    def reactions(
+        self,
+        lanes: Indices,
+        bound: Bound,
+        there: tuple[Array, Array],
+        slopes: Slopes,
+        states_by_x: dict[int, Array],
+    ) -> Array:
+        """(N, J, 6, m) derivative of the reactions of some lanes.
+
+        Parameters
+        ----------
+        there : poses q (N, J, 6) and their derivatives (N, J, 6, m).
+        """
+        stack, (q, dq) = self.stack, there
+        seen = survey(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
+        own = bound.held_by(q, slopes, states_by_x)
+        by_x = own + missing(seen, dq, self._pushes(lanes, seen))
+        found: Array = np.where(seen.fixed[..., None], by_x, 0.0)
+        return found
 
 
-def observing(one: Acting) -> MeasurementEffect:
+def observing(one: Acting) -> Instrument:
     """The effect on what is measured."""
-    assert isinstance(one.effect, MeasurementEffect)
+    assert isinstance(one.effect, MeasurementEffect | MeasurementBeside)
     return one.effect
+
+
+def _beside(stack: Stack, effect: Instrument, seen: Array, flat: Indices) -> Beside | None:
+    """What stands beside joints at places ``flat`` of all (L J, 6), if the effect asks for it."""
+    if not isinstance(effect, MeasurementBeside):
+        return None
+    runs = range(len(stack.remembers))
+    along = np.concatenate([passed(stack.case(run)) for run in runs])
+    every = beside(seen.reshape(-1, stack.joints, 6), along)
+    return Beside(every.above[flat], every.below[flat], every.passed[flat])
+
+
+def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]:
+    """Derivatives (K, 6, m) of the joints above and below, from those of all (L J, 6, m)."""
+    every = by_x.reshape(-1, stack.joints, *by_x.shape[1:])
+    above, below = np.zeros(every.shape), np.zeros(every.shape)
+    above[:, :-1], below[:, 1:] = every[:, 1:], every[:, :-1]
+    return above.reshape(by_x.shape)[flat], below.reshape(by_x.shape)[flat]
 
 
 def readings(stack: Stack, q: Array) -> Array:
@@ -136,8 +253,13 @@ def readings(stack: Stack, q: Array) -> Array:
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
         flat = stack.joints * lanes + one.joint[places]
-        seen[flat] = observing(one).observe(seen[flat], one.values[one.row[places]]).q
-    return seen.reshape(q.shape)
+        effect = observing(one)
+        around = _beside(stack, effect, seen, flat)
+        seen[flat] = read(effect, seen[flat], one.values[one.row[places]], around).q
+    if not stack.loads.supports.there:
+        return seen.reshape(q.shape)
+    every = np.arange(len(q))
+    return _with_reactions(stack, every, seen.reshape(q.shape), reactions(stack, q))
 
 
 def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
@@ -146,9 +268,15 @@ def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
         flat, rows = stack.joints * lanes + one.joint[places], one.row[places]
-        observed = observing(one).observe(seen[flat], one.values[rows])
-        own = observing(one).by_parameter(seen[flat], one.values[rows])
+        effect = observing(one)
+        around = _beside(stack, effect, seen, flat)
+        observed = read(effect, seen[flat], one.values[rows], around)
+        own = read_by(effect, seen[flat], one.values[rows], around)
         slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
-        by_x[flat] = observed.by_coordinate @ by_x[flat] + own @ slope
+        neighbours = None if around is None else _neighbours(stack, by_x, flat)
+        by_x[flat] = followed(observed, by_x[flat], neighbours) + own @ slope
         seen[flat] = observed.q
-    return by_x.reshape(dq.shape)
+    if not stack.loads.supports.there:
+        return by_x.reshape(dq.shape)
+    every, held = np.arange(len(q)), reactions_by(stack, q, dq, unknowns)
+    return _with_reactions(stack, every, by_x.reshape(dq.shape), held)

@@ -63,7 +63,7 @@ def tangents_of(seen: Survey) -> Array:
     """(N, n, n) tangents of what the joints hold less what is applied."""
     count, n = len(seen.axes), 6 * seen.axes.shape[1]
     found = np.empty((count, n, n))
-    _unfold(tuple(seen), found)
+    _unfold(seen.numbers, found)
     return found
 
 

@@ -8,7 +8,9 @@ where a_j and b_j are displacements of its lower and upper frame, zero but for d
 poses. With w_b a change of the wrench on vertebra b, the loads of joint j balance to first order
 where
 
-    D_j u_j - C_j (xi_(j-1) + a_j) - S_j' sum_(b>=j) (L_b xi_b + w_b) = rho_j.
+    D_j u_j - C_j (xi_(j-1) + a_j) - S_j' sum_(b>=j) (L_b xi_b + w_b) = rho_j,
+
+but for coordinates that a rig fixes: these have u = 0 whatever is missing there.
 
 What hangs on the twist below a joint is carried down from the top, as for articulated bodies
 (Featherstone 2008, doi 10.1007/978-1-4899-7560-7): time grows with the number of joints, not with
@@ -131,12 +133,23 @@ def _add_product(matrix: Array, vectors: Array, out: Array) -> None:
 
 
 @compiled
-def _carry(seen: Plain, changes: Plain, rates: Array, signs: Indices) -> None:
+def _hold(fixed: Flags, matrix: Array, right: Array) -> None:
+    """Make rows of fixed coordinates (6,) say that these do not move, and others not ask."""
+    for k in range(6):
+        if fixed[k]:
+            matrix[k] = 0.0
+            matrix[:, k] = 0.0
+            matrix[k, k] = 1.0
+            right[k] = 0.0
+
+
+@compiled
+def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indices) -> None:
     """Fill rates (N, J, 6, m) and the signs (N,) of the tangents' determinants, 0 for no answer."""
     every_axes, _, rows, blocks, every_slopes, _, _ = seen
     sources, pushes, lower, upper = changes
     joints, m = sources.shape[1], sources.shape[3]
-    pushed, displaced = pushes.shape[3] > 0, lower.shape[3] > 0
+    pushed, displaced, held = pushes.shape[3] > 0, lower.shape[3] > 0, len(fixed) > 0
     matrix, gains = np.empty((6, 6)), np.empty((joints, 6, 6 + m))  # u = gains (xi, 1)
     slope, passed, twist = np.empty((3, 6)), np.empty((6, m)), np.empty((6, m))
     for lane in range(len(sources)):
@@ -158,6 +171,8 @@ def _carry(seen: Plain, changes: Plain, rates: Array, signs: Indices) -> None:
             _below(axes[j], rows[lane, j], blocks[lane, j], slope, matrix, right)
             right[:, 6:] = sources[lane, j]
             _add_product(axes[j], passed, right[:, 6:])
+            if held:
+                _hold(fixed[lane, j], matrix, right)
             sign *= _eliminate(matrix, right)
             if sign == 0:
                 break
@@ -181,10 +196,29 @@ def _carry(seen: Plain, changes: Plain, rates: Array, signs: Indices) -> None:
                 twist += upper[lane, j]
 
 
+def missing(seen: Survey, rates: Array, pushes: Array = NONE) -> Array:
+    """(N, J, 6, m) load that is missing on each axis when the joints move at rates (N, J, 6, m).
+
+    What `answers` takes for its sources, found from the rates: on coordinates that are fixed, what
+    holds them has to make up for it. ``pushes`` (N, J, 6, m) w, or none.
+    """
+    twists = np.cumsum(seen.axes.swapaxes(2, 3) @ rates, axis=1)
+    below = np.concatenate([np.zeros_like(twists[:, :1]), twists[:, :-1]], axis=1)
+    slopes = seen.slopes.copy()
+    slopes[:, :-1] -= seen.slopes[:, 1:]
+    changes = np.zeros(twists.shape)
+    changes[:, :, :3] = slopes @ twists
+    if pushes.shape[3]:
+        changes += pushes
+    beyond = np.cumsum(changes[:, ::-1], axis=1)[:, ::-1]
+    found: Array = seen.blocks @ rates - seen.rows @ below - seen.axes @ beyond
+    return found
+
+
 def answers(seen: Survey, changes: Changes) -> tuple[Array, Flags]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; where there is."""
     rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
-    _carry(tuple(seen), tuple(changes), rates, signs)
+    _carry(seen.numbers, seen.fixed, tuple(changes), rates, signs)
     good: Flags = (signs != 0) & np.isfinite(rates).all(axis=(1, 2, 3))
     rates[~good] = 0.0
     return rates, good

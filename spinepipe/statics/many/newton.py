@@ -32,7 +32,7 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arra
     A lane whose steps do not contract, or that leaves joint motion, is given up. A step beyond the
     ends of a law, where it carries without limit, is halved.
     """
-    q = start.copy()
+    q = loads.supports.on(start)
     tangents = np.zeros((*q.shape, 6))
     arrived = np.zeros(len(q), dtype=bool)
     left: Indices = np.arange(len(q))

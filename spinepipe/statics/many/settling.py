@@ -65,6 +65,8 @@ def settle(stack: Stack, course: Course, leads: Indices) -> Ends:
     stack : its runs have one step each, masses, and no laws that remember.
     leads : (L,) the lane whose steps of time each one takes; its own number for a leading one.
     """
+    if stack.loads.supports.there:
+        raise ValueError("a rig that fixes joint coordinates holds no spine that moves")
     runs = _Runs(stack, course, leads)
     while runs.left:
         runs.advance()

@@ -9,7 +9,7 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
 from spinepipe.statics.many.lanes import Effects
-from spinepipe.statics.many.stack import Stack, durations
+from spinepipe.statics.many.stack import Stack, durations, supports_of
 from spinepipe.statics.many.survey import Chains, Loads
 
 
@@ -158,11 +158,12 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     bodies = np.full((steps, most), -1)
     for row, step in enumerate(test.steps):
         bodies[row, : len(step.wrenches)] = [wrench.body for wrench in step.wrenches]
-    listed = Loads(
-        np.repeat(chain, steps),
-        np.tile(bodies, (count, 1)),
-        *(part.reshape(-1, most, 3) for part in (cases.points, cases.forces, cases.moments)),
+    points, forces, moments = (
+        numbers.reshape(-1, most, 3) for numbers in (cases.points, cases.forces, cases.moments)
     )
+    supports = supports_of(test.steps * count, like.n_joints)
+    places = np.repeat(chain, steps), np.tile(bodies, (count, 1))
+    listed = Loads(*places, points, forces, moments, supports)
     effects = Effects.of([like] * count, [(number, test.test) for number in chain.tolist()])
     return Stack.made(
         spines.model,

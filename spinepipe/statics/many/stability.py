@@ -36,6 +36,9 @@ FURTHER, WEIGHTS = (1.5, 1.2, 1.1), (0.5, 1.0, 0.25)
 
 MOST_INTERVALS = 12
 
+STIFF = 1e6
+"""Of the largest stiffness, springs on coordinates that a rig fixes."""
+
 
 def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     """(N,) which lanes are stable at q (N, J, 6) with the joints' tangents (N, J, 6, 6)."""
@@ -50,14 +53,29 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
 
 def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "Lanes":
     """Lanes at q (N, J, 6) with all that decides their stability."""
-    seen, chain = survey(chains, loads, q, tangents), loads.chain
+    seen, chain = survey(chains, loads, q, _held(loads, tangents)), loads.chain
     return Lanes(seen, inertias_of(chains, chain, seen), chains.damping[chain])
+
+
+def _held(loads: Loads, tangents: Array) -> Array:
+    """The tangents (N, J, 6, 6) with stiff springs on what a rig fixes.
+
+    A form that is positive with them is so in all rates that leave fixed coordinates at rest,
+    where the springs add nothing: what they prove is proven however stiff they are.
+    """
+    if not loads.supports.there:
+        return tangents
+    found = tangents.copy()
+    stiff = STIFF * np.abs(tangents).max(axis=(1, 2, 3), initial=1.0)
+    springs = np.where(loads.supports.fixed, stiff[:, None, None], 0.0)
+    found[:, :, range(6), range(6)] += springs
+    return found
 
 
 def proven_by_forms(lanes: "Lanes") -> Flags:
     """(N,) which lanes are proven stable without the rates of their modes."""
     square = np.zeros(len(lanes.damping))
-    twists(tuple(lanes.seen), lanes.damping, square)
+    twists(lanes.seen.numbers, lanes.damping, square)
     top, nothing = np.sqrt(square), np.zeros(len(square))
     proven = lanes.apart(nothing, top, nothing)
     doubt = np.flatnonzero(~proven)
@@ -81,7 +99,7 @@ class Lanes:
     def apart(self, low: Array, high: Array, weight: Array) -> Flags:
         """(N,) whether no mode lies between two rates; see `proofs.apart`."""
         found = np.zeros(len(low), dtype=bool)
-        apart(tuple(self.seen), self.inertia, self.damping, low, high, weight, found)
+        apart(self.seen.numbers, self.inertia, self.damping, low, high, weight, found)
         return found
 
     @cached_property
@@ -116,8 +134,12 @@ def _by_intervals(lanes: Lanes, top: Array) -> Flags:
 
 
 def matrices(lane: Lanes) -> tuple[Array, Array]:
-    """Mass matrix and tangent (n, n) of one lane, where damping is one."""
+    """Mass matrix and tangent (n, n) of one lane's free coordinates, where damping is one."""
     scale = 1.0 / np.sqrt(lane.damping.ravel())
     both, n = scale[:, None] * scale, len(scale)
     lower = np.tril(lane.momenta.reshape(n, 6) @ lane.seen.axes.reshape(n, 6).T)
-    return (lower + np.tril(lower, -1).T) * both, tangents_of(lane.seen)[0] * both
+    mass, tangent = (lower + np.tril(lower, -1).T) * both, tangents_of(lane.seen)[0] * both
+    if not len(lane.seen.fixed):
+        return mass, tangent
+    free = np.ix_(*[np.flatnonzero(~lane.seen.fixed.ravel())] * 2)
+    return mass[free], tangent[free]

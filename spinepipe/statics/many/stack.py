@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array, Indices, Neutral
-from spinepipe.model import LoadCase, RefusedModel, SpineModel
+from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics.many.bound import Bound, PathStates
 from spinepipe.statics.many.continuation import Increment, continued
 from spinepipe.statics.many.dead import with_dead_loads
 from spinepipe.statics.many.lanes import Acting, Effects
 from spinepipe.statics.many.newton import settled
-from spinepipe.statics.many.survey import Chains, Loads, part
+from spinepipe.statics.many.survey import FREE, Chains, Loads, Supports, part
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
 from spinepipe.status import Status
@@ -93,7 +93,7 @@ class Stack:
             [case for _, case in runs].__getitem__,
             _chains(models),
             Effects.of(models, [(number, case.test) for number, case in runs]),
-            _listed(runs),
+            _listed(runs, models[0].n_joints),
             [durations(case) for _, case in runs],
         )
 
@@ -257,8 +257,9 @@ class Stack:
         """The same from the steps before, the load in fractions."""
         first = self.first[self.run[lanes]] == lanes
         before = part(self.loads, np.where(first, lanes, lanes - 1))
-        for numbers in (before.forces, before.moments):
-            numbers[first] = 0.0
+        for numbers in (before.forces, before.moments, before.supports.values):
+            if len(numbers):
+                numbers[first] = 0.0
         increment = Increment(before, part(self.loads, lanes), first)
 
         def laws(some: Indices, share: Array) -> Bound:
@@ -301,8 +302,8 @@ def _chains(models: Sequence[SpineModel]) -> Chains:
     )
 
 
-def _listed(runs: Sequence[Run]) -> Loads:
-    """The loads of every step of every run."""
+def _listed(runs: Sequence[Run], joints: int) -> Loads:
+    """The loads of every step of every run on chains of J joints."""
     steps = [(number, step) for number, case in runs for step in case.steps]
     most = max((len(step.wrenches) for _, step in steps), default=0)
     bodies = np.full((len(steps), most), -1)
@@ -311,7 +312,25 @@ def _listed(runs: Sequence[Run]) -> Loads:
         for column, wrench in enumerate(step.wrenches):
             bodies[lane, column] = wrench.body
             numbers[:, lane, column] = wrench.point, wrench.force, wrench.moment
-    return Loads(np.array([number for number, _ in steps], dtype=np.int64), bodies, *numbers)
+    chain = np.array([number for number, _ in steps], dtype=np.int64)
+    points, forces, moments = numbers
+    supports = supports_of([step for _, step in steps], joints)
+    return Loads(chain, bodies, points, forces, moments, supports)
+
+
+def supports_of(steps: Sequence[LoadStep], joints: int) -> Supports:
+    """What rigs fix in load steps on chains of J joints."""
+    if not any(step.supports for step in steps):
+        return FREE
+    found = Supports(
+        np.zeros((len(steps), joints, 6), dtype=bool), *np.zeros((2, len(steps), joints, 6))
+    )
+    for lane, step in enumerate(steps):
+        for one in step.supports:
+            at = (lane, one.joint, one.coordinate)
+            found.fixed[at], found.values[at] = True, one.value
+            found.read_as[at] = one.read_as or 0.0
+    return found
 
 
 def durations(case: LoadCase) -> Array:

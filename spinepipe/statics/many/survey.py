@@ -53,6 +53,46 @@ class Chains(NamedTuple):
     gravity: Array
 
 
+class Supports(NamedTuple):
+    """Which joint coordinates of each of N lanes a rig fixes; none anywhere when N is 0.
+
+    Attributes
+    ----------
+    fixed : (N, J, 6). values : (N, J, 6) m and rad, where they are fixed.
+    read_as : (N, J, 6) m per N or rad per N m by which the reaction is read, 0 where it is not.
+    """
+
+    fixed: Flags
+    values: Array
+    read_as: Array
+
+    @property
+    def there(self) -> bool:
+        """Whether any lane may have one."""
+        return len(self.fixed) > 0
+
+    def part(self, lanes: Indices) -> "Supports":
+        """Those of some lanes."""
+        if not self.there:
+            return self
+        return Supports(self.fixed[lanes], self.values[lanes], self.read_as[lanes])
+
+    def towards(self, later: "Supports", share: Array) -> "Supports":
+        """The values a share (N,) of the way to those of a later step."""
+        if not self.there:
+            return self
+        part = share[:, None, None]
+        return later._replace(values=self.values + part * (later.values - self.values))
+
+    def on(self, q: Array) -> Array:
+        """The poses q (N, J, 6) with fixed coordinates where they are fixed."""
+        return np.where(self.fixed, self.values, q) if self.there else q.copy()
+
+
+FREE = Supports(np.zeros((0, 0, 6), dtype=bool), np.zeros((0, 0, 6)), np.zeros((0, 0, 6)))
+"""No supports."""
+
+
 class Loads(NamedTuple):
     """What acts on each of N lanes; a lane is a chain under one set of loads.
 
@@ -61,6 +101,7 @@ class Loads(NamedTuple):
     chain : (N,) which chain it is.
     bodies : (N, W) vertebra of each wrench, -1 for none. points : (N, W, 3) m, neutral pose.
     forces, moments : (N, W, 3) N and N m, fixed in ground.
+    supports : joint coordinates that a rig fixes.
     """
 
     chain: Indices
@@ -68,12 +109,14 @@ class Loads(NamedTuple):
     points: Array
     forces: Array
     moments: Array
+    supports: Supports = FREE
 
 
 def part(loads: Loads, lanes: Indices) -> Loads:
     """The loads of some lanes."""
-    chain, bodies, points, forces, moments = loads
-    return Loads(chain[lanes], bodies[lanes], points[lanes], forces[lanes], moments[lanes])
+    chain, bodies, points, forces, moments, supports = loads
+    places, wrenches = (chain[lanes], bodies[lanes], points[lanes]), (forces[lanes], moments[lanes])
+    return Loads(*places, *wrenches, supports.part(lanes))
 
 
 @compiled
@@ -228,6 +271,7 @@ class Survey(NamedTuple):
         axes turn each other.
     slopes : (N, J, 3, 6) sum of L_b over the joint's vertebra and those beyond.
     turned, shifted : (N, J, 3, 3) and (N, J, 3) displacement of each vertebra.
+    fixed : (N, J, 6) coordinates that do not move, or (0, 0, 6) where all do.
     """
 
     axes: Array
@@ -237,10 +281,18 @@ class Survey(NamedTuple):
     slopes: Array
     turned: Array
     shifted: Array
+    fixed: Flags
 
     def part(self, lanes: Indices) -> "Survey":
         """Some of the lanes."""
-        return Survey(*(numbers[lanes] for numbers in self))
+        fixed = self.fixed[lanes] if len(self.fixed) else self.fixed
+        axes, applied, rows, blocks, slopes, turned, shifted = (one[lanes] for one in self.numbers)
+        return Survey(axes, applied, rows, blocks, slopes, turned, shifted, fixed)
+
+    @property
+    def numbers(self) -> Plain:
+        """All of it but what is fixed, as compiled code takes it."""
+        return self[:-1]
 
 
 @compiled
@@ -305,6 +357,8 @@ def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) 
 def survey(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Survey:
     """Lanes at q (N, J, 6) whose joints hold with tangents (N, J, 6, 6)."""
     shapes = ((6, 6), (6,), (6, 6), (6, 6), (3, 6), (3, 3), (3,))
-    found = Survey(*(np.empty((*q.shape[:2], *shape)) for shape in shapes))
-    _look(tuple(chains), tuple(loads), q, tangents, tuple(found))
-    return found
+    numbers = [np.empty((*q.shape[:2], *shape)) for shape in shapes]
+    _look(tuple(chains), loads[:-1], q, tangents, tuple(numbers))
+    axes, applied, rows, blocks, slopes, turned, shifted = numbers
+    fixed = loads.supports.fixed
+    return Survey(axes, applied, rows, blocks, slopes, turned, shifted, fixed)
