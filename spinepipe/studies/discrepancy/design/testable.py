@@ -261,7 +261,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
 def typical(design: Design, number: int, form: Form) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
-    middle = (0.0,) * len(form.variant.shapes)
+    middle = min(shape_grid(form.variant), key=lambda sds: sum(sd**2 for sd in sds))
     places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
     count = len(strengths)
     signs = sides(form, strengths)
