@@ -1,21 +1,26 @@
 """The verdict in one sentence, how sure it is, and what else a reader should know."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pandas as pd
 
 from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, count, fixed, listed, number, plain
+from spinepipe.studies.discrepancy.quantities import quantities
+from spinepipe.studies.discrepancy.tables import MODELS
 from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Reason, Verdict
 from spinepipe.studies.discrepancy.words import (
-    axis,
     called,
     differing,
-    estimate_of,
+    general,
+    motion_of,
     readable,
     what_of,
     with_article,
 )
+
+BASE, WITH_EFFECTS = MODELS
 
 _SPREADS = {
     ", each joint of each specimen": ", of its own in each joint of each specimen",
@@ -51,7 +56,17 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
         return _nothing(verdict)
     if verdict.verdict is Answer.SET:
         return _one_of(verdict)
-    return _lacks(verdict.effects)
+    told = _lacks(verdict.effects)
+    return f"{told} {_stays(verdict, where)}" if verdict.verdict is Answer.PART else told
+
+
+def _stays(verdict: Verdict, where: pd.DataFrame) -> str:
+    """That the effects are not all, how much stays, and where most."""
+    told = "That is a part of what is missing: more stays"
+    gap = None if verdict.part is None else verdict.part.left_gap
+    told += "" if gap is None else f", a gap of {fixed(gap)} noise SD"
+    first = _shown_most(_worst(where, WITH_EFFECTS), _coordinate(verdict))
+    return f"{told}." if first is None else f"{told}, most at {_place(first)}."
 
 
 def _unknown(verdict: Verdict, where: pd.DataFrame) -> str:
@@ -62,12 +77,27 @@ def _unknown(verdict: Verdict, where: pd.DataFrame) -> str:
     told = "Something is missing, but no name is believed."
     if _of_unknown_shape(verdict):
         told = "Something is missing that is none of the known effects."
-    worst = _worst(where)
-    if worst.empty:
-        return told
-    first = worst.iloc[0]
-    place = f"{first['joint']}, {axis(first['coordinate'])}, test {plain(first['test'])}"
-    return f"{told} It shows most at {place}."
+    first = _shown_most(_worst(where), _coordinate(verdict))
+    return told if first is None else f"{told} It shows most at {_place(first)}."
+
+
+def _place(row: Mapping[str, Any]) -> str:
+    return f"{row['joint']}, {motion_of(row['coordinate'])}, test {plain(row['test'])}"
+
+
+def _coordinate(verdict: Verdict) -> str | None:
+    """The coordinate that the page describes the shape of, if it does."""
+    if verdict.part is not None:
+        return verdict.part.coordinate
+    told = verdict.unknown if _of_unknown_shape(verdict) else None
+    return None if told is None else told.coordinate
+
+
+def _shown_most(worst: pd.DataFrame, coordinate: str | None) -> Mapping[str, Any] | None:
+    """The place of the largest gap above the noise, in the coordinate of the shape if any is."""
+    of_shape = worst[worst["coordinate"] == coordinate] if len(worst) else worst
+    rows = (of_shape if len(of_shape) else worst).head(1).to_dict("records")
+    return {str(key): value for key, value in rows[0].items()} if rows else None
 
 
 def _of_unknown_shape(verdict: Verdict) -> bool:
@@ -80,23 +110,25 @@ def _of_unknown_shape(verdict: Verdict) -> bool:
 
 
 def _shape_of(verdict: Verdict) -> str:
-    """What is missing as generic shapes see it; empty where they see nothing."""
+    """What is missing, or stays, as generic shapes see it; empty where they see nothing."""
+    if verdict.part is not None:
+        return verdict.part.left_shape or ""
     return "" if verdict.unknown is None else verdict.unknown.shape or ""
 
 
-def _worst(where: pd.DataFrame) -> pd.DataFrame:
+def _worst(where: pd.DataFrame, model: str = BASE) -> pd.DataFrame:
     """Of these, those whose gap is above the noise, largest first."""
-    rows = _at_places(where)
+    rows = _at_places(where, model)
     if rows.empty:
         return rows
     return rows[rows["gap_low"] > 0.0].sort_values("gap", ascending=False, kind="stable")
 
 
-def _at_places(where: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the base at each joint and coordinate in each test."""
+def _at_places(where: pd.DataFrame, model: str) -> pd.DataFrame:
+    """Rows of a model at each joint and coordinate in each test."""
     if where.empty:
         return where
-    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == "base")]
+    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == model)]
 
 
 def _nothing(verdict: Verdict) -> str:
@@ -112,7 +144,7 @@ def _nothing(verdict: Verdict) -> str:
 
 
 def _one_of(verdict: Verdict) -> str:
-    names = listed([with_article(name) for name in verdict.candidates_in_set], 8, "or")
+    names = listed([with_article(general(one)) for one in verdict.candidates_in_set], 8, "or")
     told = f"one of these is missing, and these tests cannot tell which: {names}."
     return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
 
@@ -126,6 +158,7 @@ def how_sure(verdict: Verdict) -> str:
     parts = [
         *(_evidence(effect, verdict) for effect in verdict.effects),
         _why_unknown(verdict),
+        _why_more(verdict),
         _shape(verdict),
         _misfit(verdict),
         _closed(verdict),
@@ -139,7 +172,7 @@ def _evidence(effect: Missing, verdict: Verdict) -> str:
         told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
     if effect.rivals:
         first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
-        told += f"; next best {plain(first.name)}, {number(first.log_evidence_margin, 2)} behind"
+        told += f"; next best {general(first.name)}, {number(first.log_evidence_margin, 2)} behind"
     return f"{told}."
 
 
@@ -150,13 +183,21 @@ def _why_unknown(verdict: Verdict) -> str:
     return f"Why no name: {readable(verdict.why).rstrip('.')}."
 
 
+def _why_more(verdict: Verdict) -> str:
+    """Why it is not said that nothing else is missing."""
+    reasons = () if verdict.part is None else verdict.part.reasons
+    told = "; ".join(readable(one).rstrip(".") for one in reasons)
+    return f"Why that is not all: {told}." if told else ""
+
+
 def _shape(verdict: Verdict) -> str:
     if verdict.reason is Reason.NO_BASE or not _of_unknown_shape(verdict):
         return ""
+    of = "The shape of what stays" if verdict.part is not None else "Its shape"
     shape = readable(_shape_of(verdict)).rstrip(".")
     for spread, words in _SPREADS.items():
         shape = shape.removesuffix(spread) + words if shape.endswith(spread) else shape
-    return f"Its shape: {shape}." if shape else ""
+    return f"{of}: {shape}." if shape else ""
 
 
 def _misfit(verdict: Verdict) -> str:
@@ -197,6 +238,8 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
         would_have_been_seen(verdict),
         _before_and_after(results.table("where")),
         _where(results.table("where")),
+        _left(verdict, results.table("where")),
+        _of_another_coordinate(verdict, results.table("where")),
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
         not_testable(verdict),
@@ -209,7 +252,7 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
 def _sizes(verdict: Verdict) -> Iterator[str]:
     """How large each named effect is."""
     for effect in verdict.effects:
-        sizes = [estimate_of(parameter) for parameter in effect.parameters]
+        sizes = [one.words for one in quantities(effect)]
         if sizes:
             more = " (more in table 1)" if len(sizes) > _MOST_SIZES else ""
             spread = f"; {differing(effect)}" if differing(effect) else ""
@@ -235,19 +278,46 @@ def _where(where: pd.DataFrame) -> str:
     """The places of the largest gap of the base that is above the noise."""
     if where.empty:
         return ""
-    chosen, ordered = _at_places(where), _worst(where)
+    chosen, ordered = _at_places(where, BASE), _worst(where)
     if ordered.empty:
         return "Base model and measurement agree within the noise at every joint in every test."
-    places = [
-        f"{row['joint']} in {axis(row['coordinate'])}, test {plain(row['test'])}: "
-        f"{fixed(row['gap'], 1)} ({fixed(row['gap_low'], 1)} to {fixed(row['gap_high'], 1)})"
-        for row in ordered.head(_MOST_PLACES).to_dict("records")
-    ]
     above = f"{len(ordered)} of {count(len(chosen), 'place')}"
     chance = fixed(_BY_CHANCE * len(chosen), 0)
     return (
-        f"Where the base is off most (gap in noise SD, 95 % interval): {'; '.join(places)}. "
+        f"Where the base is off most (gap in noise SD, 95 % interval): {_places(ordered)}. "
         f"The gap is above the noise at {above}; noise alone would do that at about {chance}."
+    )
+
+
+def _left(verdict: Verdict, where: pd.DataFrame) -> str:
+    """The places of the largest gap that stays with the effects."""
+    if verdict.part is None:
+        return ""
+    ordered = _worst(where, WITH_EFFECTS)
+    if ordered.empty:
+        return "With the effects no single place is above the noise by itself."
+    return f"What stays with the effects (gap in noise SD, 95 % interval): {_places(ordered)}."
+
+
+def _places(ordered: pd.DataFrame) -> str:
+    """The first of these places, each with its gap."""
+    return "; ".join(
+        f"{row['joint']} in {motion_of(row['coordinate'])}, test {plain(row['test'])}: "
+        f"{fixed(row['gap'], 1)} ({fixed(row['gap_low'], 1)} to {fixed(row['gap_high'], 1)})"
+        for row in ordered.head(_MOST_PLACES).to_dict("records")
+    )
+
+
+def _of_another_coordinate(verdict: Verdict, where: pd.DataFrame) -> str:
+    """That the shape that is told of is not that of the largest gap, where it is not."""
+    coordinate = _coordinate(verdict)
+    worst = _worst(where, BASE if verdict.part is None else WITH_EFFECTS)
+    if coordinate is None or worst.empty or worst["coordinate"].iloc[0] == coordinate:
+        return ""
+    most = motion_of(worst["coordinate"].iloc[0])
+    return (
+        f"The shape that explains most is one of {motion_of(coordinate)}, though the largest gap "
+        f"is in {most}: it does not tell what happens in {most}."
     )
 
 
@@ -269,7 +339,7 @@ def would_have_been_seen(verdict: Verdict) -> str:
     if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
         return ""
     ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
-    told = [f"{plain(one.name)} {number(one.gap, 2)}" for one in ordered]
+    told = [f"{general(one.name)} {number(one.gap, 2)}" for one in ordered]
     if len(told) <= _MOST_EASY + _MOST_HARD:
         return f"Smallest gap, in noise SD, that would have been named: {', '.join(told)}."
     return (
@@ -286,11 +356,11 @@ def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
         rows = confusions[(confusions["effect"] == effect.name) & (confusions["share"] >= _ALIKE)]
         others = rows[rows["other"] != effect.name].sort_values("share", ascending=False)
         alike = [
-            f"{with_article(row['other'])} would explain {100.0 * row['share']:.0f} %"
+            f"{with_article(general(row['other']))} would explain {100.0 * row['share']:.0f} %"
             for row in others.head(_MOST_ALIKE).to_dict("records")
         ]
         if alike:
-            told.append(f"{listed(alike)} of the gap that {plain(effect.name)} makes")
+            told.append(f"{listed(alike)} of the gap that {called(effect)} makes")
     return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
 
 
@@ -306,7 +376,7 @@ def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
     if best["log_evidence"] <= threshold:
         return ""
     return (
-        f"Nearest known effect: {plain(best['effect'])}, log evidence "
+        f"Nearest known effect: {general(best['effect'])}, log evidence "
         f"{number(best['log_evidence'])}. Generic shapes without physics explain much more, so it "
         "would only imitate what is missing."
     )
@@ -314,7 +384,7 @@ def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
 
 def not_testable(verdict: Verdict) -> str:
     """Effects without a trace in these tests, and the tests that would show them."""
-    names = [plain(one.name) for one in verdict.not_testable]
+    names = [general(one.name) for one in verdict.not_testable]
     if not names:
         return ""
     told = f"These tests cannot show {listed(names, 8, 'or')}"
@@ -322,8 +392,12 @@ def not_testable(verdict: Verdict) -> str:
         told += ", so nothing is said about them"
     by_test: dict[str, list[str]] = {}
     for one in verdict.not_testable:
-        by_test.setdefault(readable(one.test_that_would_tell), []).append(plain(one.name))
-    would = [
-        f"{listed(shown, 8)}: {test}" for test, shown in list(by_test.items())[:_MOST_TESTS] if test
-    ]
-    return f"{told}. What would show them: {'; '.join(would)}." if would else f"{told}."
+        by_test.setdefault(readable(one.test_that_would_tell), []).append(general(one.name))
+    none = by_test.pop("", [])
+    would = [f"{listed(shown, 8)}: {test}" for test, shown in by_test.items()]
+    parts = [f"{told}."]
+    if would:
+        parts.append(f"What would show them: {'; '.join(would[:_MOST_TESTS])}.")
+    if none:
+        parts.append(f"No single addition that was tried shows {listed(none, 8, 'or')}.")
+    return " ".join(parts)

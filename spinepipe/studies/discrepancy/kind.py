@@ -24,6 +24,12 @@ class DiscrepancyFiles(StudyFiles):
     told_in_report = (VERDICT,)
     drawings = (
         Figure(
+            "load_displacement",
+            "Load over displacement, measured and modelled",
+            "figures.load_displacement:load_displacement_figure",
+            ("gap",),
+        ),
+        Figure(
             "gap_map",
             "Where the model is off, before and after",
             "figures.gap_map:gap_map_figure",
@@ -36,21 +42,21 @@ class DiscrepancyFiles(StudyFiles):
             ("gap",),
         ),
         Figure(
-            "effect_evidence",
-            "Evidence for each effect",
-            "figures.effects:effect_evidence_figure",
-            ("candidates", VERDICT),
+            "held_out_by_test",
+            "Proof on motion held out",
+            "figures.held_out_by_test:held_out_by_test_figure",
+            ("held_out",),
         ),
         Figure(
-            "gap_held_out",
-            "Proof on motion held out",
-            "figures.gap_held_out:gap_held_out_figure",
-            ("held_out",),
+            "evidence_by_round",
+            "Evidence for each effect, round by round",
+            "figures.evidence_by_round:evidence_by_round_figure",
+            ("candidates", VERDICT),
         ),
         Figure(
             "effect_confusions",
             "What these tests could tell apart, and see",
-            "figures.effects:effect_confusions_figure",
+            "figures.effect_confusions:effect_confusions_figure",
             ("confusions", "candidates", VERDICT),
         ),
     )

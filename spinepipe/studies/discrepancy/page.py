@@ -10,17 +10,16 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
 from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
+from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, WHERE
 from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import (
-    axis,
     called,
     differing,
-    name_and_place,
+    general,
+    motion_of,
     readable,
-    unit_of,
-    value_of,
     where_of,
 )
 from spinepipe.tables.schema import Column
@@ -151,19 +150,19 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
         "parameters": [
             {
                 "effect": called(effect),
-                "parameter": name_and_place(one)[0],
-                "value [95 % interval]": value_of(one),
-                "unit": unit_of(one.unit),
-                "place": _place(effect, name_and_place(one)[1]),
+                "parameter": one.name,
+                "value [95 % interval]": one.in_brackets,
+                "unit": one.unit,
+                "place": _place(effect, one.place),
             }
             for effect in verdict.effects
-            for one in effect.parameters
+            for one in quantities(effect)
         ],
-        "set": [{"effect": plain(name)} for name in verdict.candidates_in_set],
+        "set": [{"effect": general(name)} for name in verdict.candidates_in_set],
         "rivals": [
             {
-                "effect": plain(effect.name),
-                "rival": plain(rival.name),
+                "effect": called(effect),
+                "rival": general(rival.name),
                 "margin": rival.log_evidence_margin,
             }
             for effect in verdict.effects
@@ -171,14 +170,14 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
         ],
         "not_testable": [
             {
-                "effect": plain(one.name),
+                "effect": general(one.name),
                 "why": readable(one.why),
-                "test_that_would_tell": readable(one.test_that_would_tell),
+                "test_that_would_tell": readable(one.test_that_would_tell) or "none of those tried",
             }
             for one in verdict.not_testable
         ],
         "detectable": [
-            {"effect": plain(one.name), "gap": one.gap}
+            {"effect": general(one.name), "gap": one.gap}
             for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
         ],
     }
@@ -198,17 +197,28 @@ def file_tables(results: Results) -> Iterator[Parts]:
     candidates = results.table("candidates")
     if len(candidates):
         columns = tuple(column for column in CANDIDATES.columns if column.name in _TRIED)
-        yield "candidates", "What was tried", _CANDIDATES, _worded(_best(candidates)), columns
+        rows = _worded(_in_field_units(_best(candidates)))
+        yield "candidates", "What was tried", _CANDIDATES, rows, columns
+
+
+def _in_field_units(candidates: pd.DataFrame) -> pd.DataFrame:
+    """Estimates as the field gives them, with what they are where it is not the parameter."""
+    told = [
+        estimate(row["effect"], json.loads(row["variant"]), row["estimate"], row["unit"])
+        for row in candidates.to_dict("records")
+    ]
+    values, units = zip(*told, strict=True) if told else ((), ())
+    return candidates.assign(estimate=list(values), unit=list(units))
 
 
 def _worded(frame: pd.DataFrame) -> pd.DataFrame:
     """Effects, places and options in plain words."""
     ways = {
-        "effect": plain,
+        "effect": general,
         "fold": plain,
         "test": plain,
         "model": plain,
-        "coordinate": axis,
+        "coordinate": motion_of,
         "variant": _options,
     }
     return frame.assign(
@@ -223,7 +233,7 @@ def _options(text: str) -> str:
         for value in json.loads(text).values()
         for name in (value if isinstance(value, list) else [value])
     ]
-    return ", ".join(axis(str(name)) for name in values)
+    return ", ".join(motion_of(str(name)) for name in values)
 
 
 def _above(where: pd.DataFrame) -> pd.DataFrame:

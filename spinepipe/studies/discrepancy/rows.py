@@ -57,6 +57,7 @@ def _rows_of(
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
     noise = found.base.noise
     base, final = found.base.fit.predicted[name], found.final.fit.predicted[name]
+    loads = readings.applied
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
         sd = size[:, None] * noise.sd * BORDER_PER_SI
@@ -73,6 +74,7 @@ def _rows_of(
             yield (
                 key,
                 {
+                    "load": float(loads[number][t, j, c]),
                     "measured": float(test.mean[t, j, c] * factor),
                     "readings": count,
                     "base": float(base[number][t, j, c] * factor),
@@ -92,7 +94,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
         return at | rows[0]
     readings = sum(row["readings"] for row in rows)
     found: Row = {"readings": readings}
-    for name in ("measured", "base", "with_effects"):
+    for name in ("load", "measured", "base", "with_effects"):
         found[name] = sum(row[name] * row["readings"] for row in rows) / readings
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
     same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
@@ -141,7 +143,7 @@ def _screened(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
-            row = _form_row(f"screen {stage.name}", tried.form, joints)
+            row = _form_row(f"screen {stage.name}", stage.beside, tried.form, joints)
             row |= _of_screen(tried) | {
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
@@ -154,9 +156,10 @@ def _screened(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     return rows
 
 
-def _form_row(stage: str, form: Form, joints: Sequence[str]) -> Row:
+def _form_row(stage: str, beside: Sequence[str], form: Form, joints: Sequence[str]) -> Row:
     return {
         "stage": stage,
+        "beside": ", ".join(beside),
         "effect": form.name,
         "kind": form.variant.create().kind,
         "variant": json.dumps(dict(form.variant.options)),
@@ -203,7 +206,8 @@ def _share(drop: float, excess: float) -> float | None:
 def _refitted(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
     rows, seen = [], set()
     for one in stage.refits:
-        row = _form_row(f"refit {stage.name}", one.form, joints) | _of_refit(one, excess)
+        row = _form_row(f"refit {stage.name}", stage.beside, one.form, joints)
+        row |= _of_refit(one, excess)
         row["threshold"] = stage.screen.threshold
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
         if key not in seen:
@@ -246,6 +250,7 @@ def design_rows(told: ToldApart) -> list[Row]:
     return [
         {
             "stage": "design",
+            "beside": "",
             "effect": one.effect,
             "kind": one.best.form.variant.create().kind,
             "variant": json.dumps(dict(one.best.form.variant.options)),
@@ -289,10 +294,23 @@ def _fold_row(row: FoldRow) -> Row:
         "rms_base": _rms(row.base, row.expected),
         "rms_with_effects": _rms(row.with_effects, row.expected),
         "rms_surrogate": _rms(row.surrogate, row.expected),
+        **_held_out_gap("base", row.base, row.expected),
+        **_held_out_gap("with_effects", row.with_effects, row.expected),
+        **_held_out_gap("surrogate", row.surrogate, row.expected),
         "closed": row.closed,
+        "worse": row.worse,
         "status": Status.CONVERGED if row.base is not None else Status.NOT_CONVERGED,
         "message": row.message,
     }
+
+
+def _held_out_gap(model: str, gap: Gap | None, expected: float) -> Row:
+    """The gap of a model in a fold, with its interval."""
+    names = [f"gap_{model}{end}" for end in ("", "_low", "_high")]
+    if gap is None or expected <= 0.0:
+        return dict.fromkeys(names)
+    beyond = gap.against(expected)
+    return dict(zip(names, (beyond.gap, *beyond.interval), strict=True))
 
 
 def _rms(gap: Gap | None, expected: float) -> float | None:

@@ -45,6 +45,13 @@ GAP = Table(
         JOINT,
         Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
         Column("unit", "text", "unit of the motion", allowed=("mm", "deg")),
+        Column(
+            "load",
+            "number",
+            "what the test's forces and moments do at this joint, in the direction of the "
+            "coordinate in the neutral pose; weight and load effects not counted",
+            "N where unit is mm, N m where it is deg",
+        ),
         _motion("measured", "measured motion, mean over cycles", None),
         Column("readings", "integer", "cycles averaged", low=1),
         _motion("base", "motion of the base model, fitted", _NO_POSE),
@@ -76,6 +83,12 @@ CANDIDATES = Table(
             "design: what the tests could tell, before residuals are looked at; screen N: all "
             "candidates, linear at the model of round N; refit N: the leading few, by the full "
             "simulator; screen, refit in place of X (N): X taken away, all others tried there",
+        ),
+        Column(
+            "beside",
+            "text",
+            "effects in the model beside which it was tried, with commas, once for each form; "
+            "empty: the base alone",
         ),
         Column("effect", "text", "effect, as in a model file"),
         Column("kind", "text", "what it acts on", allowed=tuple(Kind)),
@@ -167,6 +180,15 @@ def _rms(name: str, of: str, null: str) -> Column:
     return _of_noise(name, meaning, null)
 
 
+def _gaps(model: str, of: str, null: str) -> tuple[Column, ...]:
+    """The gap of a model in a fold, and its interval."""
+    return (
+        _of_noise(f"gap_{model}", f"gap of {of} beyond noise and what training leaves open", null),
+        _of_noise(f"gap_{model}_low", "lower end of its 95 % interval", null),
+        _of_noise(f"gap_{model}_high", "upper end of its 95 % interval", null),
+    )
+
+
 HELD_OUT = Table(
     "held_out",
     "Proof on motion that no fit has seen: one row per specimen or test left out.",
@@ -178,12 +200,20 @@ HELD_OUT = Table(
         _rms("rms_base", "the base model", "no result, see status"),
         _rms("rms_with_effects", "the model with the named effects", "no result, see status"),
         _rms("rms_surrogate", "a generic surrogate that knows no physics", "not computed"),
+        *_gaps("base", "the base model", "no result, see status"),
+        *_gaps("with_effects", "the model with the named effects", "no result, see status"),
+        *_gaps("surrogate", "the generic surrogate", "not computed"),
         Column(
             "closed",
             "number",
             "share of the base's discrepancy that the effects close; negative: they widen it",
             null="no result, or the base's discrepancy is not above the noise",
             high=1.0,
+        ),
+        Column(
+            "worse",
+            "flag",
+            "whether the effects predict it worse than the base, by more than noise makes",
         ),
         status("fits"),
         MESSAGE,

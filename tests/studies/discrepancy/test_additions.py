@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from testable_cases import case_of
 
 from spinepipe.model import LoadCase
@@ -67,3 +68,20 @@ def test_cycles_whose_loads_differ_a_little_are_one_test():
     (one,) = as_made(readings, True, "per_joint").tests
     assert one.case == cases[0]
     assert one.count.tolist() == [[0, 0, 0, 3, 3, 3]] * 2
+
+
+@pytest.mark.parametrize(
+    ("moments", "back"),
+    [
+        ((0.0, 2.5, 5.0, 7.5), False),
+        ((0.0, 2.5, 5.0, 7.5, 5.0, 2.5, 0.0), True),
+        ((0.0, 2.51, 5.02, 7.5, 4.93, 2.44, 0.1), True),  # as a machine gives it
+        ((0.0, 3.0, 7.5, 4.0), True),  # thinned: no load twice
+        ((0.0, 2.5, 5.0, 7.5, -2.5, -5.0, -7.5), False),  # two ways out, none back
+        ((0.0, 2.5, 7.5, 0.0, -7.5), True),
+        ((0.0, 5.0, 7.5, 7.3, 7.5), False),  # held, not unloaded
+        ((-7.5, -5.0, 0.0, 5.0, 7.5), False),  # from one end to the other, once
+    ],
+)
+def test_unloading_is_seen_in_a_machines_loads(moments, back):
+    assert comes_back(case_of("flexion", 1, moments, 5.0)) is back

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.effects import Trial, create, registered
+from spinepipe.effects import create
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, RefusedModel, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.plans import (
@@ -50,6 +50,9 @@ TRANSLATION_SD = 1e-4
 """m, of translations in tests where none were read and none is declared."""
 
 PRELOAD = "follower_load"
+
+NONE_SHOWS_IT = "no single addition that was tried shows it"
+"""Said instead of advice: what an effect takes in general these tests may have already."""
 
 MOST_STEPS = 10
 """Per test before anything is added; fewer readings than in truth err on the safe side."""
@@ -109,13 +112,9 @@ def not_testable(
                 faint.setdefault(one.effect, addition.words)
     told = faint | clear
     return tuple(
-        NotTestable(name, why, told.get(name) or _declared(name)) for name, why in hidden.items()
+        NotTestable(name, why if name in told else f"{why}; {NONE_SHOWS_IT}", told.get(name, ""))
+        for name, why in hidden.items()
     )
-
-
-def _declared(effect: str) -> str:
-    trial: Trial = registered()[effect].trial  # type: ignore[attr-defined]
-    return f"no single addition that was tried shows it; it takes {trial.told_by}"
 
 
 def bench(grounds: Grounds, declared: Array | None) -> Bench:

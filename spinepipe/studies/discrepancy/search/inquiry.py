@@ -83,7 +83,7 @@ class Stage:
     ----------
     name : number of the round, or whose place all others were tried in.
     in_place : whether they were tried in the place of an effect; else some could enter.
-    beside : names of the effects in the model beside which they were tried.
+    beside : names of the effects in the model beside which they were tried, one for each form.
     """
 
     name: str
@@ -203,7 +203,7 @@ class Inquiry:
             tried = self._refits(grounds, screen) if place or evident else ()
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
-        beside = tuple(dict.fromkeys(one.form.name for one in grounds.fit.hypothesis.supposed))
+        beside = tuple(one.form.name for one in grounds.fit.hypothesis.supposed)
         self.stages.append(Stage(name, screen, tried, place, beside))
         return self.stages[-1]
 

@@ -1,0 +1,291 @@
+"""Figure: log evidence of every effect in every round of the search, and what came of it.
+
+A round tries all effects beside those that are in the model; later ones try them in the place of
+one that is. What a round led to is seen from the model of the next.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from textwrap import fill
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.marks import Array
+from spinepipe.report.panels import explain_marks
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE, blank, saying
+from spinepipe.report.words import count, fixed, number, short, tick
+from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell, name_cells
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
+from spinepipe.studies.discrepancy.words import general
+from spinepipe.tables import Tables
+
+SCREEN, REFIT = "screen", "refit"
+ENTERED, LEFT, REPLACED = "entered", "left", "replaced"
+MOST_ROUNDS = 12
+_EVENTS = {
+    ENTERED: ("^", BLUE, "entered after it"),
+    LEFT: ("v", VERMILLION, "left after it"),
+    REPLACED: ("X", VERMILLION, "gave way after it"),
+}
+"""Marker, colour and words of what a round led to."""
+
+_IN_PLACE = re.compile(r"^in place of (?P<names>.+?)(?P<trial>, beside .+)? \(\d+\)$")
+_ROW_MM, _TURNED_MM, _WRAPPED_MM, _KEY_MM = 4.8, 30.0, 14.0, 17.0
+_FULL = 6
+"""Rounds whose columns fill the figure; of more the headings are turned."""
+
+_DARK = 0.62
+_LEAST_DECADES = 1.0
+_NO_TRACE = 0.05
+"""Evidence below this, of either sign, is printed as 0: the tests say nothing of the effect."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One look at all effects.
+
+    Attributes
+    ----------
+    beside : effects in the model. without : those in whose place the others were tried.
+    trial : whether it tried a second effect in the place of one: no step of the search's own.
+    evidence : a row per effect with ``screen`` and ``refit``, of its best form; NaN where none.
+    events : what became of effects after it.
+    """
+
+    stage: str
+    beside: tuple[str, ...]
+    without: tuple[str, ...]
+    trial: bool
+    evidence: pd.DataFrame
+    events: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> pd.Series:
+        """The evidence of each effect: of its refit, else of the screen."""
+        return self.evidence[REFIT].fillna(self.evidence[SCREEN])
+
+    @property
+    def words(self) -> str:
+        """What the effects were tried beside, or in whose place."""
+        if self.without:
+            return f"in place of {_counted(self.without)}"
+        return f"beside {_counted(self.beside)}" if self.beside else "base alone"
+
+
+def _counted(names: Sequence[str]) -> str:
+    """``nonlinear stiffening x 2, creep``: forms of one effect together."""
+    times = Counter(names)
+    return ", ".join(general(name) + (f" × {n}" if n > 1 else "") for name, n in times.items())
+
+
+def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[Round]:
+    """All rounds in their order, each with what it led to.
+
+    Parameters
+    ----------
+    end : effects that the verdict stands for; empty: the last round says no more.
+    """
+    rows = candidates[candidates["log_evidence"].notna()]
+    if rows.empty:
+        return []
+    way = rows["stage"].str.partition(" ")
+    looked = rows.assign(way=way[0], round=way[2])
+    looked = looked[looked["way"].isin((SCREEN, REFIT))]
+    found = [_round(str(name), part) for name, part in looked.groupby("round", sort=False)]
+    steps = [one for one in found if not one.trial]
+    for one, later in pairwise(steps):
+        one.events.update(_events(_model(one), _model(later)))
+    if end and steps:
+        known = {name: _model(steps[-1]).get(name, 1) for name in end}
+        steps[-1].events.update(_events(_model(steps[-1]), Counter(known)))
+    return found
+
+
+def _round(stage: str, rows: pd.DataFrame) -> Round:
+    best = rows.groupby(["effect", "way"])["log_evidence"].max().unstack("way")
+    evidence = best.reindex(columns=[SCREEN, REFIT])
+    place = _IN_PLACE.match(stage)
+    beside = tuple(name for name in str(rows["beside"].iloc[0]).split(", ") if name)
+    without = tuple(place["names"].split(" and ")) if place else ()
+    return Round(stage, beside, without, bool(place and place["trial"]), evidence)
+
+
+def _model(one: Round) -> Counter[str]:
+    """Effects that the search had in its model when it came to the round, and their forms."""
+    return Counter([*one.beside, *one.without])
+
+
+def _events(before: Counter[str], later: Counter[str]) -> dict[str, str]:
+    """What entered, and what left or gave way to that."""
+    entered, gone = later - before, before - later
+    lost = REPLACED if entered else LEFT
+    return dict.fromkeys(sorted(entered), ENTERED) | dict.fromkeys(sorted(gone), lost)
+
+
+def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+    """Effects by rounds: the evidence in each cell, coloured where it passes the threshold."""
+    verdict = read_verdict(tables.files["verdict"])
+    end = (*verdict.named, *verdict.candidates_in_set)
+    every = rounds(tables["candidates"], end)
+    if not every:
+        return saying("No evidence can be shown: no effect was tried.")
+    shown = chosen(every)
+    wide = pd.concat([one.shown.rename(column) for column, one in enumerate(shown)], axis=1)
+    names = _with_a_trace(wide)
+    grid = wide.loc[names].to_numpy(float)
+    turned = len(shown) > _FULL
+    labels = _TURNED_MM if turned else _WRAPPED_MM
+    figure = blank(len(names) * _ROW_MM + labels + _KEY_MM)
+    axis = _panel(figure, len(shown))
+    threshold = verdict.threshold.log_evidence
+    levels, scale = _levels(grid, threshold)
+    image = draw_heat(axis, levels, scale, None, levels <= 0.0)
+    _numbers(axis, grid, [one.evidence.reindex(names) for one in shown], levels, scale)
+    _mark(axis, names, shown)
+    heads = [f"{every.index(one) + 1}  {short(one.words, 34)}" for one in shown]
+    if not turned:
+        heads = [f"round {fill(head, 17)}" for head in heads]
+    name_cells(axis, [general(name) for name in names], heads, turned)
+    _bold(axis, names, verdict)
+    if threshold is not None:
+        _scale_bar(figure, axis, image, threshold, scale)
+    hidden = len(wide) - len(names)
+    explain_marks(figure, _handles(shown, grid), _words(every, shown, hidden, verdict), 5)
+    return figure
+
+
+def _with_a_trace(wide: pd.DataFrame) -> list[str]:
+    """Effects with evidence for or against them in some round, most evidence first."""
+    seen = wide[(wide.abs() >= _NO_TRACE).any(axis=1)]
+    shown = seen if len(seen) else wide
+    return list(shown.max(axis=1).sort_values(ascending=False, kind="stable").index)
+
+
+def _panel(figure: Figure, columns: int) -> Axes:
+    """A panel that is as wide as its columns need; of few rounds the cells are no wider."""
+    spare = max(_FULL - columns, 0)
+    if not spare:
+        return figure.subplots()
+    left, right = figure.subplots(1, 2, width_ratios=[columns, 0.75 * spare])
+    right.set_visible(False)
+    panel: Axes = left
+    return panel
+
+
+def chosen(every: Sequence[Round]) -> list[Round]:
+    """Of many rounds those that led to something first, in their order."""
+    if len(every) <= MOST_ROUNDS:
+        return list(every)
+    ranked = sorted(range(len(every)), key=lambda n: (n > 0 and not every[n].events, n))
+    return [every[n] for n in sorted(ranked[:MOST_ROUNDS])]
+
+
+def _levels(grid: Array, threshold: float | None) -> tuple[Array, Normalize]:
+    """(R, C) decades above the threshold, 0 below it; without one all is white."""
+    if threshold is None:
+        return np.where(np.isfinite(grid), 0.0, np.nan), Normalize(0.0, 1.0)
+    beyond = np.log10(np.maximum(grid, threshold) / threshold)
+    return beyond, Normalize(0.0, max(_LEAST_DECADES, float(np.nanmax(beyond))))
+
+
+def _numbers(
+    axis: Axes, grid: Array, by_way: Sequence[pd.DataFrame], levels: Array, scale: Normalize
+) -> None:
+    """The evidence in each cell, small where it was only screened."""
+    for row, column in np.argwhere(np.isfinite(grid)):
+        value = float(grid[row, column])
+        refitted = np.isfinite(by_way[column][REFIT].iloc[row])
+        words = fixed(value, 1) if abs(value) < 100.0 else number(value, 4)
+        dark = scale(levels[row, column]) > _DARK
+        axis.text(
+            column + 0.06,
+            row,
+            words,
+            ha="center",
+            va="center",
+            fontsize=6.0 if refitted else 5.0,
+            fontweight="bold" if refitted else "normal",
+            color=WHITE if dark else BLACK if refitted or levels[row, column] else GREY,
+            zorder=3,
+            in_layout=False,
+        )
+
+
+def _mark(axis: Axes, names: Sequence[str], shown: Sequence[Round]) -> None:
+    """What was in the model of a round, and what the round led to."""
+    for column, one in enumerate(shown):
+        for name in one.beside:
+            if name in names:
+                corner = (column - 0.47, names.index(name) - 0.44)
+                outline = Rectangle(corner, 0.94, 0.88, fill=False, ec=BLUE, lw=1.2, zorder=4)
+                axis.add_patch(outline)
+        for name, event in one.events.items():
+            if name in names:
+                marker, color, _ = _EVENTS[event]
+                at = ([column - 0.39], [names.index(name)])
+                how = {"mec": WHITE, "mew": 0.5, "zorder": 5}
+                axis.plot(*at, marker, color=color, ms=5.0, **how)  # type: ignore[arg-type]
+
+
+def _bold(axis: Axes, names: Sequence[str], verdict: Verdict) -> None:
+    for label, name in zip(axis.get_yticklabels(), names, strict=True):
+        if name in verdict.named:
+            label.set(fontweight="bold", color=BLUE)
+        elif name in verdict.candidates_in_set:
+            label.set(fontweight="bold", color=GREEN)
+
+
+def _scale_bar(figure: Figure, axis: Axes, image: object, threshold: float, to: Normalize) -> None:
+    bar = figure.colorbar(image, ax=axis, location="right", aspect=30, shrink=0.8)  # type: ignore[arg-type]
+    most = threshold * 10.0 ** float(to.vmax or 0.0)
+    ticks = [threshold, *(x for d in range(7) for x in (10.0**d,) if 1.5 * threshold < x < most)]
+    bar.set_ticks([float(np.log10(x / threshold)) for x in ticks])
+    bar.set_ticklabels([f"{tick(round(x, 1))}" for x in ticks])
+    bar.set_label("log evidence")
+    bar.outline.set_linewidth(0.4)
+
+
+def _handles(shown: Sequence[Round], grid: Array) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = []
+    if any(one.beside for one in shown):
+        handles.append(Patch(fill=False, ec=BLUE, lw=1.2, label="in the model"))
+    happened = {event for one in shown for event in one.events.values()}
+    handles += [
+        Line2D([], [], marker=marker, color=color, ms=5.0, lw=0, label=words)
+        for event, (marker, color, words) in _EVENTS.items()
+        if event in happened
+    ]
+    if np.isnan(grid).any():
+        handles.append(empty_cell("no form of it had a result"))
+    return handles
+
+
+def _words(every: Sequence[Round], shown: Sequence[Round], hidden: int, verdict: Verdict) -> str:
+    told = [
+        "A column is a round of the search; best form of each effect; bold: refitted by the full "
+        "simulator, else screened",
+    ]
+    threshold, false_alarm = verdict.threshold.log_evidence, verdict.threshold.false_alarm
+    if threshold is not None and false_alarm is not None:
+        told.append(
+            f"white: below the threshold {number(threshold, 2)}, which "
+            f"{tick(100.0 * false_alarm)} % of data sets that lack nothing pass"
+        )
+    if verdict.named or verdict.candidates_in_set:
+        told.append("blue names: named, green: cannot be told apart")
+    if hidden:
+        told.append(f"{count(hidden, 'effect')} without a trace in these tests left out")
+    if len(shown) < len(every):
+        told.append(f"{len(shown)} of {count(len(every), 'round')}, those that changed the model")
+    return "; ".join(told) + "."

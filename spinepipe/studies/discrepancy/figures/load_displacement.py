@@ -1,0 +1,215 @@
+"""Figure: applied load over displacement, measured and modelled, joint by joint and test by test.
+
+Each joint has a panel for the coordinate that a test drives: that in which its load does the most
+work. The curve is the field's own: displacement along, load up, loading and unloading apart.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.marks import Array
+from spinepipe.report.panels import explain_marks, head, sections
+from spinepipe.report.style import BLACK, GREY, INK, OURS, SMALL_PT, THEIRS, WHITE, saying
+from spinepipe.report.words import case, count, fixed, short, unit
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.words import load_axis, motion_of
+from spinepipe.tables import Tables
+from spinepipe.units import BORDER_PER_SI, COORDINATES
+
+MOST_PANELS, FEWEST_PANELS = 12, 6
+CLEARLY = 1.5
+"""Beyond the fewest, curves are shown where the base is off by more than so many noise SD."""
+
+BAND_SD = 2.0
+"""SDs of the measured mean to each side of a point."""
+
+PLACE = ["specimen", "test", "joint", "coordinate"]
+
+_LINES: dict[str, dict[str, Any]] = {
+    "base": {"color": THEIRS, "ls": (0, (4, 1.5)), "lw": 1.0},
+    "with_effects": {"color": OURS, "ls": "-", "lw": 1.2},
+}
+_LABELS = {"base": "base model", "with_effects": "model with the effects"}
+_DOT: dict[str, Any] = {"marker": "o", "ms": 3.4, "lw": 0, "mec": BLACK, "mew": 0.6}
+_PANEL_MM, _KEY_MM = 51.0, 18.0
+_JUMP = 2.0
+"""Times the usual change of load from which a change of side is a jump."""
+
+_BACK = 0.02
+"""Share of the largest load by which a load must fall for its step to be one of unloading."""
+
+Steps = NDArray[np.int64]
+
+
+def load_displacement_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+    """The curves where the base is farthest off, each in the specimen where it is worst."""
+    gap = tables["gap"]
+    curves = worst_curves(gap)
+    if not curves:
+        return saying(
+            "No curve can be shown: the base model has no pose, or no test loads a joint."
+        )
+    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
+    (panels,), figure = sections([(len(curves), _PANEL_MM)], _KEY_MM)
+    unloaded = False
+    for index, (axis, curve) in enumerate(zip(panels, curves, strict=True)):
+        unloaded |= _draw(axis, curve, added)
+        _label(axis, index, curve, len(cohort.specimen_names))
+    explain_marks(figure, _handles(added, unloaded), _words(gap, curves, cohort), 5)
+    return figure
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One specimen's joint in one test: ``rows`` of the table gap in the order of load steps.
+
+    ``off`` : root mean square of measured less base, noise SD.
+    """
+
+    specimen: str
+    test: str
+    joint: str
+    coordinate: str
+    rows: pd.DataFrame
+    off: float
+
+
+def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[Curve]:
+    """Of each joint in each test the driven coordinate, the base's farthest first.
+
+    Of many each in the specimen where it is worst.
+    """
+    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)].sort_values("step", kind="stable")
+    chosen = driven(rows)
+    found = [
+        Curve(str(specimen), str(test), str(joint), str(coordinate), part, _off(part))
+        for (specimen, test, joint, coordinate), part in rows.groupby(PLACE, sort=False)
+        if (test, joint, coordinate) in chosen
+    ]
+    ordered = sorted(found, key=lambda curve: -curve.off)
+    if len(ordered) <= most:
+        return ordered
+    of_place: dict[tuple[str, str], Curve] = {}
+    for curve in ordered:
+        of_place.setdefault((curve.test, curve.joint), curve)
+    shown = list(of_place.values())[:most]
+    return [curve for n, curve in enumerate(shown) if n < FEWEST_PANELS or curve.off > CLEARLY]
+
+
+def driven(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
+    """Test, joint and the coordinate in which the load does the most work there, over specimens."""
+    factors = dict(zip(COORDINATES, BORDER_PER_SI, strict=True))
+    per_si = gap["coordinate"].map(factors).astype(float)
+    work = (gap["load"] * gap["measured"] / per_si).abs()
+    keys = ["test", "joint", "coordinate"]
+    total = work.groupby([gap[key] for key in keys], sort=False).sum().rename("work").reset_index()
+    best = total[total["work"] > 0.0].sort_values("work", ascending=False, kind="stable")
+    chosen = best.drop_duplicates(["test", "joint"])
+    return set(chosen[keys].itertuples(index=False, name=None))
+
+
+def _off(rows: pd.DataFrame) -> float:
+    residual = (rows["measured"] - rows["base"]) / rows["noise_sd"]
+    return float(np.sqrt(np.mean(residual**2)))
+
+
+def unloading(load: Array) -> NDArray[np.bool_]:
+    """(T,) steps that were come to from a larger load to the same side, the way back to zero."""
+    before = np.concatenate([load[:1], load[:-1]])
+    least = _BACK * float(np.abs(load).max(initial=0.0))
+    same_side = load * before >= 0.0
+    return same_side & (np.abs(before) - np.abs(load) > least)
+
+
+def _draw(axis: Axes, curve: Curve, with_effects: bool) -> bool:
+    """Points, their noise and the models' curves; whether there were unloading steps."""
+    rows = curve.rows
+    load, measured = rows["load"].to_numpy(float), rows["measured"].to_numpy(float)
+    back, noise = unloading(load), BAND_SD * rows["noise_sd"].to_numpy(float)
+    for way in ways(load):
+        for steps in _branches(way, back):
+            low, high = measured[steps] - noise[steps], measured[steps] + noise[steps]
+            axis.fill_betweenx(load[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
+        for name in _LINES if with_effects else ("base",):
+            axis.plot(rows[name].to_numpy(float)[way], load[way], zorder=3, **_LINES[name])
+    for chosen, fill in ((~back, BLACK), (back, WHITE)):
+        axis.plot(measured[chosen], load[chosen], mfc=fill, zorder=5, **_DOT)
+    axis.axhline(0.0, color=GREY, lw=0.4, zorder=0)
+    axis.axvline(0.0, color=GREY, lw=0.4, zorder=0)
+    return bool(back.any())
+
+
+def ways(load: Array) -> list[Steps]:
+    """Steps that a line may join: a jump to the other side starts anew, from where all began."""
+    change = np.abs(np.diff(load))
+    sides = load[1:] * load[:-1] < 0.0
+    usual = float(np.median(change)) if len(change) else 0.0
+    jumps = np.flatnonzero(sides & (change > _JUMP * usual)) + 1
+    found: list[Steps] = np.split(np.arange(len(load)), jumps)
+    unloaded = abs(load[0]) <= _BACK * float(np.abs(load).max(initial=0.0))
+    return [np.r_[0, way] if unloaded and way[0] else way for way in found]
+
+
+def _branches(way: Steps, back: NDArray[np.bool_]) -> list[Steps]:
+    """Runs of steps that load or unload, each with the step that it starts from."""
+    turns = [0, *(np.flatnonzero(np.diff(back[way])) + 1).tolist(), len(way)]
+    return [way[max(0, a - 1) : b] for a, b in pairwise(turns)]
+
+
+def _label(axis: Axes, index: int, curve: Curve, specimens: int) -> None:
+    whose = f", {short(curve.specimen, 14)}" if specimens > 1 else ""
+    head(axis, index, f"{curve.joint}{whose}\n{short(case(curve.test), 34)}")
+    axis.set_xlabel(f"{motion_of(curve.coordinate)} ({unit(curve.coordinate)})")
+    axis.set_ylabel(load_axis(curve.coordinate))
+    axis.xaxis.set_major_locator(MaxNLocator(5))
+    axis.yaxis.set_major_locator(MaxNLocator(5))
+    axis.tick_params(axis="y", length=2.5)
+    axis.margins(x=0.06, y=0.08)
+    axis.text(
+        0.98,
+        0.03,
+        f"base off by {fixed(curve.off, 1)} SD",
+        transform=axis.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=SMALL_PT,
+        color=INK[GREY],
+        bbox={"facecolor": WHITE, "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+        in_layout=False,
+    )
+
+
+def _handles(with_effects: bool, unloaded: bool) -> list[Line2D | Patch]:
+    word = "measured, loading" if unloaded else "measured"
+    handles: list[Line2D | Patch] = [Line2D([], [], mfc=BLACK, label=word, **_DOT)]
+    if unloaded:
+        handles.append(Line2D([], [], mfc=WHITE, label="measured, unloading", **_DOT))
+    handles.append(Patch(facecolor=GREY, alpha=0.3, lw=0, label="noise of the mean, 2 SD"))
+    handles.append(Line2D([], [], label=_LABELS["base"], **_LINES["base"]))
+    if with_effects:
+        handles.append(Line2D([], [], label=_LABELS["with_effects"], **_LINES["with_effects"]))
+    return handles
+
+
+def _words(gap: pd.DataFrame, curves: Sequence[Curve], cohort: Cohort) -> str:
+    places = len(driven(gap))
+    each = len(curves) == len({(curve.test, curve.joint) for curve in curves})
+    whose = ", each in the specimen where it is worst" if len(cohort.specimen_names) > 1 else ""
+    some = f"{len(curves)} of {count(places, 'curve')} (joint and test)"
+    shown = some if each and places > len(curves) else "All curves"
+    return (
+        f"{shown} in the direction that the test drives, the base's farthest first"
+        f"{whose if each else ''}; the load at the joint is that of the neutral pose."
+    )
