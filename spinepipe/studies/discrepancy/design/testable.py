@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.design.seen import Design, Seen, candidates
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, shape_grid
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, usual_shapes
 from spinepipe.studies.discrepancy.search.model_files import border
 from spinepipe.studies.discrepancy.search.screen import Group, Places, sides
 

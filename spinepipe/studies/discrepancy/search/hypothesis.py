@@ -166,6 +166,11 @@ def shape_grid(variant: Variant) -> list[tuple[float, ...]]:
     return list(product(*(parameters[column].tried for column in variant.shapes)))
 
 
+def usual_shapes(variant: Variant) -> tuple[float, ...]:
+    """The point of the grid with every shape nearest to its default."""
+    return min(shape_grid(variant), key=lambda sds: sum(abs(one) for one in sds))
+
+
 def trials(
     names: Sequence[str] | None, coordinates: Sequence[str], specimens: Sequence[str], joints: int
 ) -> tuple[Trials, ...]:
