@@ -234,6 +234,9 @@ def _problem(file: str, line: int, key: tuple[object, ...], tests: list[str]) ->
     return Problem(file, line, column, found, allowed, remedy)
 
 
+FOR_ALL = {("loads", "specimen"), ("supports", "specimen"), ("supports", "joint")}
+"""Tables and columns in which * stands for all."""
+
 SPECIMEN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 """Specimens become folder names of results."""
 
@@ -253,7 +256,7 @@ def check_names(draft: Draft) -> Iterator[Problem]:
     for stem, form in draft.forms.items():
         for column, names in known.items():
             if names and column in form.names and stem != "specimens":
-                wildcard = ("*",) if (stem, column) == ("loads", "specimen") else ()
+                wildcard = ("*",) if (stem, column) in FOR_ALL else ()
                 yield from _unknown(draft, stem, column, (*names, *wildcard))
 
 

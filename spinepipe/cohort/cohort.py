@@ -24,6 +24,18 @@ class MeasurementSd(BaseModel):
 
     rotation_deg: float = Field(gt=0, le=45, description="SD of a measured angle, deg")
     translation_mm: float = Field(gt=0, le=50, description="SD of a measured translation, mm")
+    force_n: float | None = Field(
+        default=None,
+        gt=0,
+        le=20000,
+        description="SD of a rig's measured force, N; for supports.csv alone",
+    )
+    moment_nm: float | None = Field(
+        default=None,
+        gt=0,
+        le=500,
+        description="SD of a rig's measured moment, N m; for supports.csv alone",
+    )
 
 
 class CohortHeader(BaseModel):
@@ -73,6 +85,7 @@ class Cohort:
     landmarks, joints, bodies : geometry and masses in ground, neutral pose.
     loads : ``specimen`` may be ``*`` (all); ``cycle`` is float64, NaN stands for every cycle.
     motion : ``cycle`` is int64, 1 where the file says nothing.
+    supports : joint coordinates that rigs fix; names may be ``*``.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
     digest : sha256 over the names and bytes of the files that were read.
@@ -94,6 +107,7 @@ class Cohort:
     motion: pd.DataFrame | None
     digest: str
     further: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    supports: pd.DataFrame | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -131,10 +145,10 @@ class Cohort:
             "vertebrae": self.vertebrae,
             "gravity": self.gravity,
             "zeroed_at_step_0": self.zeroed_at_step_0,
-            "measurement_sd": None if sd is None else sd.model_dump(mode="json"),
+            "measurement_sd": None if sd is None else sd.model_dump(mode="json", exclude_none=True),
             "tests": self.tests,
         }
-        names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion")
+        names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", "supports")
         tables = {name: getattr(self, name) for name in names}
         return _PartDigests(shared, {**tables, **self.further})
 

@@ -233,5 +233,31 @@ MOTION = TableForm(
     keys=("specimen", "test", "cycle", "step", "joint"),
 )
 
-TABLES = {form.stem: form for form in (SPECIMENS, LANDMARKS, JOINTS, BODIES, LOADS, MOTION)}
+SUPPORTS = TableForm(
+    "supports",
+    "specimen x test x joint coordinate that a rig fixes; of rows that fit, the last counts",
+    (
+        _key("specimen", "specimen, * stands for all"),
+        _key("test", "load case, * stands for all"),
+        Column("joint", "joint as L4L5, * stands for all", "text"),
+        Column("coordinate", "extension, right_bending, … or anterior, superior, right", "text"),
+        Column("vertebra", "vertebra that is held by itself: not yet supported", "text"),
+        Column("direction", "its direction in ground: not yet supported", "text"),
+        _key(
+            "state",
+            "free; held: as in the neutral pose; prescribed: moved as motion.csv says",
+        ),
+        Column(
+            "reaction",
+            "measured: the rig's load on it was measured and stands in loads.csv; "
+            "unknown or empty: not",
+            "text",
+        ),
+    ),
+    keys=("specimen", "test", "joint", "coordinate"),
+)
+
+TABLES = {
+    form.stem: form for form in (SPECIMENS, LANDMARKS, JOINTS, BODIES, LOADS, MOTION, SUPPORTS)
+}
 """Every CSV file that is read, by stem; other files in the folder are ignored."""

@@ -17,10 +17,18 @@ from spinepipe.units import COORDINATES
 DRIVEN = ("right_bending", "left_rotation", "extension")
 """Coordinate driven by a moment about x, y and z of ground."""
 
+PUSHED = ("anterior", "superior", "right")
+"""Coordinate driven by a force along x, y and z of ground."""
+
 
 def moments(case: LoadCase) -> Array:
     """(T, 3) N m, ground: sum of the moments of each load step."""
     return _sums([[wrench.moment for wrench in step.wrenches] for step in case.steps])
+
+
+def forces(case: LoadCase) -> Array:
+    """(T, 3) N, ground: sum of the forces of each load step."""
+    return _sums([[wrench.force for wrench in step.wrenches] for step in case.steps])
 
 
 def _sums(vectors: Sequence[Sequence[Array]]) -> Array:
@@ -35,7 +43,7 @@ def peak_step(case: LoadCase) -> int:
     """
     applied = moments(case)
     if not applied.any():
-        applied = _sums([[wrench.force for wrench in step.wrenches] for step in case.steps])
+        applied = forces(case)
     return int(np.argmax(np.linalg.norm(applied, axis=1)))
 
 
@@ -47,6 +55,17 @@ def loaded_coordinate(case: LoadCase) -> str | None:
     coordinate = DRIVEN[int(np.argmax(np.abs(largest)))]
     assert coordinate in COORDINATES
     return coordinate
+
+
+def pushed_coordinate(case: LoadCase) -> str | None:
+    """The coordinate that the largest force drives; None where no force is applied."""
+    largest = forces(case)[most_pushed_step(case)]
+    return PUSHED[int(np.argmax(np.abs(largest)))] if largest.any() else None
+
+
+def most_pushed_step(case: LoadCase) -> int:
+    """Place of the load step with the largest force; the first of equal ones."""
+    return int(np.argmax(np.linalg.norm(forces(case), axis=1)))
 
 
 def coupled_range(case: LoadCase) -> float:

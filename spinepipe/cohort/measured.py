@@ -7,12 +7,18 @@ from functools import cached_property
 import numpy as np
 
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.load_tests import loaded_coordinate, peak_step
+from spinepipe.cohort.load_tests import (
+    loaded_coordinate,
+    most_pushed_step,
+    peak_step,
+    pushed_coordinate,
+)
 from spinepipe.cohort.specimen import joint_frames, load_cases
+from spinepipe.cohort.supports import as_read, supported
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, reexpress
 from spinepipe.model import LoadCase, MeasuredCase
-from spinepipe.units import COORDINATE_COLUMNS, to_si
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, to_si
 
 NO_SHIFT = np.zeros(3)
 
@@ -23,13 +29,24 @@ class MeasuredCycle(MeasuredCase):
 
     @cached_property
     def peak(self) -> int:
-        """Place of the load step with the largest moment."""
-        return peak_step(self.case)
+        """Place of the load step with the largest moment; of force where that is what drives."""
+        return most_pushed_step(self.case) if self.is_pushed else peak_step(self.case)
 
     @cached_property
     def loaded(self) -> str | None:
-        """Coordinate that the main moment drives, None without a moment."""
-        return loaded_coordinate(self.case)
+        """Coordinate that the main moment drives, or the main force, see `is_pushed`; or None."""
+        return pushed_coordinate(self.case) if self.is_pushed else loaded_coordinate(self.case)
+
+    @cached_property
+    def is_pushed(self) -> bool:
+        """Whether a force is what is read of: its coordinate is read, that of the moment is not."""
+        turned, pushed = loaded_coordinate(self.case), pushed_coordinate(self.case)
+        return not self._reads(turned) and self._reads(pushed)
+
+    def _reads(self, coordinate: str | None) -> bool:
+        if coordinate is None:
+            return False
+        return bool(np.isfinite(self.readings[..., COORDINATES.index(coordinate)]).any())
 
     def in_frames(self, nominal: Sequence[Pose], sampled: Sequence[Pose]) -> "MeasuredCycle":
         """The same motion of the vertebrae, expressed in other joint frames.
@@ -88,10 +105,13 @@ def measured_cycles(
 ) -> tuple[MeasuredCycle, ...]:
     """Each case with its measured motion in the cohort's own joint frames."""
     joints = {name: index for index, name in enumerate(cohort.joint_names)}
-    return tuple(
-        MeasuredCycle(case, _motion(cohort, specimen, case, joints), cohort.zeroed_at_step_0)
-        for case in cases
-    )
+    found = []
+    for case in cases:
+        motion = _motion(cohort, specimen, case, joints)
+        with_rig = supported(cohort, specimen, case, motion)
+        read = as_read(with_rig, motion)
+        found.append(MeasuredCycle(with_rig, read, cohort.zeroed_at_step_0))
+    return tuple(found)
 
 
 def _motion(cohort: Cohort, specimen: str, case: LoadCase, joints: Mapping[str, int]) -> Array:

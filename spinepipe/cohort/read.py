@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort.check_geometry import check_bodies, check_geometry
+from spinepipe.cohort.check_supports import check_supports
 from spinepipe.cohort.checks import (
     check_header,
     check_keys,
@@ -56,6 +57,7 @@ def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
         forms=forms,
     )
     problems += _checks(draft)
+    problems += check_supports(draft, document)
     if problems or header is None:
         raise InputError(problems)
     return _cohort(folder, header, tables, forms)
@@ -128,6 +130,7 @@ def _cohort(
         bodies=final.get("bodies"),
         loads=final.get("loads"),
         motion=_numbered(final.get("motion")),
+        supports=final.get("supports"),
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )

@@ -88,6 +88,7 @@ class Kind:
         cohort, specimen, number of a joint pose or None, and the folder of the results, it returns
         the document, and in words what it is.
     forms : files of a cohort's folder that it reads besides those of every cohort.
+    holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).
     """
 
     settings: type[Study]
@@ -101,6 +102,7 @@ class Kind:
     makes_models: str | None = None
     exports: str | None = None
     forms: tuple[TableForm, ...] = ()
+    holds: bool = False
 
     def job(self, name: str) -> Job:
         """The job of that name."""

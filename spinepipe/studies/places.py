@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.supports import motion_read
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
@@ -61,22 +62,22 @@ def readings(
 ) -> pd.DataFrame:
     """Rows of motion with a reading, and their columns of the coordinates; None stands for all.
 
-    Zeros that zeroing made are no readings.
+    Zeros that zeroing made are no readings, nor are coordinates that a rig fixes.
 
     Parameters
     ----------
     cohort : with motion.
     """
-    assert cohort.motion is not None
     columns = [
         column
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if name in (coordinates or COORDINATES)
     ]
-    there = has_reading(cohort.motion["step"], cohort.zeroed_at_step_0)
-    read = cohort.motion[columns].notna().any(axis=1) & there
-    chosen = cohort.motion["test"].isin(list(tests or cohort.tests))
-    return cohort.motion.loc[read & chosen, [*_PLACE, "cycle", *columns]]
+    motion = motion_read(cohort)
+    there = has_reading(motion["step"], cohort.zeroed_at_step_0)
+    read = motion[columns].notna().any(axis=1) & there
+    chosen = motion["test"].isin(list(tests or cohort.tests))
+    return motion.loc[read & chosen, [*_PLACE, "cycle", *columns]]
 
 
 def measured_columns(rows: pd.DataFrame) -> list[str]:

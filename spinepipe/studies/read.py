@@ -111,11 +111,23 @@ def _misfits(
     """What the kind of the study finds wrong with it, its cohort, files and machine."""
     kind = kind_of(study.kind)
     problems = [found for check in kind.checks for found in check(document, study, cohort)]
+    if cohort.supports is not None and not kind.holds:
+        problems.append(_held(document, study, cohort))
     for ask in kind.checks_of_files:
         problems += ask(document, study, cohort, root)
     if at_start and not problems:
         problems = [p for ask in kind.checks_at_start for p in ask(document, study, cohort, root)]
     return problems
+
+
+def _held(document: Document, study: Study, cohort: Cohort) -> Problem:
+    """A rig in the cohort of a study that would leave it out."""
+    place = (document.file, document.line_of("cohort"), "cohort")
+    found = f"cohort '{cohort.name}', whose rig fixes joint coordinates (supports.csv)"
+    holding = [name for name in kind_names() if kind_of(name).holds]
+    allowed = f"studies of kind {', '.join(holding)}: {study.kind} knows no rig"
+    remedy = "choose such a study, or take supports.csv out if the rig does not matter"
+    return Problem(*place, found, allowed, remedy)
 
 
 def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[Problem]]:

@@ -87,6 +87,7 @@ def back_down(case: LoadCase) -> LoadCase:
             case.steps[-1].step + number,
             step.wrenches,
             2.0 * last - step.time if timed and step.time is not None else None,
+            step.supports,
         )
         for number, step in enumerate(reversed(case.steps[:-1]), start=1)
     ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.supports import motion_read
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
 from spinepipe.progress import Progress
@@ -142,8 +143,8 @@ def on_record(fit: JointFit, readings: Mapping[str, SpecimenReadings]) -> int:
 
 
 def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
-    assert cohort.motion is not None
-    motion = cohort.motion[cohort.motion["test"].isin(list(study.tests or cohort.tests))]
+    motion = motion_read(cohort)
+    motion = motion[motion["test"].isin(list(study.tests or cohort.tests))]
     return tuple(
         name
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)

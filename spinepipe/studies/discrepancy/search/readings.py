@@ -100,6 +100,7 @@ def _loads(case: LoadCase) -> tuple[object, ...]:
                 (w.body, w.point.tobytes(), w.force.tobytes(), w.moment.tobytes())
                 for w in step.wrenches
             ),
+            step.supports,
         )
         for step in case.steps
     )

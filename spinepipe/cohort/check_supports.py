@@ -1,0 +1,120 @@
+"""Does ``supports.csv`` say of a rig what can be done? Names, states, values to be prescribed."""
+
+from collections.abc import Iterator
+from math import isnan
+
+from spinepipe.cohort.cohort import EVERYONE
+from spinepipe.cohort.draft import Draft, applied_loads
+from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Fixed, fixed
+from spinepipe.cohort.text import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
+
+WORDS = {"coordinate": COORDINATES, "state": STATES, "reaction": REACTIONS}
+"""What may stand in the columns whose cells are one of several words."""
+
+
+def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]:
+    """Problems of ``supports.csv`` beyond its cells and keys; ``document`` is ``cohort.yaml``."""
+    if "supports" not in draft.tables:
+        return
+    yield from _places(draft)
+    yield from _words(draft)
+    yield from _tests(draft)
+    yield from _without_values(draft)
+    yield from _without_sd(draft, document)
+
+
+def _places(draft: Draft) -> Iterator[Problem]:
+    """Each row is of a joint and a coordinate; a vertebra by itself cannot be held yet."""
+    columns = ("joint", "coordinate", "vertebra", "direction")
+    for line, cells in draft.rows("supports", *columns):
+        there = {n: isinstance(cell, str) for n, cell in zip(columns, cells, strict=True)}
+        place = (draft.file("supports"), line)
+        if there["vertebra"] or there["direction"]:
+            found = "a vertebra held in a direction of ground, which is not yet supported"
+            allowed = "a joint and a coordinate"
+            remedy = "say it of the joints, or leave the row out if the rig does not matter"
+            yield Problem(*place, "vertebra", found, allowed, remedy)
+            continue
+        for name in ("joint", "coordinate"):
+            if not there[name]:
+                allowed = "a joint and a coordinate in every row"
+                yield Problem(*place, name, "an empty cell", allowed, f"name the {name}")
+
+
+def _words(draft: Draft) -> Iterator[Problem]:
+    for column, known in WORDS.items():
+        for line, (cell,) in draft.rows("supports", column):
+            if isinstance(cell, str) and cell not in known:
+                place = (draft.file("supports"), line, column)
+                remedy = did_you_mean(cell, known, "correct it")
+                yield Problem(*place, f"'{cell}'", one_of(known), remedy)
+
+
+def _tests(draft: Draft) -> Iterator[Problem]:
+    known = list(dict.fromkeys(load.test for load in applied_loads(draft)))
+    if "loads" not in draft.tables and "loads" not in draft.absent:
+        return
+    for line, (test,) in draft.rows("supports", "test"):
+        if isinstance(test, str) and test not in (EVERYONE, *known):
+            place = (draft.file("supports"), line, "test")
+            remedy = did_you_mean(test, known, "add its loads, zeros where nothing acts")
+            yield Problem(*place, f"unknown test '{test}'", one_of((EVERYONE, *known)), remedy)
+
+
+def _without_values(draft: Draft) -> Iterator[Problem]:
+    """A prescribed coordinate needs a reading at every step; said once per test and coordinate."""
+    if "motion" not in draft.tables and "motion" not in draft.absent:
+        return
+    motion = _measured(draft)
+    reported = set()
+    for load in applied_loads(draft):
+        if load.step is None:
+            continue
+        for one in _fixed(draft, load.specimen, load.test):
+            joint, column = draft.joint_names[one.joint], COORDINATE_COLUMNS[one.coordinate]
+            key = (load.specimen, load.test, load.cycle, load.step, joint, column)
+            if one.state != PRESCRIBED or key in motion or (*key[:3], *key[4:]) in reported:
+                continue
+            reported.add((*key[:3], *key[4:]))
+            found = (
+                f"no {column} of {joint} at step {load.step} of test '{load.test}', specimen "
+                f"'{load.specimen}', cycle {load.cycle}, though it is prescribed"
+            )
+            allowed = "a value at every step of a test in which supports.csv prescribes it"
+            remedy = "add the value to motion.csv, or set the state to held or free"
+            yield Problem(draft.file("supports"), None, "state", found, allowed, remedy)
+
+
+def _measured(draft: Draft) -> set[tuple[object, ...]]:
+    """Specimen, test, cycle, step, joint and column of every value in ``motion.csv``."""
+    keys = ("specimen", "test", "cycle", "step", "joint")
+    found: set[tuple[object, ...]] = set()
+    for _, cells in draft.rows("motion", *keys, *COORDINATE_COLUMNS):
+        (specimen, test, cycle, step, joint), values = cells[:5], cells[5:]
+        if isnan(step):
+            continue
+        place = (specimen, test, 1 if isnan(cycle) else int(cycle), int(step), joint)
+        named = zip(COORDINATE_COLUMNS, values, strict=True)
+        found |= {(*place, column) for column, value in named if not isnan(value)}
+    return found
+
+
+def _fixed(draft: Draft, specimen: str, test: str) -> tuple[Fixed, ...]:
+    return fixed(draft.tables["supports"], specimen, test, draft.joint_names)
+
+
+def _without_sd(draft: Draft, document: Document | None) -> Iterator[Problem]:
+    """A load that was measured counts by its SD."""
+    sd = document.data.get("measurement_sd") if document else None
+    known = sd if isinstance(sd, dict) else {}
+    reported = set()
+    for line, (coordinate, reaction) in draft.rows("supports", "coordinate", "reaction"):
+        key = "force_n" if coordinate in TRANSLATIONS else "moment_nm"
+        if reaction == MEASURED and key not in known and key not in reported:
+            reported.add(key)
+            place = (draft.file("supports"), line, "reaction")
+            allowed = f"a measured reaction with measurement_sd.{key} in cohort.yaml"
+            remedy = f"add `{key}:` there, the SD of the rig's load, or set the reaction to unknown"
+            yield Problem(*place, f"'{MEASURED}', but no SD of it", allowed, remedy)
