@@ -93,16 +93,16 @@ def reported(system: System, free: tuple[FreeParameter, ...] = (), x: Array | No
     other = fresh(system).with_model(moved(system.model, free, np.zeros(0) if x is None else x))
     steps = follow(other)
     assert all(step.usable for step in steps)
-    return np.stack([observe(other, step.equilibrium.q) for step in steps])
+    return np.stack([observe(other, step.equilibrium.q, k) for k, step in enumerate(steps)])
 
 
 def reported_by_parameters(system: System, free: tuple[FreeParameter, ...]) -> Array:
     """(T, J, 6, m) sensitivities of what is reported."""
     system = fresh(system)
     solved = follow(system)
-    each = zip(solved, by_parameters(system, solved, free), strict=True)
+    each = enumerate(zip(solved, by_parameters(system, solved, free), strict=True))
     return np.stack(
-        [observed_by_parameters(system, step.equilibrium.q, dq, free) for step, dq in each]
+        [observed_by_parameters(system, step.equilibrium.q, dq, free, k) for k, (step, dq) in each]
     )
 
 

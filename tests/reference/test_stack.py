@@ -71,10 +71,13 @@ def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) 
     solved = [with_tangent_there(system, step) for step in follow(system)]
     poses, shape = [step.equilibrium.q for step in solved], (len(solved), model.n_joints, 6)
     dq = by_parameters(system, solved, free)
-    by_x = [observed_by_parameters(system, q, d, free) for q, d in zip(poses, dq, strict=True)]
+    by_x = [
+        observed_by_parameters(system, q, d, free, k)
+        for k, (q, d) in enumerate(zip(poses, dq, strict=True))
+    ]
     return [
         np.reshape(poses, shape),
-        np.array([observe(system, q) for q in poses]),
+        np.array([observe(system, q, k) for k, q in enumerate(poses)]),
         np.reshape(dq, (*shape, len(free))),
         np.array(by_x),
     ]
@@ -132,17 +135,20 @@ def test_random_effects_beside_each_other(n_joints: int) -> None:
     compare(runs)
 
 
-@pytest.mark.parametrize(("n_joints", "share"), [(1, 20.0), (3, 10.0), (8, 3.0)])
+@pytest.mark.parametrize(("n_joints", "share"), [(1, 20.0), (3, 10.0), (8, 5.0)])
 def test_loads_that_do_not_come_on_at_once(
     n_joints: int, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Loads that some chains carry only in fractions, and others not at all: as the engine says."""
     rng = np.random.default_rng(40 + n_joints)
-    effects = [effect for effect in VARIANTS if effect.kind is not Kind.PATH]
-    drawn = [
-        draw.model(rng, n_joints, [effects[int(rng.integers(len(effects)))]], share)
-        for _ in range(16)
-    ]
+    without_memory = [e for e in VARIANTS if e.kind not in (Kind.PATH, Kind.MEASUREMENT)]
+    names = sorted({effect.name for effect in without_memory})
+    drawn = []
+    for _ in range(16):
+        name = names[int(rng.integers(len(names)))]
+        variants = [effect for effect in without_memory if effect.name == name]
+        effect = variants[int(rng.integers(len(variants)))]
+        drawn.append(draw.model(rng, n_joints, [effect], share))
     stack, continued = stack_of(drawn), []
     at_once = Stack._continued
 
@@ -230,7 +236,8 @@ def test_what_idle_effects_would_do(effect: Effect) -> None:
     found = np.moveaxis(found, (2, 3), (1, 2)).reshape(expected.shape)
     largest = np.maximum(np.abs(expected).max(axis=(0, 1, 2)), 1e-9)
     np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-11)
-    assert np.abs(expected).max() > 0.0 or effect.name == "facet_contact"  # a gap not closed here
+    late = effect.name == "facet_contact" or getattr(effect, "shape", "") == "bilinear"
+    assert np.abs(expected).max() > 0.0 or late  # a gap, or a break, not reached here
 
 
 def test_effects_in_between_need_a_model_of_their_own() -> None:

@@ -27,6 +27,7 @@ from spinepipe.effects import (
     JointLaw,
     Kind,
     LoadEffect,
+    MeasurementBeside,
     MeasurementEffect,
     PathLaw,
     create,
@@ -299,7 +300,7 @@ def test_every_registered_effect_declares_itself_fully() -> None:
     for name, cls in registered().items():
         effect = cls()
         assert effect.name == name
-        assert isinstance(effect, PROTOCOLS[effect.kind])
+        assert isinstance(effect, PROTOCOLS[effect.kind] | MeasurementBeside)
         for parameter in effect.parameters:
             assert parameter.low <= parameter.default <= parameter.high
             assert parameter.prior_scale > 0.0

@@ -47,7 +47,7 @@ def _motion(system: System, zeroed: bool) -> tuple[Array | None, Status, str]:
     for step in steps:
         if not step.usable:
             return None, step.equilibrium.status, step.equilibrium.message
-    q = np.stack([observe(system, step.equilibrium.q) for step in steps])
+    q = np.stack([observe(system, step.equilibrium.q, k) for k, step in enumerate(steps)])
     return less_step_0(q, zeroed), Status.CONVERGED, ""
 
 

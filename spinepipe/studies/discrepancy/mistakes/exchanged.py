@@ -114,8 +114,10 @@ def _exchange(
 ) -> _Exchange | None:
     """The best of the ways; None where the base has no fit with the pair exchanged."""
     setting = _setting(grounds, pair)
-    there = setting and _fitted(grounds, setting, pair, (), run)
-    if there is None or setting is None:
+    if setting is None:
+        return None
+    there = _fitted(grounds, setting, pair, (), run)
+    if there is None:
         return None
     best = [_in_place_of_all(grounds, there, pair, run, trials, found)]
     for others, left_out in _ways(grounds, run, found):

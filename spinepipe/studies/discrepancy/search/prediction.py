@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from spinepipe.calibrate.solvers import on_record
+from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import FreeParameter, moved
@@ -218,7 +219,10 @@ class Solved:
         free : unknowns of ``full``.
         """
         stack = Stack.of([full], [(0, case) for case in self.cases])
-        dq = poses_by(stack, self._q, [free])
+        if all(full.effects[one.effect].effect.kind is Kind.MEASUREMENT for one in free):
+            dq = np.zeros((*self._q.shape, len(free)))  # instruments move no joint
+        else:
+            dq = poses_by(stack, self._q, [free])
         found = self._by_test(readings_by(stack, self._q, dq, [free]))
         return tuple(less_step_0(one, self.zeroed) for one in found)
 

@@ -1,0 +1,86 @@
+"""Soft tissue artefact: markers on skin follow a neighbouring joint, until the skin is taut."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from spinepipe.effects.carried_share import require
+from spinepipe.effects.contract import Array, Beside, Kind, Observation, Parameter
+from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.units import COORDINATES, TRANSLATIONS
+
+NEIGHBOURS = ("above", "below")
+
+_REACH = {  # smallest, usual and largest slip
+    True: (1e-4, 1e-3, 5e-3),
+    False: tuple(float(np.deg2rad(deg)) for deg in (0.1, 2.0, 8.0)),
+}
+
+
+@register("soft_tissue_artefact")
+@dataclass(frozen=True)
+class SoftTissueArtefact:
+    """One coordinate is read with a share of what the neighbouring joint does: ``q + s slip(u)``.
+
+    u is the same coordinate of the joint above (or below), and skin slips with it only so far:
+    ``slip(u) = u / sqrt(1 + (u / reach)^2)``, which is u while small and the reach in the end. A
+    share of zero is off. Slip without end, a straight share of the neighbour's motion, could as
+    well be tissue that spans two joints: a fit whose reach runs to its bound is no artefact.
+    """
+
+    coordinate: str = "extension"
+    neighbour: str = "above"
+
+    name: ClassVar[str] = "soft_tissue_artefact"
+    kind: ClassVar[Kind] = Kind.MEASUREMENT
+    per_joint: ClassVar[bool] = True
+    trial: ClassVar[Trial] = Trial(
+        variants=tuple({"coordinate": c, "neighbour": n} for c in COORDINATES for n in NEIGHBOURS),
+        spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
+        told_by="several joints read over several load steps up to a large motion",
+    )
+
+    def __post_init__(self) -> None:
+        require(self.name, "coordinate", self.coordinate, COORDINATES)
+        require(self.name, "neighbour", self.neighbour, NEIGHBOURS)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The share, and how far skin slips."""
+        moves = self.coordinate in TRANSLATIONS
+        low, usual, high = _REACH[moves]
+        share = f"share of {self.coordinate} of the joint {self.neighbour} that is read besides"
+        reach = "reading besides at which the skin is taut"
+        return (
+            Parameter("share", "1", 0.0, 2.0, 0.3, 0.3, False, share, off=0.0),
+            Parameter("reach", "m" if moves else "rad", low, high, usual, 0.7, True, reach),
+        )
+
+    def observe_beside(self, q: Array, parameters: Array, beside: Beside) -> Observation:
+        """Reported coordinates, by the joint's own and the neighbour's."""
+        share, u, root = self._slip(parameters, beside)
+        seen, by_other = q.copy(), np.zeros((len(q), 6, 6))
+        seen[:, self._at] += share * u / root
+        by_other[:, self._at, self._at] = share / root**3
+        own = np.tile(np.eye(6), (len(q), 1, 1))
+        if self.neighbour == "above":
+            return Observation(seen, own, by_above=by_other)
+        return Observation(seen, own, by_below=by_other)
+
+    def by_parameter_beside(self, q: Array, parameters: Array, beside: Beside) -> Array:
+        """(J, 6, 2)."""
+        share, u, root = self._slip(parameters, beside)
+        found = np.zeros((len(q), 6, 2))
+        found[:, self._at, 0] = u / root
+        found[:, self._at, 1] = share * (u / root) ** 3 / parameters[:, 1] ** 3
+        return found
+
+    @property
+    def _at(self) -> int:
+        return COORDINATES.index(self.coordinate)
+
+    def _slip(self, parameters: Array, beside: Beside) -> tuple[Array, Array, Array]:
+        """(J,) share, motion of the neighbour, and the root that it is divided by."""
+        u = (beside.above if self.neighbour == "above" else beside.below)[:, self._at]
+        return parameters[:, 0], u, np.sqrt(1.0 + (u / parameters[:, 1]) ** 2)
