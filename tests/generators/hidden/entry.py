@@ -52,8 +52,8 @@ class Entry:
     one_specimen: bool = False
 
     def size(self, coordinate: str | None, recipe: Recipe) -> float:
-        """What a strength of a rotation is multiplied by for this coordinate, SI."""
-        if coordinate not in TRANSLATIONS:
+        """What the strength of a lumbar joint's extension is multiplied by elsewhere, SI."""
+        if coordinate is None:
             return 1.0
         stiffer = typical(recipe, coordinate) / typical(LUMBAR_MOMENTS, "extension")
         farther = reach(coordinate, recipe) / reach("extension", LUMBAR_MOMENTS)

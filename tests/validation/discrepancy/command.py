@@ -6,22 +6,24 @@ from collections.abc import Sequence
 
 from tests.validation.discrepancy.report import write
 from tests.validation.discrepancy.run import run
+from tests.validation.discrepancy.seeds import claim, first_seed
 from tests.validation.discrepancy.store import folder, kept
-from tests.validation.discrepancy.targets import AT_THE_END, KINDS, Target, of_seeds, targets
+from tests.validation.discrepancy.targets import DRAWN, NUMBER, Target, of_seeds, targets
 
 
 def main(arguments: Sequence[str] = ()) -> None:
     """Score what is not scored yet, then write the tables of all rows there are."""
     asked = _options(arguments)
     place = folder()
+    first = first_seed(place.name)
     if not asked.report:
-        run(_chosen(asked), place, asked.jobs)
-    write(kept(targets(), place), "python -m tests.validation discrepancy", place.name)
+        claim(place.name, first, first + NUMBER - 1)
+        run(_chosen(asked, first), place, asked.jobs)
+    write(kept(targets(first), place), "python -m tests.validation discrepancy", place.name)
 
 
-def _chosen(asked: argparse.Namespace) -> list[Target]:
-    usual = tuple(kind for kind in KINDS if asked.full or kind not in AT_THE_END)
-    found = targets(tuple(asked.kind) if asked.kind else usual)
+def _chosen(asked: argparse.Namespace, first: int) -> list[Target]:
+    found = targets(first, tuple(asked.kind or DRAWN))
     if asked.seeds:
         found = list(of_seeds(found, *asked.seeds))
     return found[: asked.limit]
@@ -35,9 +37,8 @@ def _range(text: str) -> tuple[int, int]:
 def _options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser("python -m tests.validation discrepancy")
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
-    parser.add_argument("--kind", action="append", choices=KINDS, help="one kind; may be repeated")
+    parser.add_argument("--kind", action="append", choices=DRAWN, help="one kind; may be repeated")
     parser.add_argument("--limit", type=int, help="only the first so many, a fair sample of all")
     parser.add_argument("--seeds", type=_range, metavar="FIRST:LAST", help="both ends included")
-    parser.add_argument("--full", action="store_true", help="also cohorts of real size, last")
     parser.add_argument("--report", action="store_true", help="only the tables, of rows there are")
     return parser.parse_args(list(arguments))

@@ -1,34 +1,174 @@
-"""How the cohorts that are scored are tested: drawn by seed, apart from what is hidden in them."""
+"""How the cohorts that are scored are tested: drawn by seed, apart from what is hidden in them.
 
+Small ones, so that a search takes seconds: two to four specimens of one to four joints, 7 to 13
+load steps a test.
+"""
+
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tests.generators.hidden import USUAL, Recipe, draw_hidden
+from tests.generators.hidden import KNOWN, USUAL, Recipe, draw_hidden
 
 STREAM = 7
+
+OF_LAWS = (
+    "nonlinear_stiffening",
+    "neutral_zone",
+    "flexion_extension_asymmetry",
+    "facet_contact",
+    "hysteresis",
+    "creep",
+)
+"""Effects that one joint shows by itself, in moments and in forces."""
+
 TOLD_BY_TRANSLATIONS = ("joint_centre_offset", "joint_centre_migration", "follower_load")
 """With pure moments and rotations alone these leave little or no trace."""
 
-PRELOAD_N, STRONG_PRELOAD_N = 200.0, 400.0
+PRELOAD_N = 200.0
+
+Fields = dict[str, Any]
 
 
-def plain(seed: int, **given: Any) -> Recipe:
-    """A recipe without any effect, in a drawn design; given fields are kept."""
-    rng = np.random.default_rng([seed, STREAM])
-    drawn: dict[str, Any] = {
-        "unloading": bool(rng.random() < 0.35),
-        "translations": bool(rng.random() < 0.25),
+def _path(rng: np.random.Generator, share: float) -> Fields:
+    """13 steps with unloading in that share of designs, else 7 to 11 without."""
+    if rng.random() < share:
+        return {"steps": 3, "unloading": True}
+    return {"steps": int(rng.integers(3, 6)), "unloading": False}
+
+
+def moments(rng: np.random.Generator) -> Fields:
+    """Two to four joints in sweeps of moments, rotations read."""
+    joints = int(rng.integers(2, 5))
+    return {
+        "joints": joints,
+        "lowest": int(rng.integers(0, 7 - joints)),
+        "n_specimens": int(rng.integers(2, 5)),
         "zeroed": bool(rng.random() < 0.25),
-        "preload_n": PRELOAD_N if rng.random() < 0.15 else 0.0,
-        "noise": str(rng.choice(["white", "serial", "outliers"], p=[0.6, 0.2, 0.2])),
-        "design": "directions" if rng.random() < 0.1 else "sweeps",
+        **_path(rng, 0.35),
     }
-    drawn |= given
-    if drawn["design"] == "directions":
-        drawn |= {"steps": 5, "preload_n": 0.0}
-    return Recipe(seed=seed, **(drawn | given))
+
+
+def six(rng: np.random.Generator) -> Fields:
+    """One to three joints, all six coordinates read."""
+    joints = int(rng.integers(1, 4))
+    return {
+        "joints": joints,
+        "lowest": int(rng.integers(0, 7 - joints)),
+        "n_specimens": int(rng.integers(2, 4)),
+        "translations": True,
+        **_path(rng, 0.2) | {"steps": 3},
+    }
+
+
+def one_joint(rng: np.random.Generator) -> Fields:
+    """One segment of either region in flexion and extension, or in three sweeps."""
+    cervical = bool(rng.random() < 0.4)
+    return {
+        "region": "cervical" if cervical else "lumbar",
+        "joints": 1,
+        "lowest": 0 if cervical else int(rng.integers(0, 3)),
+        "peak_nm": 2.5 if cervical else 7.5,
+        "design": str(rng.choice(["flexion_extension", "sweeps"])),
+        "n_specimens": int(rng.integers(2, 5)),
+        **_path(rng, 0.5),
+    }
+
+
+def shear(rng: np.random.Generator) -> Fields:
+    """One segment, C6-C7 or L4-L5, pushed forth and back; its displacement read, or more."""
+    cervical = bool(rng.random() < 0.5)
+    more = bool(rng.random() < 0.3)
+    return {
+        "region": "cervical" if cervical else "lumbar",
+        "joints": 1,
+        "lowest": 0 if cervical else 1,
+        "peak_n": 100.0 if cervical else 250.0,
+        "design": "shear",
+        "n_specimens": int(rng.integers(3, 6)),
+        "gravity": False,
+        "only": ("anterior", "extension") if more else ("anterior",),
+        "noise_sd_mm": 0.02,
+        **_path(rng, 0.5),
+    }
+
+
+def thin(rng: np.random.Generator) -> Fields:
+    """Two or three specimens, eleven steps, every test once."""
+    joints = int(rng.integers(2, 4))
+    return {
+        "joints": joints,
+        "lowest": int(rng.integers(0, 7 - joints)),
+        "n_specimens": int(rng.integers(2, 4)),
+        "steps": 5,
+        "cycles": 1,
+        "noise_sd_deg": 0.05,
+    }
+
+
+DESIGNS: dict[str, Callable[[np.random.Generator], Fields]] = {
+    "moments": moments,
+    "six": six,
+    "one_joint": one_joint,
+    "shear": shear,
+    "thin": thin,
+}
+
+USUAL_SHARES = {"moments": 0.4, "six": 0.1, "one_joint": 0.2, "shear": 0.2, "thin": 0.1}
+SHARES: dict[str, dict[str, float]] = {
+    **dict.fromkeys(OF_LAWS, USUAL_SHARES),
+    **{name: {"six": 0.9, "moments": 0.1} for name in TOLD_BY_TRANSLATIONS},
+    "preload_stiffening": {"moments": 1.0},
+}
+"""Of designs in which an effect is hidden; others are of several joints."""
+
+OF_SEVERAL = {"moments": 0.7, "six": 0.15, "thin": 0.15}
+
+
+def plain(seed: int, *names: str, **given: Any) -> Recipe:
+    """A recipe without any effect, in a design that suits these; given fields are kept."""
+    rng = np.random.default_rng([seed, STREAM])
+    shares = _shares(names)
+    kind = str(rng.choice(list(shares), p=list(shares.values())))
+    fields = DESIGNS[kind](rng)
+    noise = str(rng.choice(["white", "serial", "outliers"], p=[0.7, 0.15, 0.15]))
+    fields["noise"] = "white" if kind == "thin" else noise  # one cycle shows no outlier
+    if "hysteresis" in names:
+        fields |= {"unloading": True, "steps": 3}
+    if "preload_stiffening" in names:
+        fields |= {"preload_n": PRELOAD_N, "joints": 3, "lowest": min(fields["lowest"], 3)}
+    if set(names) & {"level_dependence", "local_laxity", "neighbour_coupling"}:
+        joints = max(fields["joints"], 3)
+        fields |= {"joints": joints, "lowest": min(fields["lowest"], 6 - joints)}
+    found = fields | given
+    if found.get("noise") == "outliers":
+        found["cycles"] = max(found.get("cycles", 3), 3)
+    return Recipe(seed=seed, **found)
+
+
+def _shares(names: tuple[str, ...]) -> dict[str, float]:
+    """Of one effect, its own; of several, where all of them can be."""
+    if not names:
+        return USUAL_SHARES
+    every = [SHARES.get(name, OF_SEVERAL) for name in names]
+    common = {one: min(s.get(one, 0.0) for s in every) for one in DESIGNS}
+    total = sum(common.values())
+    if not total:
+        return {"six": 1.0}
+    return {one: share / total for one, share in common.items() if share}
+
+
+def design_of(recipe: dict[str, Any]) -> str:
+    """In a word: shear, one joint, six coordinates, thin, or moments."""
+    if recipe["design"] in ("shear", "two_shears"):
+        return "shear"
+    if recipe["translations"]:
+        return "six"
+    if recipe["joints"] == 1:
+        return "one_joint"
+    return "thin" if recipe["cycles"] == 1 else "moments"
 
 
 def soiled(recipe: Recipe, share: float) -> Recipe:
@@ -40,20 +180,20 @@ def soiled(recipe: Recipe, share: float) -> Recipe:
     return replace(recipe, dirt=dict(USUAL) if rng.random() < 0.5 else {one: USUAL[one]})
 
 
+OTHER_SHARE = 0.65
+"""Of effects with a formula that spinepipe does not have, where there is one."""
+
+
 def with_effects(recipe: Recipe, *names: str) -> Recipe:
-    """With effects drawn for the recipe's seed."""
-    hidden = tuple(draw_hidden(name, recipe, number) for number, name in enumerate(names))
+    """With effects drawn for the recipe's seed, of the library's formulas or of others."""
+    rng = np.random.default_rng([recipe.seed, STREAM + 2])
+    hidden = tuple(
+        draw_hidden(name, recipe, number, other=bool(rng.random() < OTHER_SHARE))
+        for number, name in enumerate(names)
+    )
     return replace(recipe, hidden=hidden)
 
 
-def suited(seed: int, share: float, *names: str) -> dict[str, Any]:
-    """Fields of a design that shows these effects, in that share of designs."""
-    rng = np.random.default_rng([seed, STREAM + 2])
-    fields: dict[str, Any] = {}
-    if set(names) & set(TOLD_BY_TRANSLATIONS) and rng.random() < share:
-        fields["translations"] = True
-    if "preload_stiffening" in names:
-        fields["preload_n"] = STRONG_PRELOAD_N if rng.random() < share else 0.0
-    if "hysteresis" in names and rng.random() < share:
-        fields["unloading"] = True
-    return fields
+def known_effects() -> tuple[str, ...]:
+    """Names by turns: laws of one joint twice, since they have most formulas and designs."""
+    return (*KNOWN, *OF_LAWS)

@@ -1,4 +1,4 @@
-"""What is asked besides the verdict: held-out motion by kind, what the design could tell.
+"""What is asked besides the verdict: held-out motion by kind, what the design could tell, the rest.
 
 A question that fails is a row with a message; it does not take the verdict with it.
 """
@@ -11,11 +11,21 @@ import numpy as np
 
 from spinepipe.studies.discrepancy.design.seen import seen_in
 from spinepipe.studies.discrepancy.design.testable import judgements
-from spinepipe.studies.discrepancy.proof.held_out import Asked, held_out
+from spinepipe.studies.discrepancy.proof.folds import SPECIMEN, TEST
+from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
+from spinepipe.studies.discrepancy.search.beyond import beyond
+from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.investigation import Investigation
 from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.verdict import Answer, Reason
 
 Told = dict[str, Any]
+
+CLEAR = 2.0
+"""SDs of chi2 by which the base must miss held-out readings for a share of it to mean anything."""
+
+PLACES_KEPT = 3
 
 
 def _told(ask: Callable[..., Told]) -> Callable[..., Told]:
@@ -32,20 +42,33 @@ def _told(ask: Callable[..., Told]) -> Callable[..., Told]:
 
 
 @_told
-def held_out_told(found: Found) -> Told:
+def held_out_told(proof: HeldOut) -> Told:
     """Of tests and of specimens that were left out: share of the gap closed, and rms residual."""
-    told: Told = {}
-    for kind in ("tests", "specimens"):
-        asked = Asked(tests=kind == "tests", specimens=kind == "specimens")
-        said = held_out(found, asked, at_once)
-        told[kind] = {
-            "closed": said.closed,
-            "base_rms": said.base.rms if said.base else None,
-            "rms": said.with_effects.rms if said.with_effects else None,
-            "beats_base": said.beats_base,
-            "beats_surrogate": said.over_surrogate.beats if said.over_surrogate else None,
-        }
-    return told
+    return {
+        "tests": _of_folds([row for row in proof.folds if row.kind == TEST]),
+        "specimens": _of_folds([row for row in proof.folds if row.kind == SPECIMEN]),
+        "all_closed": proof.closed,
+        "beats_base": proof.beats_base,
+    }
+
+
+def _of_folds(rows: Sequence[FoldRow]) -> Told:
+    """Sums over folds; ``expected`` is the chi2 of a model that is right."""
+    pairs = [(row.base, row.with_effects, row) for row in rows]
+    scored = [(base, new, row) for base, new, row in pairs if base is not None and new is not None]
+    base = sum(one.chi2 for one, _, _ in scored)
+    new = sum(one.chi2 for _, one, _ in scored)
+    expected = sum(row.expected for *_, row in scored)
+    readings = sum(row.readings for *_, row in scored)
+    clear = base - expected > CLEAR * np.sqrt(2.0 * expected) if expected else False
+    return {
+        "folds": len(scored),
+        "closed": min((base - new) / (base - expected), 1.0) if clear else None,
+        "base_rms": np.sqrt(base / expected) if expected else None,
+        "rms": np.sqrt(new / expected) if expected else None,
+        "readings": readings,
+        "worse": [row.name for *_, row in scored if row.worse],
+    }
 
 
 @_told
@@ -78,3 +101,30 @@ def _repeats(found: Found) -> float:
         test.count[test.count > 0] for one in found.base.readings.values() for test in one.tests
     ]
     return float(np.mean(np.concatenate(counts)))
+
+
+@_told
+def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
+    """Where most is left by the model that the verdict stands for, as the verdict file says it."""
+    if ended.ended.verdict not in (Answer.UNKNOWN, Answer.PART):
+        return {}
+    told = ended.as_told().found.final
+    left = worst(places(residual_frame(told, told.fit, joints)), PLACES_KEPT)
+    return {"worst": [dict(place.at) | {"gap": place.gap.gap} for place in left]}
+
+
+@_told
+def table_told(ended: Investigation) -> Told:
+    """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
+    final, said = ended.as_told().found.final, ended.ended
+    if said.verdict not in (Answer.UNKNOWN, Answer.PART) or said.reason is Reason.DATA_ERRORS:
+        return {}
+    stays = beyond(final, ended.rules, at_once)
+    table, formula = stays.table, stays.formula
+    return {
+        "place": table.place if table else None,
+        "gap": table.gap if table else None,
+        "held_out_closed": table.held_out_closed if table else None,
+        "formula": formula.text if formula else None,
+        "formula_closed": formula.held_out_closed if formula else None,
+    }

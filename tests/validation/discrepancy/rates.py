@@ -43,11 +43,18 @@ def share(name: str, counts: Iterable[bool], goal: Goal | None = None) -> dict[s
 
 def median(name: str, values: Sequence[float], goal: Goal | None = None) -> dict[str, Any]:
     """A median with the interval of its order statistics; ends are None where too few."""
+    return percentile(name, values, 0.5, goal)
+
+
+def percentile(
+    name: str, values: Sequence[float], at: float, goal: Goal | None = None
+) -> dict[str, Any]:
+    """A percentile with the interval of its order statistics; ends are None where too few."""
     if not values:
         return _row(name, 0, None, None, None, None, goal)
-    ends: Any = quantile_test(np.array(values), q=0.0, p=0.5).confidence_interval(0.95)
+    ends: Any = quantile_test(np.array(values), q=0.0, p=at).confidence_interval(0.95)
     low, high = (float(end) if np.isfinite(end) else None for end in (ends.low, ends.high))
-    return _row(name, len(values), None, float(np.median(values)), low, high, goal)
+    return _row(name, len(values), None, float(np.quantile(values, at)), low, high, goal)
 
 
 def _row(

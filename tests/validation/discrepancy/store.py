@@ -1,36 +1,56 @@
-"""Rows as files: one per cohort, in a folder named by the code that made them."""
+"""Rows as files: one per cohort, in a folder named by the code of the search that made them."""
 
+import ast
 import hashlib
 import json
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import value_digest
 from tests.validation.discrepancy.row import Row
 from tests.validation.discrepancy.targets import Target
 
 ROOT = Path(__file__).resolve().parents[3]
 PLACE = ROOT / "results" / "validation" / "discrepancy"
-SEARCH = ("search.investigation", "search.model_files", "design.testable")
-"""Modules of the kind discrepancy that a row hangs on, with all that they import."""
-
-SOURCES = ("generators/hidden/*.py", "validation/discrepancy/row.py")
-"""Files of tests that a row hangs on; its recipe is in its name."""
+KIND = "spinepipe/studies/discrepancy"
+SEARCH = (
+    *(f"{KIND}/{folder}/*.py" for folder in ("search", "proof", "mistakes")),
+    f"{KIND}/design/testable.py",
+    f"{KIND}/design/seen.py",
+    f"{KIND}/settings.py",
+    "spinepipe/effects/*.py",
+    "tests/generators/hidden/*.py",
+    "tests/validation/discrepancy/row.py",
+)
+"""What a row hangs on: the search, the effects, and what made the data; not all of the package."""
 
 
 def folder() -> Path:
-    """Where rows of the code as it is now are kept."""
+    """Where rows of the search as it is now are kept."""
+    files = sorted(path for pattern in SEARCH for path in ROOT.glob(pattern))
+    return PLACE / digest(files)
+
+
+def digest(files: Iterable[Path]) -> str:
+    """Of what files mean: comments, docstrings and layout do not count."""
     found = hashlib.sha256()
-    for module in SEARCH:
-        found.update(code_digest(f"spinepipe.studies.discrepancy.{module}").encode())
-    for pattern in SOURCES:
-        for path in sorted((ROOT / "tests").glob(pattern)):
-            found.update(path.read_bytes())
-    return PLACE / found.hexdigest()[:12]
+    for path in files:
+        tree = ast.parse(path.read_bytes())
+        for node in ast.walk(tree):
+            body = getattr(node, "body", None)
+            if isinstance(body, list):
+                node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
+        found.update(f"{path.name} {ast.dump(tree)}\n".encode())
+    return found.hexdigest()[:12]
+
+
+def _is_text(node: ast.AST) -> bool:
+    value = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def path_of(target: Target, place: Path) -> Path:

@@ -6,29 +6,35 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tests.generators.hidden import KNOWN
-from tests.validation.discrepancy.judged import Judged
+from tests.generators.hidden import CATALOGUE, KNOWN
+from tests.validation.discrepancy.designs import DESIGNS, design_of
+from tests.validation.discrepancy.judged import NULLS, Judged
 from tests.validation.discrepancy.parameters import Compared, compared
 from tests.validation.discrepancy.rates import share
 from tests.validation.discrepancy.row import Row
 
-ANSWERS = (*KNOWN, "several", "SET with the truth", "SET without it", "NULL", "UNKNOWN")
-LEVEL_NAMES = {0.0: "none", 0.1: "0.1", 0.2: "0.2", 0.5: "0.5", 1.0: "1.0"}
+ANSWERS = (
+    *KNOWN,
+    *("several", "PART", "SET with the truth", "SET without it", "NULL", "UNKNOWN", "REFUSED"),
+)
+BANDS = ("none", "< 0.2", "0.2-0.5", ">= 0.5")
 
 
 def answer(row: Judged) -> str:
     """One of `ANSWERS`."""
     if row.verdict == "SET":
         return "SET with the truth" if row.truth_in_set else "SET without it"
-    if row.verdict == "NAMED":
-        return row.named[0] if len(row.named) == 1 else "several"
-    return row.verdict
+    if row.is_named and len(row.named) == 1 and row.named[0] in KNOWN:
+        return row.named[0]
+    return "several" if row.verdict == "NAMED" else row.verdict
 
 
 def truth_name(row: Judged) -> str:
     """What was hidden, in the words of the confusion table."""
-    if row.kind in ("pair", "mistake"):
-        return row.kind if row.kind == "pair" else f"mistake: {row.label}"
+    if row.kind in ("two", "part"):
+        return row.kind
+    if row.kind == "mistake":
+        return f"mistake: {row.label}"
     return "+".join(row.truth) or "NULL"
 
 
@@ -36,7 +42,7 @@ def confusion(rows: Sequence[Judged]) -> pd.DataFrame:
     """Truth by answer, for each level of the gap; a row of counts."""
     found: dict[tuple[str, str], dict[str, int]] = {}
     for row in rows:
-        key = truth_name(row), LEVEL_NAMES[row.level] if row.truth else "none"
+        key = truth_name(row), row.band
         counts = found.setdefault(key, dict.fromkeys(ANSWERS, 0))
         counts[answer(row)] += 1
     lines = [
@@ -54,13 +60,50 @@ def _order(item: tuple[tuple[str, str], Any]) -> tuple[int, str, str]:
 
 def by_effect(rows: Sequence[Judged]) -> pd.DataFrame:
     """Single effects by name and gap, over all designs and over those that show it by algebra."""
-    singles = [row for row in rows if row.kind == "single"]
+    singles = [row for row in rows if row.kind in ("one", "small")]
     found = []
     for name in (*KNOWN, "all"):
-        for level, gap in LEVEL_NAMES.items():
-            those = [r for r in singles if name in ("all", *r.truth) and r.level == level]
-            if those:
-                found.append({"effect": name, "gap": gap, **_counts(those)})
+        for formula in ("same", "other"):
+            for band in BANDS:
+                of_name = [r for r in singles if name in ("all", *r.truth) and r.band == band]
+                those = [r for r in of_name if r.formula == formula]
+                if those:
+                    row = {"effect": name, "formula": formula, "gap": band, **_counts(those)}
+                    found.append(row)
+    return pd.DataFrame(found)
+
+
+def by_formula(rows: Sequence[Judged]) -> pd.DataFrame:
+    """Large single effects above their limit by each formula: which are found, and as what."""
+    singles = [row for row in rows if row.kind == "one" and row.above and row.band == ">= 0.5"]
+    groups: dict[tuple[str, str], list[Judged]] = {}
+    for row in singles:
+        one = row.row["recipe"]["hidden"][0]
+        groups.setdefault((one["name"], str(one["shape"].get("formula", ""))), []).append(row)
+    return pd.DataFrame(
+        [
+            {
+                "effect": name,
+                "formula": formula,
+                "library": CATALOGUE[name].formulas.get(formula, "other"),
+                **_counts(those),
+            }
+            for (name, formula), those in sorted(groups.items())
+        ]
+    )
+
+
+def by_design(rows: Sequence[Judged]) -> pd.DataFrame:
+    """Nulls and single effects above their limit by design."""
+    found = []
+    for design in DESIGNS:
+        nulls = [r for r in rows if r.kind in NULLS and r.design == design]
+        those = [r for r in rows if r.kind in ("one", "small") and r.above and r.design == design]
+        alarms = sum(r.verdict in ("NAMED", "PART", "SET") for r in nulls)
+        if nulls or those:
+            found.append(
+                {"design": design, "n_null": len(nulls), "alarms": alarms, **_counts(those)}
+            )
     return pd.DataFrame(found)
 
 
@@ -74,6 +117,7 @@ def _counts(those: Sequence[Judged]) -> dict[str, Any]:
         "top1_high": top1["high"],
         "truth_in_set": sum(row.truth_in_set for row in those),
         "wrong_name": sum(row.wrong_name for row in those),
+        "part": sum(row.verdict == "PART" for row in those),
         "set": sum(row.verdict == "SET" for row in those),
         "null": sum(row.verdict == "NULL" for row in those),
         "unknown": sum(row.verdict == "UNKNOWN" for row in those),
@@ -87,12 +131,12 @@ def _counts(those: Sequence[Judged]) -> dict[str, Any]:
 
 def parameters(rows: Sequence[Judged]) -> pd.DataFrame:
     """Parameters of effects named right, by gap from 0.2 on."""
-    right = [row for row in rows if row.kind == "single" and row.top1 and row.at_least(0.2)]
+    bands = (">= 0.5", "0.2-0.5")
+    right = [r for r in rows if r.kind in ("one", "small") and r.top1 and r.band in bands]
     found: dict[tuple[str, str, str], list[Compared]] = {}
     for row in right:
         for one in compared(row.row):
-            gap = ">= 0.5" if row.at_least(0.5) else "0.2"
-            found.setdefault((one.effect, one.name, gap), []).append(one)
+            found.setdefault((one.effect, one.name, row.band), []).append(one)
     return pd.DataFrame(
         [
             {
@@ -122,6 +166,8 @@ def _line(row: Row, one: Judged | None) -> dict[str, Any]:
         "seed": target["seed"],
         "kind": target["kind"],
         "label": target["label"],
+        "formulas": "+".join(str(h["shape"].get("formula", "")) for h in recipe["hidden"]),
+        "formula": one.formula if one else "",
         "wanted_gap": target["gap"] if recipe["hidden"] else 0.0,
         "gap": row.get("truth", {}).get("gap"),
         "design": _design(recipe),
@@ -139,7 +185,7 @@ def _line(row: Row, one: Judged | None) -> dict[str, Any]:
         "gap_final": row.get("gap", {}).get("final"),
         "held_out_closed": held_out.get("closed"),
         "held_out_rms": held_out.get("rms"),
-        "cpu_seconds": row.get("seconds", {}).get("search_cpu"),
+        "cpu_seconds": sum(row.get("seconds", {}).values()),
         "message": row["message"] or _why_not(row, one),
     }
 
@@ -151,7 +197,7 @@ def _why_not(row: Row, one: Judged | None) -> str:
 
 
 def _design(recipe: dict[str, Any]) -> str:
-    words = [recipe["design"], recipe["noise"]]
+    words = [design_of(recipe), recipe["noise"]]
     words += [key for key in ("unloading", "translations", "zeroed") if recipe[key]]
     if recipe["preload_n"]:
         words.append(f"preload {recipe['preload_n']:g} N")

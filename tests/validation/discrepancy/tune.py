@@ -13,11 +13,12 @@ from multiprocessing import get_context
 
 from tests.validation.discrepancy.judged import Judged, judged
 from tests.validation.discrepancy.row import Row, scored
-from tests.validation.discrepancy.targets import DRAWN, TUNING, Target
+from tests.validation.discrepancy.seeds import TUNING
+from tests.validation.discrepancy.targets import DRAWN, Target
 
 HEADER = (
     f"{'seed':>5} {'kind':<9} {'hidden':<46} {'formula':<13} {'gap':>5} {'left':>5} "
-    f"{'verdict':<7} {'right':<5} {'seconds':>11}  names"
+    f"{'verdict':<7} {'right':<5} {'cpu seconds':>13}  names"
 )
 
 
@@ -29,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     answers: Counter[str] = Counter()
     started = time.monotonic()
     for target, row in _scored(wanted, asked.jobs):
-        one = judged(row) if row["status"] == "scored" else None
+        one = judged(row) if row["status"] in ("scored", "refused") else None
         answers[f"{target.kind}: {_right(one)}"] += 1
         print(_line(target, row, one, asked.why), flush=True)
     seconds = time.monotonic() - started
@@ -67,7 +68,8 @@ def _targets(kinds: Sequence[str], number: int, seed: int, effect: str | None) -
 
 def _line(target: Target, row: Row, one: Judged | None, why: bool) -> str:
     seconds = row.get("seconds", {})
-    spent = f"{seconds.get('make', 0.0):.1f}+{seconds.get('search', 0.0):.1f}"
+    parts = ("make", "search", "besides")
+    spent = "+".join(f"{seconds.get(part, 0.0):.1f}" for part in parts)
     said = row.get("verdict", row["status"])
     names = "+".join(row.get("named", [])) or row["message"]
     tied = f" | set: {', '.join(row['tied'])}" if row.get("tied") else ""
@@ -76,7 +78,7 @@ def _line(target: Target, row: Row, one: Judged | None, why: bool) -> str:
     left = row.get("gap", {}).get("final", 0.0) or 0.0
     return (
         f"{target.seed:>5} {target.kind:<9} {target.label[:46]:<46} {_formulas(row):<13} "
-        f"{gap:5.2f} {left:5.2f} {said:<7} {_right(one):<5} {spent:>11}  {names}{tied}{reason}"
+        f"{gap:5.2f} {left:5.2f} {said:<7} {_right(one):<5} {spent:>13}  {names}{tied}{reason}"
     )
 
 
@@ -92,6 +94,8 @@ def _right(one: Judged | None) -> str:
     if one.wrong_name:
         return "WRONG"
     right = one.top1 or (not one.truth and one.verdict == "NULL")
+    if one.kind in ("alien", "mistake"):
+        right = one.verdict in ("UNKNOWN", "REFUSED")
     return "yes" if right else "set" if one.truth_in_set else "no"
 
 
