@@ -16,7 +16,13 @@ from scipy.optimize import brentq
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.design.seen import Design, Seen, candidates
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, usual_shapes
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    Form,
+    Trials,
+    Variant,
+    shape_grid,
+    usual_shapes,
+)
 from spinepipe.studies.discrepancy.search.model_files import border
 from spinepipe.studies.discrepancy.search.screen import Group, Places, sides
 
@@ -261,7 +267,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
 def typical(design: Design, number: int, form: Form) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
-    middle = min(shape_grid(form.variant), key=lambda sds: sum(sd**2 for sd in sds))
+    middle = usual_shapes(form.variant)
     places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
     count = len(strengths)
     signs = sides(form, strengths)
