@@ -177,9 +177,9 @@ def sd_sentence(imported: Imported) -> str:
     words = []
     for sure, unit in ((imported.rotation, "deg"), (imported.translation, "mm")):
         if sure is None:
-            words.append(f"no motion in {unit} was read, {NOT_READ[unit]} stands for it.")
+            words.append(f"No motion in {unit} was read, {NOT_READ[unit]} stands for its SD.")
         elif sure.sd == 0.0:
-            words.append(f"readings in {unit} never change, {NOT_READ[unit]} stands for their SD.")
+            words.append(f"Readings in {unit} never change, {NOT_READ[unit]} stands for their SD.")
         else:
             between = (
                 "no cycle is repeated"
