@@ -374,7 +374,10 @@ def _row(one: Parameter, options: str) -> tuple[str, ...]:
     prior = f"{one.prior_scale:g}" + (" (of the logarithm)" if one.logarithmic else "")
     off = "" if one.off is None else f"{one.off:g}"
     name = f"{code(one.name)}, with {code(options)}" if options else code(one.name)
-    return name, one.unit, bounds, off, f"{one.default:.6g}", prior, one.meaning
+    default = f"{one.default:.6g}"
+    if one.unsaid is not None:
+        default += f" (in a file that does not name it {one.unsaid:g})"
+    return name, one.unit, bounds, off, default, prior, one.meaning
 
 
 def _number(value: float) -> str:
