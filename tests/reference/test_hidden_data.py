@@ -41,6 +41,7 @@ VOCABULARY = {
     *("bending_rotation_coupling", "facet_contact", "level_dependence", "local_laxity"),
     *("preload_stiffening", "joint_centre_offset", "joint_centre_migration", "segment_weight"),
     *("follower_load", "load_misalignment", "load_offset", "hysteresis", "creep", "marker_bias"),
+    *("soft_tissue_artefact", "neutral_pose_drift"),
 }
 SMALL = Recipe(seed=5, n_specimens=2)
 DAMPING = np.ones(6)

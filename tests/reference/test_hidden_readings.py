@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.generators.hidden import turns
 from tests.generators.hidden.contacts import OffDiagonals
-from tests.generators.hidden.foreign import OrderDrift, SoftTissue
+from tests.generators.hidden.foreign import OrderDrift
+from tests.generators.hidden.readouts import COURSES, PoseDrift, SoftTissue
 from tests.generators.hidden.scope import scope
 from tests.generators.hidden.world import Now, Place
 
@@ -72,3 +73,11 @@ def test_off_diagonals_push_the_other_rotation() -> None:
     q = np.array([[0, 0, 0, 0.1, 0.0, 0.0]])
     load = OffDiagonals(matrix)(q, np.zeros((1, 6)), np.zeros((2, 1, 6)), NOW)
     np.testing.assert_allclose(load, [[0, 0, 0, 0, 0.2, 0]])
+
+
+@pytest.mark.parametrize("formula", COURSES)
+def test_a_zero_that_moves_on_starts_at_zero_and_ends_at_its_drift(formula: str) -> None:
+    told = PoseDrift(scope("extension", 1, 2), 0.004, 0.4, formula)(np.zeros((3, 7, 2, 6)))
+    np.testing.assert_allclose(told[:, [0, -1], 1, 3], np.tile([0.0, 0.004], (3, 1)), atol=1e-15)
+    assert np.all(np.diff(told[0, :, 1, 3]) > 0.0)
+    assert not told[:, :, 0].any()

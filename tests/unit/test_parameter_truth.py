@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spinepipe.effects import create
+from spinepipe.effects.contract import Beside
 from tests.generators.hidden import CATALOGUE, Hidden, Recipe
 from tests.generators.hidden.anatomy import COORDINATES, JOINTS
 from tests.generators.hidden.scene import scene
@@ -145,6 +146,23 @@ def test_a_tilted_marker_frame_tells_the_same_motion() -> None:
     told = world(hidden).views[-1](POSES)
     assert np.abs(told - POSES).max() > 1e-3
     assert effect.observe(POSES, values).q == pytest.approx(told, abs=1e-12)
+
+
+def test_skin_and_a_moving_zero_read_alike() -> None:
+    q = np.stack([POSES, 0.5 * POSES, -POSES, 0.0 * POSES])[None]
+    skin = Hidden(
+        "soft_tissue_artefact", "extension", strength=0.4, shape={"formula": "root", "reach": 0.03}
+    )
+    drift = Hidden("neutral_pose_drift", "extension", strength=0.01, shape={"sign": 1, "pace": 0.4})
+    for hidden, options in ((skin, {"neighbour": "above"}), (drift, {})):
+        effect, values = mapped(hidden, options)
+        told = world(hidden).views[-1](q)[0]
+        for step, pose in enumerate(q[0]):
+            above = np.vstack([pose[1:], np.zeros((1, 6))])
+            beside = Beside(above, np.zeros((N, 6)), np.full(N, step / 3.0))
+            assert effect.observe_beside(pose, values, beside).q == pytest.approx(
+                told[step], abs=1e-12
+            )
 
 
 @pytest.mark.parametrize(

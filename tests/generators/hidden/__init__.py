@@ -5,7 +5,7 @@ Interface
 ``make(recipe, folder) -> Truth`` writes a cohort folder and truth.json in it (never read by
 studies). ``Recipe`` says what is wanted (plain values; ``recipe.as_dict()`` and ``recipe_from``
 go to and from JSON). ``draw_hidden(name, recipe, number=0, **given)`` draws coordinate, scope
-and shape of one effect by the recipe's seed; ``KNOWN`` are the 17 names of the vocabulary,
+and shape of one effect by the recipe's seed; ``KNOWN`` are the names of the vocabulary,
 ``UNKNOWN`` the effects outside it. Dirt: ``DIRT`` (names), ``USUAL`` (sizes). Mistakes in the
 files: ``ERRORS`` (names) and ``LOAD_UNIT``.
 

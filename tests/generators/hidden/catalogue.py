@@ -11,7 +11,7 @@ from .recipe import Hidden, Recipe
 
 CATALOGUE: dict[str, Entry] = {**known_laws.ENTRIES, **known_others.ENTRIES, **unknown.ENTRIES}
 KNOWN = tuple(name for name, entry in CATALOGUE.items() if entry.known)
-"""The vocabulary's 17."""
+"""The vocabulary."""
 UNKNOWN = tuple(name for name, entry in CATALOGUE.items() if not entry.known)
 
 ONE_JOINT_CHANCE = 0.2

@@ -80,20 +80,6 @@ class NeutralWalk:
 
 
 @dataclass(frozen=True)
-class SoftTissue:
-    """Skin moves with the joint above: reported += ``share * reach * tanh(q_above / reach)``."""
-
-    scope: Scope
-    reach: float
-    share: float
-
-    def __call__(self, q: np.ndarray) -> np.ndarray:
-        above = np.zeros_like(self.scope.of(q))
-        above[..., :-1] = self.scope.of(q)[..., 1:]
-        return q + self.scope.into(q, self.share * self.reach * np.tanh(above / self.reach))
-
-
-@dataclass(frozen=True)
 class OrderDrift:
     """Readings drift as tests go by, faster at high load: ``angle * number * load_share^2``.
 

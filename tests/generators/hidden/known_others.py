@@ -6,9 +6,19 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from . import pushes, turns
+from . import pushes, readouts, turns
 from .anatomy import COORDINATES
-from .entry import OTHER, SAME, Entry, formula, joints_of, reach, value
+from .entry import (
+    OTHER,
+    SAME,
+    Entry,
+    formula,
+    joints_of,
+    reach,
+    scope_of,
+    sign,
+    value,
+)
 from .recipe import Hidden, Recipe
 from .world import World
 
@@ -117,6 +127,25 @@ def _draw_marker(rng, recipe: Recipe, coordinate):
     return {**_draw_axis(rng, recipe, coordinate), "offset_m": [float(v) for v in offset]}
 
 
+def _soft_tissue(world: World, hidden: Hidden, strength: float) -> World:
+    far, named = value(hidden, "reach"), formula(hidden, "root")
+    return world.with_view(readouts.SoftTissue(scope_of(world, hidden), far, strength, named))
+
+
+def _draw_soft_tissue(rng, recipe: Recipe, coordinate):
+    return {"reach": float(rng.uniform(0.3, 0.6) * reach(coordinate, recipe))}
+
+
+def _pose_drift(world: World, hidden: Hidden, strength: float) -> World:
+    drift, pace = value(hidden, "sign") * strength, value(hidden, "pace")
+    named = formula(hidden, "settling")
+    return world.with_view(readouts.PoseDrift(scope_of(world, hidden), drift, pace, named))
+
+
+def _draw_pose_drift(rng, recipe: Recipe, coordinate):
+    return {"sign": sign(rng), "pace": float(np.exp(rng.uniform(*np.log((0.2, 1.0)))))}
+
+
 PLACE, LOAD, READING = "geometry", "load", "measurement"
 ENTRIES = {
     "joint_centre_offset": Entry(
@@ -181,5 +210,26 @@ ENTRIES = {
     ),
     "marker_bias": Entry(
         READING, "tilt", "rad", 0.03, 0.5, _marker_bias, _draw_marker, {"frame": SAME}, ()
+    ),
+    "soft_tissue_artefact": Entry(
+        READING,
+        "share",
+        "1",
+        0.1,
+        1.0,
+        _soft_tissue,
+        _draw_soft_tissue,
+        {"root": SAME, "tanh": OTHER},
+        joints="all",
+    ),
+    "neutral_pose_drift": Entry(
+        READING,
+        "drift",
+        "rad",
+        0.001,
+        0.05,
+        _pose_drift,
+        _draw_pose_drift,
+        {"settling": SAME, "square_root": OTHER, "slipping": OTHER},
     ),
 }

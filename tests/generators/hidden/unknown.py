@@ -55,15 +55,6 @@ def _draw_walk(rng, recipe: Recipe, coordinate):
     return {"steps": steps.tolist()}
 
 
-def _soft_tissue(world: World, hidden: Hidden, strength: float) -> World:
-    far = value(hidden, "reach")
-    return world.with_view(foreign.SoftTissue(scope_of(world, hidden), far, strength))
-
-
-def _draw_soft_tissue(rng, recipe: Recipe, coordinate):
-    return {"reach": float(rng.uniform(0.3, 0.6) * reach(coordinate, recipe))}
-
-
 def _drift(world: World, hidden: Hidden, strength: float) -> World:
     sizes = np.array(
         [np.linalg.norm(np.hstack([c.moments, c.forces]), axis=1) for c in world.tests]
@@ -98,18 +89,6 @@ ENTRIES = {
     ),
     "neutral_pose_walk": Entry(
         LAW, "step_sd", "rad", 0.002, 0.1, _walk, _draw_walk, ALIEN, joints="all", known=False
-    ),
-    "soft_tissue_artefact": Entry(
-        READING,
-        "share",
-        "1",
-        0.1,
-        1.0,
-        _soft_tissue,
-        _draw_soft_tissue,
-        ALIEN,
-        joints="all",
-        known=False,
     ),
     "test_order_drift": Entry(
         READING, "angle", "rad", 0.001, 0.1, _drift, _draw_sign, ALIEN, joints="all", known=False

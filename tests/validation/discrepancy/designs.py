@@ -24,6 +24,14 @@ OF_LAWS = (
 )
 """Effects that one joint shows by itself, in moments and in forces."""
 
+OF_NEIGHBOURS = (
+    "level_dependence",
+    "local_laxity",
+    "neighbour_coupling",
+    "soft_tissue_artefact",
+)
+"""With one joint alone these leave no trace."""
+
 TOLD_BY_TRANSLATIONS = ("joint_centre_offset", "joint_centre_migration", "follower_load")
 """With pure moments and rotations alone these leave little or no trace."""
 
@@ -139,7 +147,7 @@ def plain(seed: int, *names: str, **given: Any) -> Recipe:
         fields |= {"unloading": True, "steps": 3}
     if "preload_stiffening" in names:
         fields |= {"preload_n": PRELOAD_N, "joints": 3, "lowest": min(fields["lowest"], 3)}
-    if set(names) & {"level_dependence", "local_laxity", "neighbour_coupling"}:
+    if set(names) & set(OF_NEIGHBOURS):
         joints = max(fields["joints"], 3)
         fields |= {"joints": joints, "lowest": min(fields["lowest"], 6 - joints)}
     found = fields | given

@@ -5,7 +5,7 @@ from typing import Any
 
 from tests.generators.hidden import CATALOGUE, KNOWN, is_other, recipe_from
 from tests.generators.hidden.anatomy import joints_of_recipe
-from tests.validation.discrepancy.designs import design_of
+from tests.validation.discrepancy.designs import OF_NEIGHBOURS, design_of
 from tests.validation.discrepancy.row import Row
 
 LARGE, SMALL = 0.5, 0.2
@@ -160,6 +160,6 @@ def by_algebra(name: str, recipe: dict[str, Any]) -> bool:
         return bool(recipe["translations"] or recipe["preload_n"])
     if name == "preload_stiffening":
         return bool(recipe["preload_n"])
-    if name in ("level_dependence", "local_laxity"):
+    if name in OF_NEIGHBOURS:
         return bool(recipe["joints"] > 1)
     return True

@@ -162,6 +162,19 @@ def tilts(hidden: Hidden, test: str) -> Values:
     return {"tilt_1": float(np.arctan2(-second, along)), "tilt_2": float(np.arcsin(first))}
 
 
+def _skin(hidden: Hidden, options: Options) -> Values | None:
+    if options["neighbour"] != "above" or formula(hidden, "root") != "root":
+        return None
+    return {"share": hidden["strength"], "reach": hidden["shape"]["reach"]}
+
+
+def _pose_drift(hidden: Hidden, options: Options) -> Values | None:
+    if formula(hidden, "settling") != "settling":
+        return None
+    drift = hidden["shape"]["sign"] * hidden["strength"]
+    return {"drift": drift, "pace": hidden["shape"]["pace"]}
+
+
 TRUTHS: dict[str, Callable[[Hidden, Options], Values | None]] = {
     "nonlinear_stiffening": _stiffening,
     "neutral_zone": _neutral_zone,
@@ -178,6 +191,8 @@ TRUTHS: dict[str, Callable[[Hidden, Options], Values | None]] = {
     "follower_load": _follower,
     "load_offset": _offset,
     "marker_bias": _marker,
+    "soft_tissue_artefact": _skin,
+    "neutral_pose_drift": _pose_drift,
 }
 """All but level_dependence and load_misalignment, whose values differ by joint and by test."""
 
