@@ -231,14 +231,20 @@ class Inquiry:
     def beside(self, current: Grounds, others: tuple[Supposed, ...]) -> Grounds | None:
         """Grounds with these of the current effects alone; None where they have no fit.
 
-        Looked for near where all stand, then from the neutral pose, then with weaker effects.
+        Looked for near where all stand, then from the neutral pose, then from the base as it stands
+        alone, which is stiffer where what was taken away has stiffened it.
         """
         if not others:
             return self.base
-        setting = self.base.setting
-        for share, near in ((1.0, current.fit.poses), *((share, None) for share in STARTS)):
-            start = current.suppose(tuple(weaker(one, share) for one in others))
-            fit: JointFit = self.run(joint_fit, start, setting, near)
+        near = current.fit.poses
+        starts = (
+            (current, 1.0, near),
+            (current, 1.0, None),
+            *((self.base, share, None) for share in STARTS),
+        )
+        for grounds, share, poses in starts:
+            start = grounds.suppose(tuple(weaker(one, share) for one in others))
+            fit: JointFit = self.run(joint_fit, start, self.base.setting, poses)
             if fit.usable:
                 return self.base.at(fit)
         return None
