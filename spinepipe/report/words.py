@@ -36,6 +36,15 @@ def unit(coordinate: str) -> str:
     return "mm" if coordinate in TRANSLATIONS else "°"
 
 
+SIGNS = {"deg": "°", "mm": "mm"}
+"""Units of motion as printed."""
+
+
+def after_number(unit: str) -> str:
+    """A unit of motion as it stands behind a number."""
+    return SIGNS[unit] if unit == "deg" else f"\u00a0{SIGNS[unit]}"
+
+
 def stiffness_unit(coordinate: str) -> str:
     """Unit of a stiffness as printed."""
     return "N/m" if coordinate in TRANSLATIONS else "N m/rad"

@@ -248,5 +248,9 @@ def _mae(size: Size) -> Iterator[Row]:
     for name, test in product(size.representations, size.tests):
         row = {"representation": name, "fitted_to": size.label, "source": "own", "stage": "fitted"}
         row |= {"test": test, "coordinate": DRIVES.get(test, "extension"), "steps": "peak"}
-        row |= {"specimens": len(size.specimens) if size.solved else 0, "largest_motion_deg": 8.0}
-        yield row | ({"mae_deg": 2.0, "mae_percent": 25.0} if size.solved else {})
+        row |= {
+            "specimens": len(size.specimens) if size.solved else 0,
+            "largest_motion": 8.0,
+            "unit": "deg",
+        }
+        yield row | ({"mae": 2.0, "mae_percent": 25.0} if size.solved else {})

@@ -87,8 +87,9 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
     """Ratios of levels need a value for each level, and a value needs its level."""
     given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
     yield from unknown_levels(document, given, cohort.joint_names)
+    asked = {"representations", "level_stiffness"} & study.model_fields_set
     chosen = [name for name in study.representations if named(name).by_level]
-    if not chosen:
+    if not chosen or not asked:  # what nobody asked for is left out where it cannot be
         return
     missing = [joint for joint in cohort.joint_names if joint not in study.level_stiffness]
     if missing:
@@ -97,6 +98,10 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
         allowed = f"a value for every joint of the cohort, as {names} {verb} among representations"
         remedy = f"add them, or leave {names} out of representations"
         yield Problem(*at(document, "level_stiffness"), found, allowed, remedy)
+    elif "representations" in asked and not set(study.free) & set(ROTATIONS):
+        allowed = f"{one_of(ROTATIONS)} among them, as published levels differ in rotations alone"
+        remedy = f"free a rotation, or leave {' and '.join(chosen)} out of representations"
+        yield Problem(*at(document, "free"), ", ".join(study.free), allowed, remedy)
 
 
 def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:

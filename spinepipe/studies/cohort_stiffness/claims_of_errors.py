@@ -4,7 +4,7 @@ The errors that are compared stand first, then the claims, then how they are dec
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,18 +17,20 @@ from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     LITERATURE,
+    MOTIONS,
+    compared_motion,
     measured_specimens,
     of_joint_fits,
     of_single_cases,
-    rotations,
     specimen_rms,
+    unit_of,
     without_result,
 )
 from spinepipe.tables.shared import joined
 
 QUANTITY = (
-    "error with {} less that with {}: root mean square of all measured rotations, mean over "
-    "specimens, t interval"
+    "error with {} less that with {}: root mean square of all measured {}, mean over specimens, "
+    "t interval"
 )
 
 
@@ -63,11 +65,10 @@ class Comparison:
     smaller: Errors
     own_readings: bool = False
 
-    @property
-    def claim(self) -> Claim:
-        """The claim in words."""
-        quantity = QUANTITY.format(self.larger.words, self.smaller.words)
-        return Claim(self.finding, self.statement, quantity, "deg")
+    def claim(self, unit: str = "deg") -> Claim:
+        """The claim in words, about errors in that unit."""
+        quantity = QUANTITY.format(self.larger.words, self.smaller.words, MOTIONS[unit])
+        return Claim(self.finding, self.statement, quantity, unit)
 
 
 PUBLISHED = Errors("published stiffness", "literature", LITERATURE)
@@ -182,7 +183,7 @@ LOADED = Claim(
     "error_is_largest_in_loaded_direction",
     "With one stiffness per specimen the error is larger in the direction of the load than in the "
     "others.",
-    "error in the loaded coordinate less that of the other rotations: root mean square, mean over "
+    "error in the loaded coordinate less that of the other {}: root mean square, mean over "
     "specimens, t interval",
     "deg",
 )
@@ -193,7 +194,7 @@ ERROR_CLAIMS = {"per_specimen": "", "level_ratio": "level_ratio_"}
 
 def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
     """Rows of the table ``findings`` that follow from those of ``errors``."""
-    seen = rotations(errors)
+    seen = compared_motion(errors)
     for comparison in COMPARISONS:
         yield compared(comparison, seen, significance)
     yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)
@@ -204,15 +205,16 @@ def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
 def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) -> Row:
     """The row of a comparison; specimens that a side cannot predict are named."""
     larger, smaller = (_of(errors, one) for one in (comparison.larger, comparison.smaller))
+    claim, unit = comparison.claim(unit_of(errors)), unit_of(errors)
     results = _results(larger, smaller, errors)
     pair = pd.DataFrame(results).dropna()
     if pair.empty:
-        return comparison.claim.unknown(_missing(larger, smaller))
+        return claim.unknown(_missing(larger, smaller))
     asked = _asked(comparison, errors)
     sides = (comparison.larger.words, comparison.smaller.words)
     lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
-    note = joined(_note(pair), OWN_READINGS if comparison.own_readings else "", lost)
-    return _against(comparison.claim, results, asked, significance, note)
+    note = joined(_note(pair, unit), OWN_READINGS if comparison.own_readings else "", lost)
+    return _against(claim, results, asked, significance, note)
 
 
 def every_level(
@@ -240,13 +242,15 @@ def every_level(
 
 def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:
     """Error in the loaded direction against that in the others."""
+    unit = unit_of(errors)
+    claim = replace(LOADED, quantity=LOADED.quantity.format(MOTIONS[unit]), unit=unit)
     pair, read = {}, []
     for name, loaded in (("loaded", True), ("others", False)):
         here = errors[errors["loaded"] == loaded]
         pair[name] = specimen_rms(fitted[fitted["loaded"] == loaded], here)
         read.append(set(measured_specimens(here)))
     difference = (pair["loaded"] - pair["others"]).dropna()
-    return above_zero(LOADED, difference, significance, _lost(pair, set.intersection(*read)))
+    return above_zero(claim, difference, significance, _lost(pair, set.intersection(*read)))
 
 
 def _of(errors: pd.DataFrame, wanted: Errors) -> pd.DataFrame:
@@ -300,10 +304,10 @@ def _missing(larger: pd.DataFrame, smaller: pd.DataFrame) -> str:
     return "no specimen has all results of both"
 
 
-def _note(pair: pd.DataFrame) -> str:
+def _note(pair: pd.DataFrame, unit: str) -> str:
     larger, smaller = pair["larger"], pair["smaller"]
     tested = wilcoxon_signed_rank(larger.to_numpy(float), smaller.to_numpy(float))
-    means = f"{larger.mean():.3g} less {smaller.mean():.3g} deg"
+    means = f"{larger.mean():.3g} less {smaller.mean():.3g} {unit}"
     return joined(means, "" if tested.p is None else f"Wilcoxon p {tested.p:.2g}")
 
 

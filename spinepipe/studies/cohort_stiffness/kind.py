@@ -15,6 +15,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     NOBODY,
     CohortStiffness,
     load_sets,
+    representations_of,
     tests_of,
 )
 from spinepipe.studies.cohort_stiffness.tables import TABLES
@@ -54,6 +55,7 @@ class CohortLayout(StudyFiles):
     Attributes
     ----------
     tests : load cases of the study. rebuilt : whether the cohort stands for that of a paper.
+    representations : those of the study that the cohort has published values for.
     """
 
     joined = OF_JOBS
@@ -87,17 +89,19 @@ class CohortLayout(StudyFiles):
     study: CohortStiffness
     tests: tuple[str, ...]
     rebuilt: bool
+    representations: tuple[str, ...]
 
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
         rebuilt = GOULD_2024B.stands_for(cohort.name)
-        return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt)
+        described = representations_of(study, cohort.joint_names)
+        return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt, described)
 
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
-        pooled = ("pooling",) if POOLED in self.study.representations else ()
+        pooled = ("pooling",) if POOLED in self.representations else ()
         analysed = (
             job.name for job in _ANALYSES if self.rebuilt or not job.name.startswith("against")
         )
@@ -122,7 +126,7 @@ class CohortLayout(StudyFiles):
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
-        whole = table != "sign_checks" and POOLED in self.study.representations
+        whole = table != "sign_checks" and POOLED in self.representations
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
@@ -148,7 +152,7 @@ class CohortLayout(StudyFiles):
     @property
     def _single(self) -> tuple[str, ...]:
         """Representations fitted specimen by specimen."""
-        return tuple(name for name in self.study.representations if name != POOLED)
+        return tuple(name for name in self.representations if name != POOLED)
 
     def _fits(self) -> list[str]:
         return [

@@ -16,7 +16,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.representations import PUBLISHED, named
-from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
+from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness, has_levels
 from spinepipe.studies.cohort_stiffness.sign_checks import sign_rows
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, SIGN_CHECKS, STIFFNESS
 from spinepipe.tables import from_rows, write
@@ -52,5 +52,5 @@ def run(
 
 def published_sets(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
     """The published sets that this cohort has values for."""
-    every_level = set(cohort.joint_names) <= set(study.level_stiffness)
-    return tuple(name for name in PUBLISHED if every_level or not named(name).by_level)
+    levels = has_levels(study, cohort.joint_names)
+    return tuple(name for name in PUBLISHED if levels or not named(name).by_level)

@@ -10,6 +10,7 @@ from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import largest_mean_motion
 from spinepipe.studies.cohort_stiffness.tables import MAE
 from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.units import COORDINATE_UNITS
 
 STEPS = {"peak": ("peak_error", "measured_peak"), "all": ("mae", "measured")}
 """Columns of the error and of the motion, at the largest load and over all load steps."""
@@ -37,7 +38,8 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
         for steps, (error, motion) in STEPS.items():
             found = specimen_mae(part, error, motion)
             largest = largest_mean_motion(here, motion)
-            rows.append({**named, "steps": steps, **_spread(found, largest)})
+            unit = COORDINATE_UNITS[named["coordinate"]]
+            rows.append({**named, "unit": unit, "steps": steps, **_spread(found, largest)})
     return rows
 
 
@@ -50,10 +52,10 @@ def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:
 
 
 def _spread(values: pd.Series, largest: float | None) -> dict[str, Any]:
-    empty = dict.fromkeys(("mae_deg", "low_quartile_deg", "high_quartile_deg", "mae_percent"))
-    row: dict[str, Any] = {"specimens": len(values), "largest_motion_deg": largest, **empty}
+    empty = dict.fromkeys(("mae", "low_quartile", "high_quartile", "mae_percent"))
+    row: dict[str, Any] = {"specimens": len(values), "largest_motion": largest, **empty}
     if values.empty:
         return row
     low, median, high = values.quantile([0.25, 0.5, 0.75])
-    row |= {"mae_deg": median, "low_quartile_deg": low, "high_quartile_deg": high}
+    row |= {"mae": median, "low_quartile": low, "high_quartile": high}
     return row | {"mae_percent": 100.0 * median / largest if largest else None}

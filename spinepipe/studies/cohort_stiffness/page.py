@@ -1,5 +1,6 @@
 """The report of a cohort study: its tables, and what is said of parts that it leaves out."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pandas as pd
@@ -7,7 +8,13 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
 from spinepipe.studies.cohort_stiffness.page_findings import findings
-from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, NOBODY, CohortStiffness
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
+from spinepipe.studies.cohort_stiffness.settings import (
+    ALL_BUT,
+    NOBODY,
+    CohortStiffness,
+    representations_of,
+)
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 from spinepipe.tables.shared import against_as_shown
@@ -43,6 +50,10 @@ _COLUMNS = {
 
 _SHAPES = {table.name: table for table in TABLES}
 
+NO_LEVELS = (
+    "no stiffness of single levels is published for these joints and the coordinates that are free"
+)
+
 HELD_OUT_ERROR = "held_out_error"
 """The figure of errors of held-out motion."""
 
@@ -61,7 +72,7 @@ def document(study: CohortStiffness, cohort: Cohort, results: Results) -> Docume
         pictures=[_with_base(study, picture) for picture in results.pictures.values()],
         tables=shown_tables(results),
         metadata=results.metadata,
-        left_out=left_out(study, len(cohort.specimen_names)),
+        left_out=left_out(study, len(cohort.specimen_names), cohort.joint_names),
         poses=results.table("poses"),
     )
 
@@ -74,9 +85,11 @@ def _with_base(study: CohortStiffness, picture: Picture) -> Picture:
     return replace(picture, caption=told)
 
 
-def left_out(study: CohortStiffness, specimens: int) -> tuple[str, ...]:
+def left_out(study: CohortStiffness, specimens: int, joints: Sequence[str] = ()) -> tuple[str, ...]:
     """Parts that the settings or the cohort leave out, each with the reason."""
     held = study.cross_validation
+    kept = representations_of(study, joints)
+    lost = [IN_WORDS[name] for name in study.representations if name not in kept]
     parts = (
         ("prediction of left-out specimens", "cross_validation: specimens: false", held.specimens),
         (
@@ -89,6 +102,7 @@ def left_out(study: CohortStiffness, specimens: int) -> tuple[str, ...]:
             "cross_validation: load_cases: false",
             held.load_cases,
         ),
+        (" and ".join(lost), NO_LEVELS, not lost),
     )
     return tuple(f"{part} ({why})" for part, why, done in parts if not done)
 

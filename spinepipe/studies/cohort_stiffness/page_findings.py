@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.page.document import Results, judged
-from spinepipe.report.words import AXIS, case, count, number, percent
+from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, PUBLISHED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
@@ -174,7 +174,8 @@ def _place(row: dict[Any, Any], significance: float) -> str:
         if pd.isna(row["p"]) or row["p"] < significance
         else (f" (not told apart from the first, p {number(row['p'], 2)})")
     )
-    return f"{IN_WORDS[row['representation']]} {number(row['value'])}{spread}°{same}"
+    error_of = f"{number(row['value'])}{spread}{after_number(row['unit'])}"
+    return f"{IN_WORDS[row['representation']]} {error_of}{same}"
 
 
 def _best(part: pd.DataFrame) -> str:
@@ -223,11 +224,12 @@ def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
         (rows["steps"] == "peak")
         & rows["stage"].isin(["literature", "fitted"])
         & rows["fitted_to"].isin(labels)
-        & rows["mae_deg"].notna()
+        & rows["mae"].notna()
     ]
     for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
         told = [
-            f"{IN_WORDS[row['representation']]} {number(row['mae_deg'], 2)}°{_share(row)}"
+            f"{IN_WORDS[row['representation']]} {number(row['mae'], 2)}"
+            f"{after_number(row['unit'])}{_share(row)}"
             for row in part.to_dict("records")
         ]
         yield (

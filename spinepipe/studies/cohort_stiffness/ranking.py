@@ -19,6 +19,7 @@ from spinepipe.studies.cohort_stiffness.stages import (
     joint_label_of,
     of_joint_fits,
     specimen_rms,
+    unit_of,
     without_result,
 )
 from spinepipe.studies.cohort_stiffness.tables import CRITERIA, RANKING
@@ -60,7 +61,8 @@ def ranking_rows(
             order = ranked(found, True, specimens, _penalty(fits, criterion, count))
             order = [_conditional(row, count) for row in order]
         else:
-            order = ranked(_errors(errors, criterion, names), False, specimens)
+            found = _errors(errors, criterion, names)
+            order = ranked(found, False, specimens, unit=unit_of(errors))
         rows += [{"criterion": criterion, **row} for row in order]
     return rows
 
@@ -126,6 +128,7 @@ def ranked(
     summed: bool,
     specimens: Iterable[str] = (),
     once: Mapping[Candidate, float] = MappingProxyType({}),
+    unit: str = "deg",
 ) -> list[Row]:
     """Candidates in order, over the specimens that have a value of all of them.
 
@@ -135,13 +138,15 @@ def ranked(
     summed : whether the criterion is the sum over specimens, else their mean.
     specimens : all there are; those without any value are told of too.
     once : what counts once in a sum, not once per specimen; shared out evenly over them.
+    unit : of the values; sums have none.
     """
+    unit = "" if summed else unit
     compared = [candidate for candidate, values in found.items() if len(values)]
     table = pd.DataFrame({candidate: found[candidate] for candidate in compared})
     complete = table.dropna()
-    none = [_row(one, summed, NO_RESULT) for one in found if one not in compared]
+    none = [_row(one, unit, NO_RESULT) for one in found if one not in compared]
     if complete.empty:
-        return [_row(one, summed, NONE_COMPLETE) for one in compared] + none
+        return [_row(one, unit, NONE_COMPLETE) for one in compared] + none
     by_name = {candidate[0]: found[candidate] for candidate in compared}
     lost = without_result(by_name, {*table.index, *specimens})
     told = f"left out, without a result: {lost}" if lost else ""
@@ -151,7 +156,7 @@ def ranked(
     rows = []
     for one in sorted(compared, key=lambda one: values[one].mean()):
         ahead = sum(bool(other.mean() < values[one].mean()) for other in values.values())
-        row = _row(one, summed, told)
+        row = _row(one, unit, told)
         row |= {"rank": 1 + ahead, "specimens": len(complete)}
         row |= dict(zip(("value", "standard_error"), _total(values[one], summed), strict=True))
         rows.append(row if one == best else row | _against(values[one], values[best], summed, row))
@@ -159,13 +164,13 @@ def ranked(
     return rows + none
 
 
-def _row(candidate: Candidate, summed: bool, message: str) -> Row:
+def _row(candidate: Candidate, unit: str, message: str) -> Row:
     """One row, without its numbers yet."""
     empty = ("rank", "value", "standard_error", "worse_than_best", "worse_standard_error", "p")
     return {
         "representation": candidate[0],
         "source": candidate[1],
-        "unit": "" if summed else "deg",
+        "unit": unit,
         "specimens": 0,
         "message": message,
         **dict.fromkeys(empty),

@@ -9,7 +9,7 @@ from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.studies.base_model import Base
-from spinepipe.studies.cohort_stiffness.representations import FITTED
+from spinepipe.studies.cohort_stiffness.representations import FITTED, named
 from spinepipe.studies.parts import (
     FORM,
     Coordinates,
@@ -19,7 +19,7 @@ from spinepipe.studies.parts import (
     Tests,
 )
 from spinepipe.studies.study import Study
-from spinepipe.units import COORDINATE_COLUMNS
+from spinepipe.units import COORDINATE_COLUMNS, ROTATIONS
 
 _PAPER = published("gould_2024b")
 
@@ -70,7 +70,8 @@ class CohortStiffness(Study):
     )
     representations: EachOnce[Fitted] = Field(
         default=FITTED,
-        description="how stiffness is described; what the literature says is always shown beside",
+        description="how stiffness is described; what the literature says is always shown beside. "
+        "Ratios of levels are left out, unless asked for here, where none are published",
     )
     free: Coordinates = Field(
         default=("extension", "right_bending", "left_rotation"),
@@ -112,6 +113,17 @@ class CohortStiffness(Study):
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"
     )
+
+
+def representations_of(study: CohortStiffness, joints: Sequence[str]) -> tuple[str, ...]:
+    """Those of the study, without ratios of levels where none are published for these joints."""
+    levels = has_levels(study, joints)
+    return tuple(name for name in study.representations if levels or not named(name).by_level)
+
+
+def has_levels(study: CohortStiffness, joints: Sequence[str]) -> bool:
+    """Whether each joint has a published value of its own against a coordinate that is fitted."""
+    return set(joints) <= set(study.level_stiffness) and bool(set(study.free) & set(ROTATIONS))
 
 
 ALL, ALL_BUT, NOTHING = "all", "all_but_", "nothing"

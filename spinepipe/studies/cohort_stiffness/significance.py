@@ -35,12 +35,13 @@ from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_SPECIMEN,
     LITERATURE,
     SHARED_ERROR,
+    compared_motion,
     of_single_cases,
-    rotations,
+    unit_of,
 )
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.tables.shared import STATISTICS, joined
-from spinepipe.units import ROTATIONS
+from spinepipe.units import COORDINATES
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)
 GROUPS = {"specimens": "specimen", "levels": "joint"}
@@ -64,7 +65,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 
 def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
     """Every test of the tables ``errors`` and ``fits``, family by family."""
-    seen = rotations(errors)
+    seen = compared_motion(errors)
     yield from between_groups(seen)
     yield from signed_ranks(seen)
     yield from against_level_ratio(seen)
@@ -87,8 +88,13 @@ def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
 
 
 def responses(rows: pd.DataFrame) -> tuple[tuple[str, pd.DataFrame], ...]:
-    """The loaded coordinate alone, and all rotations."""
-    return ("loaded_error", rows[rows["loaded"].astype(bool)]), ("rotation_error", rows)
+    """The loaded coordinate alone, and all motion that is compared."""
+    return ("loaded_error", rows[rows["loaded"].astype(bool)]), (response_of(rows), rows)
+
+
+def response_of(rows: pd.DataFrame) -> str:
+    """What errors of all motion that is compared are called."""
+    return "rotation_error" if unit_of(rows) == "deg" else "translation_error"
 
 
 def _both(rows: pd.DataFrame, factor: str) -> Iterator[Outcome]:
@@ -118,7 +124,7 @@ def _noted(outcome: Outcome, note: str, when: bool = True) -> Outcome:
 def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
     """Wilcoxon tests within each specimen: published against fitted, fitted against predicted.
 
-    Pairs are the absolute errors at the largest load of all rotations of all joints; fits to
+    Pairs are the absolute errors at the largest load of all motion of all joints; fits to
     single load cases.
     """
     published, fitted, held_out = (
@@ -145,13 +151,14 @@ def _each_specimen(name: str, first: pd.DataFrame, second: pd.DataFrame) -> Iter
         known = rows.dropna().filter(like="peak_error").abs().to_numpy(float)
         outcome = wilcoxon_signed_rank(known[:, 0], known[:, 1])
         family = f"{name}/{test}"
-        yield Tested(family, "*", "rotation_error", "stage", str(test), outcome, str(specimen))
+        response = response_of(first)
+        yield Tested(family, "*", response, "stage", str(test), outcome, str(specimen))
 
 
 def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
     """One stiffness for all joints against the published ratio of levels, over specimens.
 
-    The errors are root mean squares over joints at the largest load, per rotation and overall;
+    The errors are root mean squares over joints at the largest load, per coordinate and overall;
     fits to single load cases.
     """
     fitted = of_single_cases(errors, FITTED)
@@ -173,12 +180,12 @@ def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
 
 
 def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
-    """Root mean square over joints by specimen, for each rotation and overall.
+    """Root mean square over joints by specimen, for each coordinate and overall.
 
     A specimen with an unknown error has none.
     """
     found = {}
-    chosen = {name: rows[rows["coordinate"] == name] for name in ROTATIONS}
+    chosen = {name: rows[rows["coordinate"] == name] for name in COORDINATES}
     for name, part in (*chosen.items(), ("overall", rows)):
         measured = part[part["measured_peak"].notna()]
         squares = (measured["peak_error"].astype(float) ** 2).groupby(measured["specimen"])

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.studies.cohort_stiffness.settings import joint_label, label_of_others
-from spinepipe.units import ROTATIONS
+from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 SHARED_ERROR = (
     "readings zeroed at step 0 share its error, which the published cost takes no account of"
@@ -54,13 +54,30 @@ def _to_all_others(errors: pd.DataFrame) -> pd.Series:
 READING = ["test", "joint", "coordinate"]
 
 
-def rotations(errors: pd.DataFrame) -> pd.DataFrame:
-    """The rows of rotations."""
-    return errors[errors["coordinate"].isin(ROTATIONS)]
+KINDS = {"deg": ROTATIONS, "mm": TRANSLATIONS}
+"""Coordinates by the unit of their errors: those of one unit are compared."""
+
+MOTIONS = {"deg": "rotations", "mm": "translations"}
+"""What they are called."""
+
+
+def unit_of(errors: pd.DataFrame) -> str:
+    """The unit that errors are compared in: deg where a load drives a rotation, else mm.
+
+    Where no load drives anything that was read: deg where rotations were.
+    """
+    loaded = errors[errors["loaded"].astype(bool)]
+    told = loaded if len(loaded) else errors
+    return "deg" if told["coordinate"].isin(ROTATIONS).any() or not len(told) else "mm"
+
+
+def compared_motion(errors: pd.DataFrame, unit: str | None = None) -> pd.DataFrame:
+    """The rows of motion that is compared, in a unit, or in that of these errors."""
+    return errors[errors["coordinate"].isin(KINDS[unit or unit_of(errors)])]
 
 
 def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
-    """Root mean square error in deg by specimen, weighted by readings.
+    """Root mean square error by specimen, in the unit of the errors, weighted by readings.
 
     Only of specimens with an error for all that was measured of them: others would be compared
     over other readings.
@@ -69,8 +86,10 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     ----------
     chosen : errors of one stiffness per specimen. errors : all, for what was measured.
     """
-    measured = rotations(errors).drop_duplicates(["specimen", *READING])["specimen"].value_counts()
-    known = rotations(chosen).dropna(subset="rmse")
+    unit = unit_of(errors)
+    seen = compared_motion(errors, unit).drop_duplicates(["specimen", *READING])
+    measured = seen["specimen"].value_counts()
+    known = compared_motion(chosen, unit).dropna(subset="rmse")
     known = known[known["readings"] > 0]
     squares = (known["rmse"].astype(float) ** 2 * known["readings"]).groupby(known["specimen"])
     by_specimen = known.groupby("specimen")["readings"]
@@ -79,8 +98,8 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
 
 
 def measured_specimens(errors: pd.DataFrame) -> list[str]:
-    """Specimens with a measured rotation."""
-    return [str(name) for name in rotations(errors)["specimen"].unique()]
+    """Specimens of which the motion that is compared was measured."""
+    return [str(name) for name in compared_motion(errors)["specimen"].unique()]
 
 
 def without_result(found: Mapping[str, pd.Series], specimens: Iterable[str]) -> str:

@@ -159,7 +159,12 @@ ERRORS = Table(
         TEST,
         JOINT,
         COORDINATE,
-        Column("loaded", "flag", "whether the test's main moment drives this coordinate"),
+        Column(
+            "loaded",
+            "flag",
+            "whether the test's main moment drives this coordinate; its main "
+            "force where that of the moment is not read",
+        ),
         _MOTION_UNIT,
         Column("readings", "integer", "readings compared", low=0),
         _motion("bias", "mean error", low=None),
@@ -271,30 +276,14 @@ MAE = Table(
             allowed=("peak", "all"),
         ),
         Column("specimens", "integer", "specimens with a result", low=0),
-        Column("mae_deg", "number", "median over specimens", "deg", null=NO_POSE, low=0.0),
-        Column(
-            "low_quartile_deg",
-            "number",
-            "lower quartile over specimens",
-            "deg",
-            null=NO_POSE,
-            low=0.0,
-        ),
-        Column(
-            "high_quartile_deg",
-            "number",
-            "upper quartile over specimens",
-            "deg",
-            null=NO_POSE,
-            low=0.0,
-        ),
-        Column(
-            "largest_motion_deg",
-            "number",
+        _MOTION_UNIT,
+        _motion("mae", "median over specimens"),
+        _motion("low_quartile", "lower quartile over specimens"),
+        _motion("high_quartile", "upper quartile over specimens"),
+        _motion(
+            "largest_motion",
             "largest over specimens of the mean measured motion over joints",
-            "deg",
             null="not measured",
-            low=0.0,
         ),
         Column(
             "mae_percent",
@@ -320,7 +309,8 @@ RANKING = Table(
             "criterion",
             "text",
             "fitted, left_out_specimen, left_out_case: root mean square error of all measured "
-            "rotations of a specimen, mean over specimens; left_out_case: each load case by the "
+            "rotations of a specimen (of its translations where forces drive these and no load "
+            "drives a rotation), mean over specimens; left_out_case: each load case by the "
             "fit to all others, else fits to all load cases; aicc, bic: sums over specimens, "
             "fits to all load cases, the spreads of a pooled fit counted once",
             allowed=CRITERIA,
@@ -329,7 +319,10 @@ RANKING = Table(
         SOURCE,
         Column("rank", "integer", "1 is best", null="no result", low=1),
         Column(
-            "unit", "text", "unit of the values; none for information criteria", allowed=("deg", "")
+            "unit",
+            "text",
+            "unit of the values; none for information criteria",
+            allowed=("deg", "mm", ""),
         ),
         Column("value", "number", "the criterion", null="no result"),
         Column(

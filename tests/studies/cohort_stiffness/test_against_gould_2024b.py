@@ -134,9 +134,9 @@ def mae() -> pd.DataFrame:
             "stage": stage,
             "test": test,
             "steps": steps,
-            "mae_deg": value,
-            "low_quartile_deg": 0.75 * value,
-            "high_quartile_deg": 1.5 * value,
+            "mae": value,
+            "low_quartile": 0.75 * value,
+            "high_quartile": 1.5 * value,
             "mae_percent": 10.0 * value,
         }
         for test in TESTS
@@ -481,7 +481,7 @@ def test_tests_without_a_result_are_no_result() -> None:
     [
         ("stiffness", "stiffness", "table_3.flexion.extension.median"),
         ("errors", "peak_error", "mean_motion.flexion"),
-        ("mae", "mae_deg", "mae.per_specimen.flexion.fitted.median"),
+        ("mae", "mae", "mae.per_specimen.flexion.fitted.median"),
     ],
 )
 def test_empty_cells_are_no_result(table: str, column: str, name: str) -> None:

@@ -181,5 +181,5 @@ def test_a_test_that_drives_two_coordinates_has_two_rows_of_errors() -> None:
     ]
     found = from_rows(MAE, mae_rows(pd.DataFrame(rows))).to_pandas()
     peak = found[found["steps"] == "peak"].set_index("coordinate")
-    assert peak["mae_deg"].to_dict() == {"extension": 2.0, "right_bending": 3.0}
-    assert peak["largest_motion_deg"].to_dict() == {"extension": 10.0, "right_bending": 20.0}
+    assert peak["mae"].to_dict() == {"extension": 2.0, "right_bending": 3.0}
+    assert peak["largest_motion"].to_dict() == {"extension": 10.0, "right_bending": 20.0}

@@ -15,7 +15,7 @@ from matplotlib.text import Text
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.report.words import short
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
-from spinepipe.studies.cohort_stiffness.figures.held_out_error import rotation_errors
+from spinepipe.studies.cohort_stiffness.figures.held_out_error import motion_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
 from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
 from spinepipe.tables import Tables
@@ -225,7 +225,7 @@ def error_rows(*rows: tuple[str, str, str, int, float | None]) -> pd.DataFrame:
 
 
 def test_error_of_a_specimen_by_hand() -> None:
-    found = rotation_errors(
+    found = motion_errors(
         error_rows(
             ("a", "flexion", "extension", 10, 0.3),
             ("a", "flexion", "right_bending", 30, 0.1),
@@ -245,12 +245,12 @@ def test_left_out_load_cases_are_predicted_by_the_fit_that_left_them_out() -> No
     of_case = errors["stage"] == "left_out_case"
     right = errors["fitted_to"] == "all_but_" + errors["test"]
     errors.loc[of_case, "rmse"] = np.where(right[of_case], 0.7, 50.0)
-    found = rotation_errors(errors).set_index("stage")["error"]
+    found = motion_errors(errors).set_index("stage")["error"]
     assert found["left_out_case"] == pytest.approx(0.7)
     two = Size(("a",), tests=("flexion", "left_lateral_bending"), representations=("per_joint",))
     rows = tables_of(two)["errors"]
     rows.loc[rows["stage"] == "left_out_case", "rmse"] = 0.4
-    assert rotation_errors(rows).set_index("stage")["error"]["left_out_case"] == pytest.approx(0.4)
+    assert motion_errors(rows).set_index("stage")["error"]["left_out_case"] == pytest.approx(0.4)
 
 
 def test_held_out_figure_tells_the_mean_of_each_row() -> None:

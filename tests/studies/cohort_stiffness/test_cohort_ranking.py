@@ -22,13 +22,11 @@ def test_mae_is_over_joints_and_then_over_specimens() -> None:
     found = mae_rows(pd.DataFrame(rows))
     peak, every = from_rows(MAE, found).to_pylist()
     # Per specimen 2 and 4 deg; the mean motions are 15 and 8 deg.
-    assert [peak[name] for name in ("low_quartile_deg", "mae_deg", "high_quartile_deg")] == [
-        *(2.5, 3.0, 3.5)
-    ]
-    assert (peak["steps"], peak["specimens"], peak["largest_motion_deg"]) == ("peak", 2, 15.0)
+    assert [peak[name] for name in ("low_quartile", "mae", "high_quartile")] == [*(2.5, 3.0, 3.5)]
+    assert (peak["steps"], peak["specimens"], peak["largest_motion"]) == ("peak", 2, 15.0)
     assert peak["mae_percent"] == pytest.approx(20.0)
     # Per specimen 0.6 and 1.0 deg; the mean motions are 5 and 3.5 deg.
-    assert every["mae_deg"] == pytest.approx(0.8)
+    assert every["mae"] == pytest.approx(0.8)
     assert every["mae_percent"] == pytest.approx(16.0)
 
 
@@ -41,7 +39,7 @@ def test_mae_leaves_out_what_was_lost_or_not_measured() -> None:
         seen("b", "L5S1", None, representation="per_joint", measured_peak=40.0),
     ]
     peaks = [row for row in mae_rows(pd.DataFrame(rows)) if row["steps"] == "peak"]
-    assert [(row["specimens"], row["mae_deg"]) for row in peaks] == [(1, 2.0), (0, None)]
+    assert [(row["specimens"], row["mae"]) for row in peaks] == [(1, 2.0), (0, None)]
     from_rows(MAE, peaks)
 
 

@@ -15,7 +15,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
 from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
-from spinepipe.report.words import POSITIVE, case, count, fixed, short
+from spinepipe.report.words import POSITIVE, SIGNS, after_number, case, count, fixed, short
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
     OF_JOINTS,
@@ -24,7 +24,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     SHARED,
 )
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import compared_motion, joint_label_of, unit_of
 
 MANY_SPECIMENS = 16
 """With more of them only three stages have room."""
@@ -102,6 +102,7 @@ def error_map_figure(
     """A column of panels per load case, a line of panels per stage."""
     errors, signs = tables["errors"], tables["sign_checks"]
     loaded = errors[errors["loaded"].astype(bool)] if len(errors) else errors
+    loaded = compared_motion(loaded) if len(loaded) else loaded  # one unit, one scale
     cases = list(dict.fromkeys(loaded["test"])) if len(loaded) else []
     found = stages(loaded, len(cohort.specimen_names)) if cases else []
     values = finite(loaded["peak_error"]) if cases else np.array([])
@@ -259,6 +260,7 @@ def _explain(
     signs: pd.DataFrame,
 ) -> None:
     sizes = np.abs(np.concatenate([finite(stage.rows["peak_error"]) for stage in found]))
+    unit = unit_of(found[0].rows)
     beyond = float(sizes.max()) > float(scale.vmax or 0.0) * (1.0 + 1e-9)
     bar = figure.colorbar(
         image,
@@ -269,7 +271,8 @@ def _explain(
         shrink=0.6,
         extend="both" if beyond else "neither",
     )
-    bar.set_label("predicted less measured motion at the largest load, loaded direction (°)")
+    told = "predicted less measured motion at the largest load, loaded direction"
+    bar.set_label(f"{told} ({SIGNS[unit]})")
     bar.outline.set_linewidth(0.4)
     handles = [
         Patch(
@@ -284,9 +287,10 @@ def _explain(
         label = "measured motion goes against the load: sign flipped?"
         handles.append(Patch(facecolor=WHITE, edgecolor=BLACK, lw=1.3, label=label))
     cases = found[0].rows["test"].nunique()
+    largest = f"{fixed(float(sizes.max()), 1)}{after_number(unit)}"
     words = [
         "Predicted less measured, + and − of the coordinate as above the panels",
-        f"largest error {fixed(float(sizes.max()), 1)}°" + ", beyond the scale" * beyond,
+        f"largest error {largest}" + ", beyond the scale" * beyond,
         f"the first {MOST_CASES} of {cases} load cases" if cases > MOST_CASES else "",
     ]
     explain_marks(figure, handles, "; ".join(word for word in words if word) + ".", len(handles))

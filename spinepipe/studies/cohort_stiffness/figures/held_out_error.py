@@ -13,11 +13,11 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import finite, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import count, number
+from spinepipe.report.words import SIGNS, after_number, count, number
 from spinepipe.statistics import mean_of
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NAMES, PUBLISHED, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, specimen_rms
+from spinepipe.studies.cohort_stiffness.stages import MOTIONS, of_joint_fits, specimen_rms, unit_of
 
 KEYS = ["stage", "representation", "specimen"]
 
@@ -27,7 +27,7 @@ PANELS = {
     "left_out_specimen": "Left-out specimen",
 }
 
-LEAST_DEG = 1e-3
+LEAST = 1e-3
 """Smaller errors, of exact fits, are drawn there."""
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
@@ -39,7 +39,8 @@ def held_out_error_figure(
 ) -> Figure:
     """A panel for fitted motion and one for each way of holding motion out."""
     errors = tables["errors"]
-    found = rotation_errors(errors) if len(errors) else errors
+    found = motion_errors(errors) if len(errors) else errors
+    unit = unit_of(errors) if len(errors) else "deg"
     panels = [name for name in PANELS if len(found) and (found["stage"] == name).any()]
     if not panels:
         return saying("No error of a fit can be shown: no fit has a result.")
@@ -54,19 +55,19 @@ def held_out_error_figure(
         axis.set_xscale("log")
         axis.set_xlim(low, high)
         log_ticks(axis.xaxis, low, high, 5)
-        axis.set_xlabel("root mean square error of rotations (°)")
+        axis.set_xlabel(f"root mean square error of {MOTIONS[unit]} ({SIGNS[unit]})")
         axis.set_yticks(range(len(rows)), [IN_WORDS[row].replace(" of ", "\nof ") for row in rows])
         axis.set_ylim(-0.55, len(rows) - 0.35)
         axis.spines["left"].set_visible(False)
         for representation, value in published.items():
             axis.axvline(value, **_look(representation), zorder=1)
-        _draw(axis, found[found["stage"] == name], rows)
-    _explain(figure, published, len(cohort.specimen_names))
+        _draw(axis, found[found["stage"] == name], rows, unit)
+    _explain(figure, published, len(cohort.specimen_names), unit)
     return figure
 
 
-def rotation_errors(errors: pd.DataFrame) -> pd.DataFrame:
-    """Root mean square error over all readings of rotations, column ``error``, deg, by ``KEYS``.
+def motion_errors(errors: pd.DataFrame) -> pd.DataFrame:
+    """Root mean square error over all readings that are compared, column ``error``, by ``KEYS``.
 
     Of held-out load cases each is predicted by the fit that left it out; all else is of fits to
     all load cases. A specimen without an error for all that was measured of it is left out.
@@ -97,11 +98,11 @@ def _look(published: str) -> dict[str, Any]:
 
 
 def _reach(values: Sequence[float]) -> tuple[float, float]:
-    sizes = np.maximum(np.asarray(values, dtype=float), LEAST_DEG)
+    sizes = np.maximum(np.asarray(values, dtype=float), LEAST)
     return float(sizes.min()) / 1.35, float(sizes.max()) * 1.35
 
 
-def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
+def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str], unit: str) -> None:
     low, _ = axis.get_xlim()
     for y, name in enumerate(names):
         values = finite(rows.loc[rows["representation"] == name, "error"])
@@ -109,7 +110,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
         if not len(values):
             note(axis, 0.02, y, "no result", GREY)
             continue
-        shown = np.maximum(values, LEAST_DEG)
+        shown = np.maximum(values, LEAST)
         axis.plot(
             shown,
             y - 0.12 + 0.3 * spread_out(len(values)),
@@ -120,7 +121,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
             alpha=0.55,
             zorder=3,
         )
-        words = f"{number(float(values.mean()))}°"
+        words = f"{number(float(values.mean()))}{after_number(unit)}"
         interval = mean_of(values).interval
         if interval is not None:
             ends = max(0.0, interval[0]), interval[1]
@@ -133,22 +134,22 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str]) -> None:
                 solid_capstyle="butt",
             )
             words = f"{words} ({number(ends[0])}–{number(ends[1])})"
-        middle = max(float(values.mean()), LEAST_DEG)
+        middle = max(float(values.mean()), LEAST)
         axis.plot([middle], [y + 0.16], "D", color=BLACK, ms=3.2, mew=0, zorder=5)
         note(axis, 0.02, y + 0.4, words, BLACK)
 
 
-def _explain(figure: Figure, published: Mapping[str, float], specimens: int) -> None:
+def _explain(figure: Figure, published: Mapping[str, float], specimens: int, unit: str) -> None:
     handles = [
         Line2D([], [], color=OURS, marker="o", ms=3.0, mew=0, ls="", alpha=0.55, label="a specimen")
     ]
     mean = "mean with 95 % interval" if specimens > 1 else "mean"
     handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
     for name, value in published.items():
-        label = f"{IN_WORDS[name]}: {number(value)}°"
+        label = f"{IN_WORDS[name]}: {number(value)}{after_number(unit)}"
         handles.append(Line2D([], [], **_look(name), label=label))
     words = (
-        "All measured rotations of all joints, load steps and used cycles; "
+        f"All measured {MOTIONS[unit]} of all joints, load steps and used cycles; "
         f"{count(specimens, 'specimen')}. Vertical lines: stiffness that was not fitted at all."
     )
     explain_marks(figure, handles, words, len(handles))

@@ -89,7 +89,7 @@ def _number(run: Run, column: str, model: str, test: str, stage: str) -> float:
 
 def _median(model: str, test: str, stage: str) -> Callable[[Run], Ours]:
     def ours(run: Run) -> Ours:
-        columns = ("mae_deg", "low_quartile_deg", "high_quartile_deg")
+        columns = ("mae", "low_quartile", "high_quartile")
         middle, low, high = (_number(run, column, model, test, stage) for column in columns)
         return Ours(middle, low, high)
 
@@ -98,9 +98,7 @@ def _median(model: str, test: str, stage: str) -> Callable[[Run], Ours]:
 
 def _iqr(model: str, test: str, stage: str) -> Callable[[Run], Ours]:
     def ours(run: Run) -> Ours:
-        low, high = (
-            _number(run, f"{end}_quartile_deg", model, test, stage) for end in ("low", "high")
-        )
+        low, high = (_number(run, f"{end}_quartile", model, test, stage) for end in ("low", "high"))
         return Ours(high - low)
 
     return ours
@@ -169,10 +167,10 @@ def _ratio(
     note: str,
 ) -> Claim:
     def ours(run: Run) -> Ours:
-        whole = _number(run, "mae_deg", *larger)
+        whole = _number(run, "mae", *larger)
         if whole == 0.0:
             raise NotComputed("the larger error is 0")
-        return Ours(_number(run, "mae_deg", *smaller) / whole)
+        return Ours(_number(run, "mae", *smaller) / whole)
 
     paper = table_4(*smaller, "median_deg") / table_4(*larger, "median_deg")
     return Claim(
