@@ -39,6 +39,9 @@ STIFFNESS_COLUMNS = tuple(
 COORDINATE_UNITS = {name: "mm" if name in TRANSLATIONS else "deg" for name in COORDINATES}
 """Unit of each coordinate in files and tables."""
 
+LOAD_UNITS = {name: "N" if name in TRANSLATIONS else "N m" for name in COORDINATES}
+"""Unit of the load on each coordinate in files and tables."""
+
 STIFFNESS_UNITS = {name: "N/m" if name in TRANSLATIONS else "N m/rad" for name in COORDINATES}
 """Unit of each stiffness in files and tables."""
 

@@ -251,6 +251,7 @@ def _gap(wide: bool, named: bool) -> Rows:
                 **key,
                 "coordinate": coordinate,
                 "unit": "deg",
+                "held_at": None,
                 "readings": 2,
                 **values,
                 "noise_sd": SD_DEG,

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.supports import MEASURED
 from spinepipe.cohort.text import Document
 from spinepipe.effects import registered
 from spinepipe.problems import Problem, did_you_mean, one_of
@@ -34,6 +35,7 @@ def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) ->
     yield from _measured(document, study, cohort)
     yield from _coordinates(document, study, cohort)
     yield from _noise(document, study, cohort)
+    yield from _loads_of_a_rig(document, study, cohort)
 
 
 def _effects(document: Document, study: Discrepancy) -> Iterator[Problem]:
@@ -77,6 +79,17 @@ def _coordinates(document: Document, study: Discrepancy, cohort: Cohort) -> Iter
             place = at(document, f"coordinates.{index}")
             found = f"'{name}', which was not measured in the chosen tests"
             yield Problem(*place, found, one_of(known), "delete it, or add its column to motion")
+
+
+def _loads_of_a_rig(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+    """SDs of a rig's loads stand beside those of motion, in the cohort."""
+    if cohort.supports is None or study.measurement_sd is None:
+        return
+    if (cohort.supports["reaction"] == MEASURED).any():
+        found = "SDs of motion beside loads of a rig that were measured (supports.csv)"
+        allowed = "null: cohort.yaml says the SDs of motion and of loads together"
+        remedy = "set measurement_sd in cohort.yaml, and take it out here"
+        yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
 
 
 def _noise(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:

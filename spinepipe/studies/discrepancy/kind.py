@@ -90,4 +90,5 @@ KIND = Kind(
     # every setting says something about the search
     jobs=(Job("search", at="job", reads_base=True),),
     makes_models="search",
+    holds=True,
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array
+from spinepipe.model import LoadStep, Support
 from spinepipe.status import Status
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
@@ -19,7 +20,7 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Tried
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, LOAD_UNITS
 
 Row = dict[str, Any]
 
@@ -71,29 +72,49 @@ def _rows_of(
                     out_base = float(of_base[t, j, c] * factor)
                     out_final = float(of_final[t, j, c] * factor)
             key = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
-            yield (
-                key,
-                {
-                    "load": float(loads[number][t, j, c]),
-                    "measured": float(test.mean[t, j, c] * factor),
-                    "readings": count,
-                    "base": float(base[number][t, j, c] * factor),
-                    "with_effects": float(final[number][t, j, c] * factor),
-                    "noise_sd": float(sd[t, c] / np.sqrt(count)),
-                    "held_out_fold": fold,
-                    "held_out_base": out_base,
-                    "held_out_with_effects": out_final,
-                },
-            )
+            rig = _rig(test.case.steps[t], j, c)
+            row: Row = {
+                "unit": COORDINATE_UNITS[COORDINATES[c]],
+                "held_at": None,
+                "load": float(loads[number][t, j, c]),
+                "measured": float(test.mean[t, j, c] * factor),
+                "readings": count,
+                "base": float(base[number][t, j, c] * factor),
+                "with_effects": float(final[number][t, j, c] * factor),
+                "noise_sd": float(sd[t, c] / np.sqrt(count)),
+                "held_out_fold": fold,
+                "held_out_base": out_base,
+                "held_out_with_effects": out_final,
+            }
+            yield key, row if rig is None else _as_load(rig, row, int(c))
+
+
+def _rig(step: LoadStep, joint: int, coordinate: int) -> Support | None:
+    """What fixes a coordinate in a load step."""
+    place = 6 * joint + coordinate
+    return next((one for one in step.supports if one.place == place), None)
+
+
+def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
+    """A row of a reaction, in loads: what is listed, and what the models hold at that motion."""
+    assert rig.read_as is not None
+    per, load = float(BORDER_PER_SI[coordinate]) * rig.read_as, row["load"]
+    told: Row = {"noise_sd": row["noise_sd"] / per}
+    for name in ("measured", "base", "with_effects", "held_out_base", "held_out_with_effects"):
+        told[name] = None if row[name] is None else load + row[name] / per
+    held_at = rig.value * float(BORDER_PER_SI[coordinate])
+    return row | told | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
 
 
 def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     """One row of those that several load histories of a test have at a place."""
-    at = dict(zip(KEYS, key, strict=True)) | {"unit": COORDINATE_UNITS[key[-1]]}
+    at = dict(zip(KEYS, key, strict=True))
     if len(rows) == 1:
         return at | rows[0]
     readings = sum(row["readings"] for row in rows)
-    found: Row = {"readings": readings}
+    found: Row = {"readings": readings, "unit": rows[0]["unit"]}
+    held = [row["held_at"] for row in rows]
+    found["held_at"] = None if None in held else sum(held) / len(held)
     for name in ("load", "measured", "base", "with_effects"):
         found[name] = sum(row[name] * row["readings"] for row in rows) / readings
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))

@@ -14,7 +14,7 @@ POOLED_BY = (
 )
 NOT_TESTABLE = "not_testable"
 
-_MOTION = "mm or deg, see unit"
+_MOTION = "see unit"
 _NO_POSE = "no pose was found"
 _NOT_HELD_OUT = "not held out, or no pose was found"
 _TEST = Column("test", "text", "test")
@@ -36,7 +36,8 @@ def _of_noise(name: str, meaning: str, null: str | None = None) -> Column:
 GAP = Table(
     "gap",
     "Measured and modelled motion, reading by reading: one row per specimen, test, load step, "
-    "joint and measured coordinate. Cycles are averaged.",
+    "joint and measured coordinate. Cycles are averaged. Where a rig fixes the coordinate and its "
+    "load was measured, motion is that load: as listed, and as the models hold it.",
     ("specimen", "test", "step", "joint", "coordinate"),
     (
         SPECIMEN,
@@ -44,13 +45,20 @@ GAP = Table(
         Column("step", "integer", "load step", low=0),
         JOINT,
         Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
-        Column("unit", "text", "unit of the motion", allowed=("mm", "deg")),
+        Column("unit", "text", "unit of the motion", allowed=("mm", "deg", "N", "N m")),
+        Column(
+            "held_at",
+            "number",
+            "where a rig has the coordinate",
+            "mm where unit is N, deg where it is N m",
+            "the coordinate is free",
+        ),
         Column(
             "load",
             "number",
             "what the test's forces and moments do at this joint, in the direction of the "
             "coordinate in the neutral pose; weight and load effects not counted",
-            "N where unit is mm, N m where it is deg",
+            "N where unit is mm or N, N m where it is deg or N m",
         ),
         _motion("measured", "measured motion, mean over cycles", None),
         Column("readings", "integer", "cycles averaged", low=1),

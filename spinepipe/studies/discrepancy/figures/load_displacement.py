@@ -112,7 +112,8 @@ def driven(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
     """Test, joint and the coordinate in which the load does the most work there, over specimens."""
     factors = dict(zip(COORDINATES, BORDER_PER_SI, strict=True))
     per_si = gap["coordinate"].map(factors).astype(float)
-    work = (gap["load"] * gap["measured"] / per_si).abs()
+    motion = gap["held_at"].fillna(gap["measured"])  # on a rig that moves it, a load is measured
+    work = (gap["load"] * motion / per_si).abs()
     keys = ["test", "joint", "coordinate"]
     total = work.groupby([gap[key] for key in keys], sort=False).sum().rename("work").reset_index()
     best = total[total["work"] > 0.0].sort_values("work", ascending=False, kind="stable")
@@ -137,15 +138,23 @@ def _draw(axis: Axes, curve: Curve, with_effects: bool) -> bool:
     """Points, their noise and the models' curves; whether there were unloading steps."""
     rows = curve.rows
     load, measured = rows["load"].to_numpy(float), rows["measured"].to_numpy(float)
+    along = rows["held_at"].to_numpy(float)
+    on_a_rig = bool(np.isfinite(along).all())  # that moves the joint: a load was measured
+
+    def placed(seen: Array, steps: Steps | NDArray[np.bool_]) -> tuple[Array, Array]:
+        return (along[steps], seen[steps]) if on_a_rig else (seen[steps], load[steps])
+
     back, noise = unloading(load), BAND_SD * rows["noise_sd"].to_numpy(float)
+    fill_between = axis.fill_between if on_a_rig else axis.fill_betweenx
     for way in ways(load):
         for steps in _branches(way, back):
             low, high = measured[steps] - noise[steps], measured[steps] + noise[steps]
-            axis.fill_betweenx(load[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
+            across = along[steps] if on_a_rig else load[steps]
+            fill_between(across, low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
         for name in _LINES if with_effects else ("base",):
-            axis.plot(rows[name].to_numpy(float)[way], load[way], zorder=3, **_LINES[name])
+            axis.plot(*placed(rows[name].to_numpy(float), way), zorder=3, **_LINES[name])
     for chosen, fill in ((~back, BLACK), (back, WHITE)):
-        axis.plot(measured[chosen], load[chosen], mfc=fill, zorder=5, **_DOT)
+        axis.plot(*placed(measured, chosen), mfc=fill, zorder=5, **_DOT)
     axis.axhline(0.0, color=GREY, lw=0.4, zorder=0)
     axis.axvline(0.0, color=GREY, lw=0.4, zorder=0)
     return bool(back.any())

@@ -1,0 +1,160 @@
+"""A machine that moves a joint and measures its load: read, fitted and told as what it is.
+
+The data are made by one line of algebra, F = k q (1 + c q^2), with all rotations blocked.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.text import Document
+from spinepipe.problems import InputError, Problem
+from spinepipe.studies import read as studies
+from spinepipe.studies.discrepancy.checks import check_discrepancy
+from spinepipe.studies.discrepancy.rows import _as_load, _rig
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.investigation import Prepared, _laid, prepared
+from spinepipe.studies.discrepancy.settings import Discrepancy
+
+STEPS_MM = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 1.4, 0.6])
+STIFFNESS, FORCE_SD, MOTION_SD = 6e4, 1.0, 0.02
+"""N/m, N and mm."""
+
+YAML = """\
+cohort: rig
+title: a joint that a machine shears
+source: made up
+vertebrae: [C7, C6]
+gravity: false
+measurement_sd: {rotation_deg: 0.1, translation_mm: 0.02, force_n: 1.0}
+"""
+SUPPORTS = """\
+specimen,test,joint,coordinate,state,reaction
+*,*,*,anterior,prescribed,measured
+*,*,*,extension,held,
+*,*,*,right_bending,held,
+*,*,*,left_rotation,held,
+"""
+STUDY = Discrepancy(
+    study="rig", kind="discrepancy", cohort="rig", base={"stiffness": "per_specimen"}
+)
+
+
+def plain_run(function: Callable[..., Any], *arguments: Any) -> Any:
+    return function(*arguments)
+
+
+def force(q_mm: np.ndarray, growth_per_mm2: float) -> np.ndarray:
+    return STIFFNESS * q_mm * 1e-3 * (1.0 + growth_per_mm2 * q_mm**2)
+
+
+def written(folder: Path, growth_per_mm2: float, noise_n: float = 0.0) -> tuple[Cohort, np.ndarray]:
+    """The cohort, and the forces (tests, T) N that its machine measured."""
+    rng = np.random.default_rng(5)
+    folder = folder / "rig"
+    folder.mkdir()
+    loads = ["specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm"]
+    motion = ["specimen,test,step,joint,anterior_mm,superior_mm,right_mm"]
+    forces = []
+    for test, side in (("anterior", 1.0), ("posterior", -1.0)):
+        q = side * STEPS_MM
+        measured = force(q, growth_per_mm2) + noise_n * rng.normal(size=len(q))
+        forces.append(measured)
+        for step, (f, at) in enumerate(zip(measured, q, strict=True)):
+            loads.append(f"a,{test},{step},C6,{f:.12g},0,0,0,0,0,0,0,0")
+            motion.append(f"a,{test},{step},C6C7,{at:g},0,0")
+    (folder / "cohort.yaml").write_text(YAML)
+    (folder / "specimens.csv").write_text("specimen\na\n")
+    header = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg"
+    (folder / "joints.csv").write_text(f"{header}\na,C6C7,0,0,0,0,0,0\n")
+    (folder / "loads.csv").write_text("\n".join(loads) + "\n")
+    (folder / "motion.csv").write_text("\n".join(motion) + "\n")
+    (folder / "supports.csv").write_text(SUPPORTS)
+    return cohorts.read(folder), np.array(forces)
+
+
+def laid(cohort: Cohort) -> tuple[Prepared, Grounds]:
+    ready = prepared(STUDY, cohort, None)
+    return ready, _laid(ready, plain_run)
+
+
+def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
+    ready = prepared(STUDY, written(tmp_path, 0.0)[0], None)
+    assert ready.coordinates == ("anterior", "superior", "right")
+    for test in ready.readings[0].tests:
+        assert (test.cycles[..., 0] == 0.0).all()  # reactions: none is needed beside what is listed
+        assert np.isnan(test.cycles[..., 3:]).all()
+        assert test.case.fixed == [0, 3, 4, 5]
+
+
+@pytest.mark.parametrize(("noise_n", "within"), [(0.0, 1e-3), (FORCE_SD, 4.0)])
+def test_the_base_has_the_stiffness_that_made_the_forces(
+    noise_n: float, within: float, tmp_path: Path
+) -> None:
+    """Of reactions k q - F with one SD each, the SD of k is that of F over the root of sum q^2."""
+    cohort, _ = written(tmp_path, 0.0, noise_n)
+    _, grounds = laid(cohort)
+    found = grounds.fit.models["a"].effects[0].values[0, 0]
+    sd = FORCE_SD / np.sqrt(2.0 * (STEPS_MM**2).sum()) * 1e3
+    assert abs(found - STIFFNESS) < within * sd
+
+
+def test_the_law_that_made_the_forces_leaves_noise(tmp_path: Path) -> None:
+    cohort, forces = written(tmp_path, 0.0, noise_n=FORCE_SD)
+    ready, grounds = laid(cohort)
+    stiffness = grounds.fit.models["a"].effects[0].values[0, 0]
+    q = np.array([STEPS_MM, -STEPS_MM]) * 1e-3
+    for number, predicted in enumerate(grounds.fit.predicted["a"]):
+        order = [test.case.test for test in ready.readings[0].tests]
+        row = 0 if order[number] == "anterior" else 1
+        in_newton = predicted[:, 0, 0] / (MOTION_SD * 1e-3) * FORCE_SD
+        np.testing.assert_allclose(in_newton, stiffness * q[row] - forces[row], atol=1e-6)
+
+
+def test_rows_of_a_rig_are_loads(tmp_path: Path) -> None:
+    """Measured is what is listed; the model's is what it holds where the machine has the joint."""
+    cohort, _ = written(tmp_path, 0.0)
+    (first, *_) = prepared(STUDY, cohort, None).readings[0].tests
+    step = first.case.steps[3]
+    rig = _rig(step, 0, 0)
+    assert rig is not None
+    assert rig.read_as is not None
+    held, listed = 50.0, float(step.wrenches[0].force[0])
+    reading_mm = (held - listed) * rig.read_as * 1e3
+    row = {"load": listed, "measured": 0.0, "base": reading_mm, "with_effects": reading_mm}
+    row |= {"held_out_base": None, "held_out_with_effects": None, "noise_sd": MOTION_SD}
+    told = _as_load(rig, row, 0)
+    assert told["unit"] == "N"
+    assert told["measured"] == listed
+    assert told["base"] == pytest.approx(held, rel=1e-12)
+    assert told["noise_sd"] == pytest.approx(FORCE_SD, rel=1e-12)
+    assert told["held_at"] == pytest.approx(1.2 if first.case.test == "anterior" else -1.2)
+    assert told["held_out_base"] is None
+
+
+def test_sds_of_loads_and_motion_stand_together(tmp_path: Path) -> None:
+    cohort, _ = written(tmp_path, 0.0)
+    document = Document("config/studies/rig.yaml", {}, {})
+    assert list(check_discrepancy(document, STUDY, cohort)) == []
+    own = STUDY.model_copy(update={"measurement_sd": cohort.measurement_sd})
+    (problem,) = check_discrepancy(document, own, cohort)
+    assert "set measurement_sd in cohort.yaml" in str(problem)
+
+
+def test_kinds_that_know_no_rig_refuse_the_cohort(tmp_path: Path) -> None:
+    cohort, _ = written(tmp_path, 0.0)
+    folder = tmp_path / "config" / "studies"
+    folder.mkdir(parents=True)
+    (folder / "bent.yaml").write_text(
+        f"study: bent\nkind: cohort_stiffness\ncohort: {cohort.folder}\n"
+    )
+    with pytest.raises(InputError) as caught:
+        studies.check(tmp_path, "bent")
+    told: list[Problem] = [p for p in caught.value.problems if "supports.csv" in p.found]
+    assert len(told) == 1
+    assert "discrepancy" in told[0].allowed
