@@ -126,7 +126,7 @@ ENTRIES = {
         "rate",
         "1/rad",
         3.0,
-        80.0,
+        40.0,
         _stiffening,
         _draw_stiffening,
         {"exponential": SAME, "tangent": SAME, "cubic": SAME, "bilinear": SAME}

@@ -1,6 +1,7 @@
 """Rates, goals and tables of the scored search, from rows made by hand."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from tests.generators.hidden import KNOWN, Recipe, draw_hidden
+from tests.generators.hidden import CATALOGUE, KNOWN, Recipe, draw_hidden
 from tests.validation.discrepancy import report, run, seeds, store, tables, tune
 from tests.validation.discrepancy.designs import DESIGNS, design_of
 from tests.validation.discrepancy.goals import goals
@@ -219,6 +220,16 @@ def hidden(one: dict[str, Any]) -> list[dict[str, Any]]:
     """Effects of a row's recipe."""
     found: list[dict[str, Any]] = one["recipe"]["hidden"]
     return found
+
+
+def test_the_page_tells_every_formula() -> None:
+    """docs/studies/discrepancy.md: which formulas are the library's and which are others."""
+    page = (store.ROOT / "docs" / "studies" / "discrepancy.md").read_text(encoding="utf-8")
+    lines = dict(re.findall(r"^\| `(\w+)` \|(.*)\|$", page, re.MULTILINE))
+    for name in KNOWN:
+        same, other = (set(re.findall(r"\w+", part)) for part in lines[name].split("|"))
+        for formula, which in CATALOGUE[name].formulas.items():
+            assert formula in (same if which == "same" else other), (name, formula)
 
 
 def test_enough_cohorts_of_each_kind_for_its_goal() -> None:
