@@ -21,6 +21,7 @@ _TEXTS = {
     ".html": "<!-- {} -->\n",
     ".osim": "<!-- {} -->\n",
     ".yaml": "# {}\n",
+    ".csv": "# {}\n",
 }
 """Kinds of text that end with the mark, and how a remark is written in them."""
 

@@ -15,6 +15,9 @@ rule discrepancy_search:
         where=f"{DISCREPANCIES}/where.parquet",
         confusions=f"{DISCREPANCIES}/confusions.parquet",
         held_out=f"{DISCREPANCIES}/held_out.parquet",
+        imperfections=f"{DISCREPANCIES}/imperfections.parquet",
+        next_tests=f"{DISCREPANCIES}/next_tests.parquet",
+        design=f"{DISCREPANCIES}/design.csv",
         model_base=f"{DISCREPANCIES}/model_base.yaml",
         model_with_effects=f"{DISCREPANCIES}/model_with_effects.yaml",
     log:

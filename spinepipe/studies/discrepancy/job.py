@@ -6,7 +6,7 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,14 @@ from spinepipe.files import appearing
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.model_mark import base_marks
-from spinepipe.marks import KEY, with_mark
+from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress
+from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
+from spinepipe.studies.discrepancy.design.advice import advice
+from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
+from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
 from spinepipe.studies.discrepancy.rows import (
     candidate_rows,
@@ -33,14 +37,17 @@ from spinepipe.studies.discrepancy.rows import (
     held_out_rows,
     where_rows,
 )
+from spinepipe.studies.discrepancy.search.beyond import Beyond, beyond
 from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.grounds import NoBase
 from spinepipe.studies.discrepancy.search.hypothesis import BUSHING, Form
+from spinepipe.studies.discrepancy.search.imperfections import TakenUp, taken_up
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
     investigate,
+    on_record,
     prepared,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
@@ -50,7 +57,15 @@ from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store
-from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy.tables import (
+    CANDIDATES,
+    CONFUSIONS,
+    GAP,
+    HELD_OUT,
+    IMPERFECTIONS,
+    NEXT_TESTS,
+    WHERE,
+)
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
     Answer,
@@ -69,7 +84,7 @@ from spinepipe.studies.discrepancy.verdict import (
     plain_data,
 )
 from spinepipe.tables import from_rows, write
-from spinepipe.units import BORDER_PER_SI, ROTATIONS, STIFFNESS_COLUMNS
+from spinepipe.units import BORDER_PER_SI, STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 
@@ -109,6 +124,9 @@ def run(
     where: str,
     confusions: str,
     held_out: str,
+    imperfections: str,
+    next_tests: str,
+    design: str,
     model_base: str,
     model_with_effects: str,
 ) -> None:
@@ -123,9 +141,13 @@ def run(
         where: WHERE,
         confusions: CONFUSIONS,
         held_out: HELD_OUT,
+        imperfections: IMPERFECTIONS,
+        next_tests: NEXT_TESTS,
     }
     for path, table in files.items():
         write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
+    advised = advice_csv(results.rows.get(NEXT_TESTS.name, ()))
+    write_marked(advised, design, metadata[KEY])
     write_model(results.model_base, model_base, metadata[KEY])
     write_model(results.model_with_effects, model_with_effects, metadata[KEY])
     told = with_mark(plain_data(results.verdict), metadata[KEY])
@@ -188,12 +210,53 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     seed, trials = ended.rules.seed, ended.rules.trials
     told = told_apart(ended.grounds, trials, needed, ready.declared, seed, run)
     ended = ended.as_told()
+    imperfect = _imperfections(ready.cohort.joint_names, ended, run)
+    stays = _beyond(ended, run)
     return Results(
-        verdict=_verdict(ready, ended, told),
-        rows=_rows(ready.cohort.joint_names, ended, told),
+        verdict=replace(
+            _verdict(ready, ended, told, stays),
+            imperfections=told_imperfections(imperfect["with_effects"]),
+            tabulated=stays.table,
+        ),
+        rows={
+            **_rows(ready.cohort.joint_names, ended, told),
+            IMPERFECTIONS.name: [
+                row for model, one in imperfect.items() for row in imperfection_rows(one, model)
+            ],
+            NEXT_TESTS.name: advice_rows(
+                advice(
+                    ended.found,
+                    ended.ended,
+                    ended.rules,
+                    bench(ended.grounds, ready.declared),
+                    run,
+                )
+            ),
+        },
         model_base=_model(ready, ended.grounds.fit, "base"),
-        model_with_effects=_model(ready, ended.found.final.fit, "with_effects"),
+        model_with_effects=_model(ready, stays.grounds.fit, "with_effects"),
     )
+
+
+def _beyond(ended: Investigation, run: Run) -> Beyond:
+    """What no effect explains, described; nothing where nothing is left, or the data look wrong."""
+    final, outcome = ended.found.final, ended.ended
+    told = outcome.verdict in (Answer.UNKNOWN, Answer.PART)
+    if not told or outcome.reason is Reason.DATA_ERRORS:
+        return Beyond(None, None, final)
+    stays = beyond(final, ended.rules, run)
+    if stays.table is not None:
+        run(on_record, stays.grounds.fit, final.readings)
+    return stays
+
+
+def _imperfections(joints: Sequence[str], ended: Investigation, run: Run) -> Mapping[str, TakenUp]:
+    """What imperfections took up beside the base, and beside the model with the effects."""
+    found = ended.found
+    base = taken_up(found.base, found.base.fit, joints, run)
+    same = found.final.fit is found.base.fit
+    final = base if same else taken_up(found.final, found.final.fit, joints, run)
+    return {"base": base, "with_effects": final}
 
 
 def _rows(
@@ -215,7 +278,9 @@ def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
     return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base)
 
 
-def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> Verdict:
+def _verdict(
+    ready: Prepared, investigation: Investigation, told: ToldApart, stays: Beyond
+) -> Verdict:
     cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
     final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
@@ -240,8 +305,8 @@ def _verdict(ready: Prepared, investigation: Investigation, told: ToldApart) -> 
             held_out_closed=proof.closed,
         ),
         smallest_detectable=told.smallest_detectable,
-        unknown=_unknown(found, ended, final),
-        part=_part(found, ended, final),
+        unknown=_unknown(found, ended, final, stays),
+        part=_part(found, ended, final, stays),
         suspected_data_errors=investigation.errors,
         threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
         families=told.families,
@@ -273,15 +338,9 @@ def _missing(found: Found, one: Standing, cohort: Cohort) -> Missing:
 
 
 def _scope(form: Form, cohort: Cohort) -> Scope:
-    options = dict(form.variant.options)
-    coordinate = options.get("coordinate")
-    if coordinate is None:
-        coordinates = tuple(options.get("pair", EVERY))
-    else:
-        coordinates = ROTATIONS if coordinate == "rotations" else (coordinate,)
     return Scope(
         joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
-        coordinates=coordinates,
+        coordinates=form.variant.acts_on or EVERY,
         specimens=EVERY if form.specimen is None else (form.specimen,),
     )
 
@@ -304,17 +363,21 @@ def _rms(sd: Array) -> float | None:
     return float(np.sqrt(np.mean(read**2))) if len(read) else None
 
 
-def _unknown(found: Found, ended: Outcome, final: Sequence[Place]) -> Unknown | None:
+def _unknown(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Unknown | None:
     if ended.reason is None:
         return None
-    return Unknown(_where(final), _shape(found), ended.reason)
+    shape = _shape(found)
+    coordinate = found.lack.coordinate if shape else None
+    return Unknown(_where(final), shape, ended.reason, coordinate, stays.formula)
 
 
-def _part(found: Found, ended: Outcome, final: Sequence[Place]) -> Part | None:
+def _part(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Part | None:
     """What stays beside the effects that are certain; None where nothing is said to."""
     if not ended.left:
         return None
-    return Part(found.final_gap.gap, _where(final), _shape(found), ended.left)
+    shape, gap = _shape(found), found.final_gap.gap
+    coordinate = found.lack.coordinate if shape else None
+    return Part(gap, _where(final), shape, ended.left, coordinate, stays.formula)
 
 
 def _where(final: Sequence[Place]) -> str:

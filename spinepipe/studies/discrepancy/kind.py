@@ -6,14 +6,22 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.tables import CANDIDATES, CONFUSIONS, GAP, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy.tables import (
+    CANDIDATES,
+    CONFUSIONS,
+    GAP,
+    HELD_OUT,
+    IMPERFECTIONS,
+    NEXT_TESTS,
+    WHERE,
+)
 from spinepipe.studies.kind import Job, Kind
 from spinepipe.studies.study_files import Figure, StudyFiles
 
 VERDICT = "verdict.json"
 """The answer; each figure may draw from it."""
 
-OTHERS = (VERDICT, "model_base.yaml", "model_with_effects.yaml")
+OTHERS = (VERDICT, "design.csv", "model_base.yaml", "model_with_effects.yaml")
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,12 @@ class DiscrepancyFiles(StudyFiles):
             "figures.effect_confusions:effect_confusions_figure",
             ("confusions", "candidates", VERDICT),
         ),
+        Figure(
+            "imperfections",
+            "What small imperfections took up",
+            "figures.imperfections:imperfections_figure",
+            ("imperfections", VERDICT),
+        ),
     )
 
     study: Discrepancy
@@ -79,7 +93,7 @@ class DiscrepancyFiles(StudyFiles):
         return OTHERS
 
 
-TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT)
+TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS)
 
 KIND = Kind(
     settings=Discrepancy,

@@ -9,10 +9,11 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
 from spinepipe.report.words import plain
+from spinepipe.studies.discrepancy.advice_words import shown_advice
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
 from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, WHERE
+from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TESTS, WHERE
 from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import (
     called,
@@ -47,6 +48,7 @@ _WHERE = (
     f"{WHERE.about} Largest first; of single places those above the noise. All of them, and load "
     "steps, are in where.parquet."
 )
+_NEXT = f"{NEXT_TESTS.about} The first of each; all of them are in design.csv."
 _CANDIDATES = (
     f"{CANDIDATES.about} On each screen the best form of an effect; all forms are in "
     "candidates.parquet."
@@ -98,7 +100,7 @@ QUESTION = (
     "Where do model and measurement disagree, which effect does the model lack, what happens when "
     "it is added, and how sure is that?"
 )
-READ = ("where", "candidates", "held_out", "confusions")
+READ = ("where", "candidates", "held_out", "confusions", "next_tests")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
@@ -190,6 +192,9 @@ def _place(effect: Missing, own: str) -> str:
 
 def file_tables(results: Results) -> Iterator[Parts]:
     """File, title, what is said of it, rows and columns of each table."""
+    advised = shown_advice(results.table("next_tests"))
+    if len(advised):
+        yield "next_tests", "Which test next", _NEXT, advised, NEXT_TESTS.columns
     held_out, where = results.table("held_out"), results.table("where")
     yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), HELD_OUT.columns
     if len(where):

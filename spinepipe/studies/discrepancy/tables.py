@@ -14,6 +14,9 @@ POOLED_BY = (
 )
 NOT_TESTABLE = "not_testable"
 
+ADVICE = ("advised", "offered", "tells_nothing", "no_pose", "would_do", "not_enough")
+"""What becomes of a run that could be added, or of an imperfection that could be known better."""
+
 _MOTION = "see unit"
 _NO_POSE = "no pose was found"
 _NOT_HELD_OUT = "not held out, or no pose was found"
@@ -224,6 +227,71 @@ HELD_OUT = Table(
             "whether the effects predict it worse than the base, by more than noise makes",
         ),
         status("fits"),
+        MESSAGE,
+    ),
+)
+
+IMPERFECTIONS = Table(
+    "imperfections",
+    "What the small imperfections took up that the study allows for: one row per imperfection, at "
+    "its most likely size, and one per mean over several of them.",
+    ("model", "specimen", "kind", "component", "joint", "test"),
+    (
+        Column("model", "text", "base, or with the named effects", allowed=MODELS),
+        Column("specimen", "text", "specimen; * in a mean over all"),
+        Column("kind", "text", "imperfection, as in the study's nuisance settings"),
+        Column("component", "text", "direction, or the two coordinates that are coupled"),
+        Column("joint", "text", "joint; * for a load, for all joints alike, in a mean over all"),
+        Column("test", "text", "test; * for what all tests share, in a mean over all"),
+        Column("value", "number", "most likely size", "see unit"),
+        Column("unit", "text", "of value and prior_sd; 1: a share", allowed=("mm", "deg", "1")),
+        Column("prior_sd", "number", "one prior SD", "see unit", low=0.0),
+        Column("in_prior_sds", "number", "most likely size", "prior SD"),
+        Column(
+            "posterior_sd",
+            "number",
+            "how far readings leave it open (1: they say nothing); of a mean its standard error "
+            "by the scatter of the places",
+            "prior SD",
+            low=0.0,
+        ),
+        Column(
+            "taken_chi2",
+            "number",
+            "by how much it lowers chi squared, to first order; these add up",
+            null="a mean",
+        ),
+        Column("places", "integer", "imperfections in it; 1 where it is no mean", low=1),
+        Column(
+            "chance",
+            "number",
+            "how often random errors make as large a mean",
+            null="no mean",
+            low=0.0,
+            high=1.0,
+        ),
+        Column("common", "flag", "whether the mean is too large for random errors"),
+    ),
+)
+
+NEXT_TESTS = Table(
+    "next_tests",
+    "Which test next, for tied names, for what has none and for effects that imperfections hide: "
+    "one row per subject and run, the most log evidence per cycle first.",
+    ("effect_or_pair", "test"),
+    (
+        Column("effect_or_pair", "text", "what is asked: an effect, two names, or what has none"),
+        Column("test", "text", "a run to add, or what an imperfection would have to be known to"),
+        Column("cycles", "integer", "cycles to be made, all specimens together; 0: no test", low=0),
+        Column("gain_in_log_evidence", "number", "expected gain", null="no pose was found"),
+        Column("gain_per_cycle", "number", "the same per cycle", null="no test, or no pose"),
+        Column(
+            "status",
+            "text",
+            "advised: the best of its subject; offered: others; tells_nothing; no_pose: the base "
+            "has none; would_do, not_enough: whether the effect would be evident",
+            allowed=ADVICE,
+        ),
         MESSAGE,
     ),
 )

@@ -87,10 +87,10 @@ def _draw(
             height = y + 0.5 * 0.8 - (number + 0.5) * step
             _points(axis, own[own["joint"] == joint], height, colors[joint])
         means = rows[(rows["kind"] == kind) & rows["common"]]
-        for mean in means.itertuples():
-            ends = [mean.in_prior_sds + way * 1.96 * mean.posterior_sd for way in (-1, 1)]
+        for mean in means[["in_prior_sds", "posterior_sd"]].to_numpy(dtype=float):
+            ends = mean[0] + 1.96 * mean[1] * np.array([-1.0, 1.0])
             axis.plot(ends, [y, y], color=THEIRS, lw=1.0, zorder=5)
-            axis.plot([mean.in_prior_sds], [y], "D", color=THEIRS, ms=4.5, mew=0.0, zorder=6)
+            axis.plot([mean[0]], [y], "D", color=THEIRS, ms=4.5, mew=0.0, zorder=6)
         share = float(taken.get(kind, 0.0))
         if share > _LEAST_SHARE * whole:
             words = percent(round(share), max(round(whole), 1))

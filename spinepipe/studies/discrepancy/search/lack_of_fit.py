@@ -67,12 +67,22 @@ class GenericColumns:
 
 
 def generic_columns(
-    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool, coordinates: Sequence[str]
+    model: SpineModel,
+    cases: Sequence[LoadCase],
+    zeroed: bool,
+    coordinates: Sequence[str],
+    reached: Sequence[Array] | None = None,
 ) -> GenericColumns:
-    """The generic basis of a specimen where its model stands."""
+    """The generic basis of a specimen where its model stands.
+
+    Parameters
+    ----------
+    reached : motions (T, J, 6) whose largest is the unit of the terms; None for those of ``cases``.
+    """
     solved = Solved(model, cases, zeroed)
     motions = solved.poses
-    reach = np.maximum(np.max([np.abs(q).max(axis=0) for q in motions], axis=0), LEAST_REACH)
+    largest = [np.abs(q).max(axis=0) for q in (motions if reached is None else reached)]
+    reach = np.maximum(np.max(largest, axis=0), LEAST_REACH)
     stiffness = _stiffness(model)
     terms: list[Term] = []
     moved: list[list[Array]] = [[] for _ in cases]

@@ -112,6 +112,18 @@ def rescaled(white: Whitening, factors: Array) -> Whitening:
     return _with_moves(white, white.directions @ left, sizes, mixing)
 
 
+def joined(first: Whitening, second: Whitening, moves: Array) -> Whitening:
+    """Whitening of the readings of both, one behind the other; ``moves`` (N, K) in noise SD."""
+    plain = Whitening(
+        (*first.used, *second.used),
+        (*first.roots, *second.roots),
+        np.zeros((first.count + second.count, 0)),
+        np.zeros(0),
+        np.zeros((0, 0)),
+    )
+    return _with_moves(plain, *svd(moves))
+
+
 def _with_moves(plain: Whitening, directions: Array, sizes: Array, mixing: Array) -> Whitening:
     """The whitening with nuisances that move readings by ``directions * sizes @ mixing``."""
     seen = sizes > 1e-3

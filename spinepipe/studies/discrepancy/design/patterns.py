@@ -1,0 +1,199 @@
+"""What one model predicts beyond another: on the readings that are there and in runs to come.
+
+A pattern belongs to a fit of the other model. It is the difference of two fits, or signatures of an
+effect or of generic terms times the strengths that the readings suggest, less what noise makes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from spinepipe.effects import Spread
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase, SpineModel
+from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
+from spinepipe.studies.discrepancy.search.inquiry import linearised_for
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, Term, generic_columns
+from spinepipe.studies.discrepancy.search.prediction import Simulated, Solved
+from spinepipe.studies.discrepancy.search.projected import (
+    Column,
+    linearised,
+    products,
+    signatures,
+    taken_out,
+)
+from spinepipe.studies.discrepancy.search.screen import Group, summed
+
+
+class Pattern(Protocol):
+    """What another model predicts beyond that of ``fit``."""
+
+    @property
+    def grounds(self) -> Grounds: ...
+    @property
+    def fit(self) -> JointFit: ...
+
+    def there(self, specimen: str) -> Array:
+        """(N,) on the specimen's readings, in noise SD."""
+        ...
+
+    def under(self, specimen: str, changed: "Change", cases: Sequence[LoadCase]) -> Sequence[Array]:
+        """(T, J, 6) m and rad in each run, not zeroed, of the specimen's models as changed.
+
+        Raises
+        ------
+        NoEquilibrium
+            When a load step has no stable pose.
+        """
+        ...
+
+
+class Change(Protocol):
+    """What a run does to a model, such as a preload."""
+
+    def __call__(self, model: SpineModel) -> SpineModel: ...
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Two fits of the same readings; ``other`` would be true."""
+
+    grounds: Grounds
+    fit: JointFit
+    other: JointFit
+
+    def there(self, specimen: str) -> Array:
+        """Difference of what they predict."""
+        pairs = zip(self.other.predicted[specimen], self.fit.predicted[specimen], strict=True)
+        return self.grounds.plain[specimen].noise_only([np.nan_to_num(a - b) for a, b in pairs])
+
+    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+        """Difference of what they predict."""
+        first, second = (
+            Simulated(changed(one.models[specimen]), cases, False, ()).at(np.zeros(0)).readings
+            for one in (self.other, self.fit)
+        )
+        return [a - b for a, b in zip(first, second, strict=True)]
+
+
+@dataclass(frozen=True)
+class Strengths:
+    """An effect beside the grounds' fit, to first order; ``weights`` (m,) by specimen."""
+
+    grounds: Grounds
+    columns: tuple[Column, ...]
+    weights: Mapping[str, Array]
+
+    @property
+    def fit(self) -> JointFit:
+        """Of the model that lacks it."""
+        return self.grounds.fit
+
+    def there(self, specimen: str) -> Array:
+        """Signatures on the readings."""
+        g, weights = self.grounds, self.weights[specimen]
+        solved = Solved(self.fit.models[specimen], g.readings[specimen].cases, g.noise.zeroed)
+        moved = [one @ weights for one in signatures(solved, self.columns)]
+        return g.plain[specimen].noise_only(moved)
+
+    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+        """Signatures in each run."""
+        solved = Solved(changed(self.fit.models[specimen]), cases, False)
+        return [one @ self.weights[specimen] for one in signatures(solved, self.columns)]
+
+
+def strengths(grounds: Grounds, trials: Trials, form: Form, sds: tuple[float, ...]) -> Strengths:
+    """A form at one shape, as strong as the readings suggest."""
+    alone = Trials(trials.effect, (form.variant,), (form,))
+    ((index, problem),) = linearised_for(grounds, [alone], 0, 0)
+    specimens = tuple(grounds.readings)
+    one = summed(index, problem, form, sds, specimens, grounds.tests)
+    estimate = _beyond_noise(one.group, one.gram, one.moments[:, 0])
+    weights = {name: np.zeros(len(index.columns)) for name in specimens}
+    for name, columns, owners in index.places(form, sds, specimens, grounds.tests)[0]:
+        np.add.at(weights[name], columns, estimate[owners])
+    return Strengths(grounds, index.columns, weights)
+
+
+def _beyond_noise(group: Group, gram: Array, moments: Array) -> Array:
+    """(k,) strengths that explain most, less the share that so many explain of noise alone."""
+    estimate = group.estimate(moments)
+    explained = float(2.0 * estimate @ moments - estimate @ gram @ estimate)
+    free = float(np.sum(group.eigenvalues > 1.0))
+    result: Array = estimate * np.sqrt(max(0.0, 1.0 - free / max(explained, 1e-12)))
+    return result
+
+
+@dataclass(frozen=True)
+class Generic:
+    """Generic terms beside the grounds' fit; ``weights`` (m,) of all terms by specimen."""
+
+    grounds: Grounds
+    coordinates: tuple[str, ...]
+    weights: Mapping[str, Array]
+
+    @property
+    def fit(self) -> JointFit:
+        """Of the model that lacks them."""
+        return self.grounds.fit
+
+    def there(self, specimen: str) -> Array:
+        """The terms on the readings."""
+        g, model = self.grounds, self.fit.models[specimen]
+        cases, zeroed = g.readings[specimen].cases, g.noise.zeroed
+        moved = generic_columns(model, cases, zeroed, self.coordinates).moved
+        return g.plain[specimen].noise_only([one @ self.weights[specimen] for one in moved])
+
+    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+        """The terms in each run, in units of the motion there was: more goes on as it began."""
+        model = changed(self.fit.models[specimen])
+        reached = [q.reshape(len(q), -1, 6) for q in self.fit.poses[specimen]]
+        moved = generic_columns(model, cases, False, self.coordinates, reached).moved
+        return [one @ self.weights[specimen] for one in moved]
+
+
+def generic(grounds: Grounds, coordinates: tuple[str, ...], lack: Lack) -> Generic:
+    """The terms that explain most, as strong as the readings suggest."""
+    parts, taken = {}, taken_out(grounds.fit)
+    terms: tuple[Term, ...] = ()
+    for name, one in grounds.readings.items():
+        model = grounds.fit.models[name]
+        found = generic_columns(model, one.cases, grounds.noise.zeroed, coordinates)
+        plain, terms = grounds.plain[name].noise_only(found.moved), found.terms
+        white = grounds.setting.whitenings[name].shortened(plain)
+        residual = taken[name].residual[:, None]
+        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), residual)
+    onto = _onto(terms, lack, tuple(parts))
+    problem, count = linearised(parts), len(next(iter(onto.values())))
+    gram, moments = np.zeros((count, count)), np.zeros((count, 1))
+    coupled = np.zeros((count, len(problem.gram_shared)))
+    for name, part in parts.items():
+        gram += onto[name] @ part.gram @ onto[name].T
+        moments += onto[name] @ part.moments
+        coupled += onto[name] @ part.shared
+    gram, moments = problem.without_shared(gram, moments, coupled)
+    estimate = _beyond_noise(Group.of(gram, np.zeros(count)), gram, moments[:, 0])
+    return Generic(grounds, coordinates, {name: estimate @ one for name, one in onto.items()})
+
+
+def _onto(terms: Sequence[Term], lack: Lack, specimens: Sequence[str]) -> dict[str, Array]:
+    """(k, M) which strength each term of a specimen has; none where it is of another family."""
+    keys: dict[tuple[object, ...], int] = {}
+    owners: dict[str, list[tuple[int, int]]] = {name: [] for name in specimens}
+    for name in specimens:
+        for column, term in enumerate(terms):
+            if (term.family, term.coordinate) == (lack.family, lack.coordinate):
+                joint = None if lack.spread is Spread.SHARED else term.joint
+                own = name if lack.spread is Spread.EACH else None
+                row = keys.setdefault((term.number, joint, own), len(keys))
+                owners[name].append((row, column))
+    found = {}
+    for name, pairs in owners.items():
+        found[name] = np.zeros((len(keys), len(terms)))
+        for row, column in pairs:
+            found[name][row, column] = 1.0
+    return found

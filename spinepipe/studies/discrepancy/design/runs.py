@@ -1,0 +1,222 @@
+"""Runs that a laboratory could add to its tests, one cycle each: a menu that knows what is there.
+
+An added run keeps the name of the test it varies while the specimen stays in its set-up, so that it
+shares the errors of that set-up; another direction and a new set-up have a name of their own.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects import Wrench
+from spinepipe.effects.contract import Array
+from spinepipe.model import LoadCase, LoadStep
+from spinepipe.studies.discrepancy.design.plans import (
+    HELD_S,
+    STEP_S,
+    Planned,
+    at_times,
+    back_down,
+    comes_back,
+    has_times,
+    largest_held,
+    peak,
+    scaled,
+    summed_loads,
+    times,
+)
+
+SLOWER, LARGER = 10.0, 1.5
+PRELOAD_N = 400.0
+
+ALONG = 0.9
+"""Cosine from which two loads have the same direction."""
+
+HALF = 0.5
+"""Share of the largest load from which a direction counts as tested."""
+
+DIRECTIONS = {
+    (3, 2): ("extension", "flexion"),
+    (3, 0): ("right lateral bending", "left lateral bending"),
+    (3, 1): ("left axial rotation", "right axial rotation"),
+    (0, 0): ("anterior force", "posterior force"),
+    (0, 1): ("superior force", "inferior force"),
+    (0, 2): ("force to the right", "force to the left"),
+}
+"""Moments and forces along the ground axes x (anterior), y (superior) and z (right): + and -."""
+
+AGAIN = ("once more", "set up anew, once more")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One more cycle of a test.
+
+    Attributes
+    ----------
+    words : what it is. test : loads and what is read. zeroed : whether readings are zeroed.
+    """
+
+    words: str
+    test: Planned
+    zeroed: bool
+
+
+def runs(tests: Sequence[Planned], zeroed: bool) -> list[Run]:
+    """The menu for a specimen that has had these tests; nothing that is there already but repeats.
+
+    A run is offered once, however many ways lead to it.
+    """
+    found: dict[tuple[object, ...], Run] = {}
+    for one in (*_variations(tests, zeroed), *_directions(tests, zeroed)):
+        if one.words.endswith(AGAIN) or not any(_has(test, zeroed, one) for test in tests):
+            found.setdefault(_same(one), one)
+    return list(found.values())
+
+
+def _has(test: Planned, zeroed: bool, one: Run) -> bool:
+    """Whether a test that was done is the added run already, about as slow where it has times."""
+    loads, added = summed_loads(test.case), summed_loads(one.test.case)
+    same = len(loads) == len(added) and np.allclose(loads, added)
+    timed = not has_times(one.test.case) or (
+        has_times(test.case) and _lasts(test.case) >= 0.5 * _lasts(one.test.case)
+    )
+    read = bool((test.count >= one.test.count).all())
+    return same and timed and read and (test.preload, zeroed) == (one.test.preload, one.zeroed)
+
+
+def _lasts(case: LoadCase) -> float:
+    every = times(case)
+    return every[-1] - every[0]
+
+
+def _same(one: Run) -> tuple[object, ...]:
+    test = one.test
+    loads = tuple(np.round(load, 9).tobytes() for load in summed_loads(test.case))
+    seconds = tuple(step.time for step in test.case.steps)
+    read = test.count.astype(bool).tobytes()
+    return (test.case.test, loads, seconds, read, test.preload, one.zeroed)
+
+
+def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
+    for one in tests:
+        case, name = one.case, one.case.test
+        once = replace(one, count=np.minimum(one.count, 1))
+
+        def run(words: str, changed: LoadCase, once: Planned = once) -> Run:
+            return Run(words, replace(once, case=changed), zeroed)
+
+        yield run(f"{name}: once more", case)
+        anew = replace(case, test=f"{name}, set up anew")
+        yield run(f"{name}: specimen taken out, set up anew, once more", anew)
+        yield from _read_more(once, zeroed)
+        yield run(f"{name}: in twice as many load steps", refined(case))
+        if not comes_back(case):
+            yield run(f"{name}: unloading too, the same loads back down", back_down(case))
+        yield run(f"{name}: loads {LARGER:g} times as large", scaled(case, LARGER))
+        squeezed = replace(once, preload=PRELOAD_N)
+        yield Run(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
+        if not has_times(case):
+            timed = at_times(case, times(case))
+            yield run(f"{name}: time recorded, {STEP_S:g} s from load step to load step", timed)
+        slow = at_times(case, [SLOWER * time for time in times(case)])
+        yield run(f"{name}: {SLOWER:g} times as slow, time recorded", slow)
+        held = f"{name}: largest load held for {HELD_S[-1] / 60:g} min, read along the way"
+        yield run(held, largest_held(case))
+        if zeroed:
+            yield Run(f"{name}: readings kept as they are, not zeroed", once, False)
+
+
+def _read_more(one: Planned, zeroed: bool) -> Iterator[Run]:
+    """The test with translations, or rotations, read as well."""
+    for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
+        if not one.count[:, part].any():
+            count = one.count.copy()
+            count[:, part] = 1
+            words = f"{one.case.test}: {what} read as well"
+            yield Run(words, replace(one, count=count), zeroed)
+
+
+def refined(case: LoadCase) -> LoadCase:
+    """A step half-way between each two."""
+    steps: list[LoadStep] = []
+    for before, after in zip(case.steps[:-1], case.steps[1:], strict=True):
+        steps += [before, _between(before, after)]
+    every = [*steps, case.steps[-1]]
+    return replace(case, steps=tuple(replace(s, step=n) for n, s in enumerate(every)))
+
+
+def _between(before: LoadStep, after: LoadStep) -> LoadStep:
+    if len(before.wrenches) != len(after.wrenches):
+        return before
+    wrenches = tuple(
+        Wrench(
+            b.body,
+            0.5 * (a.point + b.point),
+            0.5 * (a.force + b.force),
+            0.5 * (a.moment + b.moment),
+        )
+        for a, b in zip(before.wrenches, after.wrenches, strict=True)
+    )
+    timed = before.time is not None and after.time is not None
+    time = 0.5 * (before.time + after.time) if timed else None  # type: ignore[operator]
+    return replace(before, wrenches=wrenches, time=time)
+
+
+def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
+    """The largest moment, and the largest force, of any test along axes that no test has."""
+    loads = [load for one in tests for load in _large(one.case)]
+    for start in (3, 0):
+        sizes = [float(np.linalg.norm(peak(one.case)[start : start + 3])) for one in tests]
+        template = tests[int(np.argmax(sizes))] if sizes else None
+        if template is None or not _mostly(peak(template.case), start):
+            continue
+        once = replace(template, count=np.minimum(template.count, 1))
+        for axis in range(3):
+            for sign, name in zip((1.0, -1.0), DIRECTIONS[start, axis], strict=True):
+                direction = np.zeros(6)
+                direction[start + axis] = sign
+                if not any(_along(load, direction) for load in loads):
+                    case = replace(_turned(template.case, start, axis, sign), test=name)
+                    loads += _large(case)  # a test to both sides needs no other
+                    yield Run(f"new test: {name}", replace(once, case=case), zeroed)
+
+
+def _large(case: LoadCase) -> list[Array]:
+    loads = summed_loads(case)
+    size = float(np.linalg.norm(peak(case)))
+    return [load for load in loads if np.linalg.norm(load) >= HALF * size > 0.0]
+
+
+def _mostly(load: Array, start: int) -> bool:
+    """Whether a load (6,) is mostly a moment (start 3) or a force (start 0)."""
+    return bool(np.linalg.norm(load[start : start + 3]) > HALF * np.linalg.norm(load) > 0.0)
+
+
+def _along(load: Array, direction: Array) -> bool:
+    return bool(load @ direction >= ALONG * np.linalg.norm(load))
+
+
+def _turned(case: LoadCase, start: int, axis: int, sign: float) -> LoadCase:
+    """The moments, or forces, of a case with their size along one axis; the others as they are.
+
+    The side of each step is that of its load along the largest one.
+    """
+    largest = peak(case)
+    steps = []
+    for step, load in zip(case.steps, summed_loads(case), strict=True):
+        side = sign * float(np.sign(load @ largest))
+        wrenches = tuple(_one_way(w, start, axis, side) for w in step.wrenches)
+        steps.append(replace(step, wrenches=wrenches))
+    return replace(case, steps=tuple(steps))
+
+
+def _one_way(wrench: Wrench, start: int, axis: int, side: float) -> Wrench:
+    along = side * np.eye(3)[axis]
+    if start:
+        moment = float(np.linalg.norm(wrench.moment)) * along
+        return Wrench(wrench.body, wrench.point, wrench.force, moment)
+    return Wrench(
+        wrench.body, wrench.point, float(np.linalg.norm(wrench.force)) * along, wrench.moment
+    )
