@@ -1,41 +1,38 @@
 """The verdict in one sentence, how sure it is, and what else a reader should know."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import pandas as pd
 
 from spinepipe.report.page.document import Results
-from spinepipe.report.words import capital, count, fixed, listed, number, plain
+from spinepipe.report.words import capital, fixed, listed, number
+from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
 from spinepipe.studies.discrepancy.quantities import quantities
-from spinepipe.studies.discrepancy.tables import MODELS
+from spinepipe.studies.discrepancy.unnamed_words import (
+    described,
+    more_stays,
+    of_another_coordinate,
+    shape_sentence,
+    what_stays,
+    why_no_name,
+    why_not_all,
+    without_a_name,
+)
 from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Reason, Verdict
 from spinepipe.studies.discrepancy.words import (
     called,
     differing,
     general,
-    motion_of,
     readable,
     what_of,
     with_article,
 )
 
-BASE, WITH_EFFECTS = MODELS
-
-_SPREADS = {
-    ", each joint of each specimen": ", of its own in each joint of each specimen",
-    ", by joint": ", of its own in each joint",
-    ", shared": ", alike in all joints and specimens",
-}
-"""How a shape differs between places, in the words of results and of the page."""
-
 _MOST_EASY, _MOST_HARD, _MOST_ALIKE, _MOST_TESTS = 4, 3, 2, 3
 _ALIKE = 0.3
 """Share of an effect's gap from which another is said to be like it."""
 
-_MOST_PLACES, _MOST_SIZES = 3, 4
-_BY_CHANCE = 0.025
-"""Of places with noise alone, the share whose 95 % interval lies above it."""
+_MOST_SIZES = 4
 
 NUISANCES = (
     "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
@@ -51,84 +48,11 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
     where : rows of the table of that name.
     """
     if verdict.verdict is Answer.UNKNOWN:
-        return _unknown(verdict, where)
+        return without_a_name(verdict, where)
     if verdict.verdict is Answer.NULL:
         return _nothing(verdict)
-    if verdict.verdict is Answer.SET:
-        return _one_of(verdict)
-    told = _lacks(verdict.effects)
-    return f"{told} {_stays(verdict, where)}" if verdict.verdict is Answer.PART else told
-
-
-def _stays(verdict: Verdict, where: pd.DataFrame) -> str:
-    """That the effects are not all, how much stays, and where most."""
-    told = "That is a part of what is missing: more stays"
-    gap = None if verdict.part is None else verdict.part.left_gap
-    told += "" if gap is None else f", a gap of {fixed(gap)} noise SD"
-    first = _shown_most(_worst(where, WITH_EFFECTS), _coordinate(verdict))
-    return f"{told}." if first is None else f"{told}, most at {_place(first)}."
-
-
-def _unknown(verdict: Verdict, where: pd.DataFrame) -> str:
-    if verdict.reason is Reason.NO_BASE:
-        return "Nothing can be said of what is missing: the base model cannot be fitted."
-    if verdict.reason is Reason.DATA_ERRORS:
-        return f"{capital(readable(verdict.why)).rstrip('.')}."
-    told = "Something is missing, but no name is believed."
-    if _of_unknown_shape(verdict):
-        told = "Something is missing that is none of the known effects."
-    first = _shown_most(_worst(where), _coordinate(verdict))
-    return told if first is None else f"{told} It shows most at {_place(first)}."
-
-
-def _place(row: Mapping[str, Any]) -> str:
-    return f"{row['joint']}, {motion_of(row['coordinate'])}, test {plain(row['test'])}"
-
-
-def _coordinate(verdict: Verdict) -> str | None:
-    """The coordinate that the page describes the shape of, if it does."""
-    if verdict.part is not None:
-        return verdict.part.coordinate
-    told = verdict.unknown if _of_unknown_shape(verdict) else None
-    return None if told is None else told.coordinate
-
-
-def _shown_most(worst: pd.DataFrame, coordinate: str | None) -> Mapping[str, Any] | None:
-    """The place of the largest gap above the noise, in the coordinate of the shape if any is."""
-    of_shape = worst[worst["coordinate"] == coordinate] if len(worst) else worst
-    rows = (of_shape if len(of_shape) else worst).head(1).to_dict("records")
-    return {str(key): value for key, value in rows[0].items()} if rows else None
-
-
-def _of_unknown_shape(verdict: Verdict) -> bool:
-    """Whether the reason for no name is what generic shapes explain and known effects do not."""
-    return not _shape_of(verdict) or verdict.reason in (
-        Reason.NO_KNOWN_EFFECT,
-        Reason.A_PART_STAYS,
-        Reason.MOST_STAYS,
-    )
-
-
-def _shape_of(verdict: Verdict) -> str:
-    """What is missing, or stays, as generic shapes see it; empty where they see nothing."""
-    if verdict.part is not None:
-        return verdict.part.left_shape or ""
-    return "" if verdict.unknown is None else verdict.unknown.shape or ""
-
-
-def _worst(where: pd.DataFrame, model: str = BASE) -> pd.DataFrame:
-    """Of these, those whose gap is above the noise, largest first."""
-    rows = _at_places(where, model)
-    if rows.empty:
-        return rows
-    return rows[rows["gap_low"] > 0.0].sort_values("gap", ascending=False, kind="stable")
-
-
-def _at_places(where: pd.DataFrame, model: str) -> pd.DataFrame:
-    """Rows of a model at each joint and coordinate in each test."""
-    if where.empty:
-        return where
-    return where[(where["by"] == "joint x coordinate x test") & (where["model"] == model)]
+    told = _one_of(verdict) if verdict.verdict is Answer.SET else _lacks(verdict.effects)
+    return f"{told} {more_stays(verdict, where)}".strip()
 
 
 def _nothing(verdict: Verdict) -> str:
@@ -157,9 +81,9 @@ def how_sure(verdict: Verdict) -> str:
     """Evidence, margin to the runner-up, and what held-out motion says."""
     parts = [
         *(_evidence(effect, verdict) for effect in verdict.effects),
-        _why_unknown(verdict),
-        _why_more(verdict),
-        _shape(verdict),
+        why_no_name(verdict),
+        why_not_all(verdict),
+        shape_sentence(verdict),
         _misfit(verdict),
         _closed(verdict),
     ]
@@ -174,30 +98,6 @@ def _evidence(effect: Missing, verdict: Verdict) -> str:
         first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
         told += f"; next best {general(first.name)}, {number(first.log_evidence_margin, 2)} behind"
     return f"{told}."
-
-
-def _why_unknown(verdict: Verdict) -> str:
-    """Why no name is given, where that is more than the shape of what is missing."""
-    if verdict.reason in (None, Reason.NO_KNOWN_EFFECT, Reason.DATA_ERRORS):
-        return ""  # or the headline says it
-    return f"Why no name: {readable(verdict.why).rstrip('.')}."
-
-
-def _why_more(verdict: Verdict) -> str:
-    """Why it is not said that nothing else is missing."""
-    reasons = () if verdict.part is None else verdict.part.reasons
-    told = "; ".join(readable(one).rstrip(".") for one in reasons)
-    return f"Why that is not all: {told}." if told else ""
-
-
-def _shape(verdict: Verdict) -> str:
-    if verdict.reason is Reason.NO_BASE or not _of_unknown_shape(verdict):
-        return ""
-    of = "The shape of what stays" if verdict.part is not None else "Its shape"
-    shape = readable(_shape_of(verdict)).rstrip(".")
-    for spread, words in _SPREADS.items():
-        shape = shape.removesuffix(spread) + words if shape.endswith(spread) else shape
-    return f"{of}: {shape}." if shape else ""
 
 
 def _misfit(verdict: Verdict) -> str:
@@ -233,13 +133,15 @@ def warnings(verdict: Verdict) -> tuple[str, ...]:
 
 def findings(verdict: Verdict, results: Results) -> list[str]:
     """The sentences, without those that there is nothing to say for."""
+    where = results.table("where")
     told = [
         *_sizes(verdict),
         would_have_been_seen(verdict),
-        _before_and_after(results.table("where")),
-        _where(results.table("where")),
-        _left(verdict, results.table("where")),
-        _of_another_coordinate(verdict, results.table("where")),
+        before_and_after(where),
+        where_most(where),
+        what_stays(verdict, where),
+        of_another_coordinate(verdict, where),
+        *described(verdict),
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
         not_testable(verdict),
@@ -258,67 +160,6 @@ def _sizes(verdict: Verdict) -> Iterator[str]:
             spread = f"; {differing(effect)}" if differing(effect) else ""
             told = ", ".join(sizes[:_MOST_SIZES])
             yield f"{capital(called(effect))}: {told}{more}{spread}."
-
-
-def _before_and_after(where: pd.DataFrame) -> str:
-    """The gap over all readings, without and with the effects."""
-    rows = where[(where["by"] == "all") & where["gap"].notna()] if len(where) else where
-    sizes = {
-        row["model"]: f"{fixed(row['gap'])} ({fixed(row['gap_low'])} to {fixed(row['gap_high'])})"
-        for row in rows.to_dict("records")
-    }
-    if "base" not in sizes:
-        return ""
-    told = f"Gap over all readings, in noise SD (95 % interval): {sizes['base']} with the base"
-    after = sizes.get("with_effects", sizes["base"])
-    return f"{told}." if after == sizes["base"] else f"{told}, {after} with the effects."
-
-
-def _where(where: pd.DataFrame) -> str:
-    """The places of the largest gap of the base that is above the noise."""
-    if where.empty:
-        return ""
-    chosen, ordered = _at_places(where, BASE), _worst(where)
-    if ordered.empty:
-        return "Base model and measurement agree within the noise at every joint in every test."
-    above = f"{len(ordered)} of {count(len(chosen), 'place')}"
-    chance = fixed(_BY_CHANCE * len(chosen), 0)
-    return (
-        f"Where the base is off most (gap in noise SD, 95 % interval): {_places(ordered)}. "
-        f"The gap is above the noise at {above}; noise alone would do that at about {chance}."
-    )
-
-
-def _left(verdict: Verdict, where: pd.DataFrame) -> str:
-    """The places of the largest gap that stays with the effects."""
-    if verdict.part is None:
-        return ""
-    ordered = _worst(where, WITH_EFFECTS)
-    if ordered.empty:
-        return "With the effects no single place is above the noise by itself."
-    return f"What stays with the effects (gap in noise SD, 95 % interval): {_places(ordered)}."
-
-
-def _places(ordered: pd.DataFrame) -> str:
-    """The first of these places, each with its gap."""
-    return "; ".join(
-        f"{row['joint']} in {motion_of(row['coordinate'])}, test {plain(row['test'])}: "
-        f"{fixed(row['gap'], 1)} ({fixed(row['gap_low'], 1)} to {fixed(row['gap_high'], 1)})"
-        for row in ordered.head(_MOST_PLACES).to_dict("records")
-    )
-
-
-def _of_another_coordinate(verdict: Verdict, where: pd.DataFrame) -> str:
-    """That the shape that is told of is not that of the largest gap, where it is not."""
-    coordinate = _coordinate(verdict)
-    worst = _worst(where, BASE if verdict.part is None else WITH_EFFECTS)
-    if coordinate is None or worst.empty or worst["coordinate"].iloc[0] == coordinate:
-        return ""
-    most = motion_of(worst["coordinate"].iloc[0])
-    return (
-        f"The shape that explains most is one of {motion_of(coordinate)}, though the largest gap "
-        f"is in {most}: it does not tell what happens in {most}."
-    )
 
 
 def _noise(verdict: Verdict) -> str:

@@ -362,3 +362,95 @@ def test_every_figure_has_a_caption_and_a_title(tmp_path: Path) -> None:
     assert list(files.figures) == FIGURES
     assert all((ROOT / path).read_text().strip() for path in files.captions())
     assert all(figure.title for figure in KIND.figures)
+
+
+def test_what_stays_beside_what_is_certain() -> None:
+    part = verdict_of(VERDICTS["PART"])
+    words = how_sure(part)
+    assert "Why that is not all: a gap of 2.4 noise SD in axial rotation" in words
+    assert "The shape of what stays: load over the joint's own axial rotation, alike in" in words
+    said = told("PART").replace("\u00a0", " ")
+    assert (
+        "What stays with the effects (gap in noise SD, 95 % interval): L3L4 in axial rotation, "
+        "test left axial rotation: 2.4 (1.9 to 3.0)." in said
+    )
+    assert "half width 1.55°" in said  # and how large what is certain is
+    inside = frames("PART")["where"].assign(gap_low=0.0)
+    assert headline(part, inside).endswith("more stays, a gap of 1.20 noise SD.")
+    known = VERDICTS["PART"]["part"] | {"left_gap": None, "left_shape": None, "coordinate": None}
+    bare = verdict_of(VERDICTS["PART"] | {"part": known})
+    assert headline(bare, NOWHERE).endswith("That is a part of what is missing: more stays.")
+    assert "shape" not in how_sure(bare)
+
+
+def test_a_set_may_stand_beside_what_is_certain_and_more_stay() -> None:
+    tied = ["hysteresis", "creep"]
+    both = VERDICTS["PART"] | {"verdict": "SET", "candidates_in_set": tied}
+    words = headline(verdict_of(both), frames("PART")["where"])
+    assert words.startswith("The model lacks a neutral zone at L4L5, in flexion–extension. Besides")
+    assert "hysteresis or creep" in words
+    assert "more stays, a gap of 1.20 noise SD, most at L3L4, axial rotation" in words
+
+
+def test_no_sentence_describes_one_motion_and_points_to_another() -> None:
+    where = frames("UNKNOWN")["where"]
+    unknown = {
+        "where": "L4L5, anterior (gap 9.3)",
+        "shape": "readings of left rotation that drift over the steps of a test, shared",
+        "reason": "no_known_effect",
+        "coordinate": "left_rotation",
+    }
+    drifting = verdict_of(VERDICTS["UNKNOWN"] | {"unknown": unknown})
+    apart = " ".join(findings(drifting, rows_of(frames("UNKNOWN"))))
+    assert headline(drifting, where).endswith("at L4L5, flexion–extension, test flexion.")
+    assert "one of axial rotation, though the largest gap is in flexion–extension" in apart
+    small = (where["joint"] == "L3L4") & (where["coordinate"] == "left_rotation")
+    both = where.assign(
+        gap=where["gap"].where(~small, 1.5), gap_low=where["gap_low"].where(~small, 1.0)
+    )
+    assert "at L3L4, axial rotation" in headline(drifting, both)  # where the shape is, if it shows
+    same = verdict_of(
+        VERDICTS["UNKNOWN"] | {"unknown": unknown | {"coordinate": "extension", "shape": "own"}}
+    )
+    assert "though the largest gap" not in " ".join(findings(same, rows_of(frames("UNKNOWN"))))
+
+
+def test_no_advice_is_given_where_none_helps() -> None:
+    none = {
+        "name": "facet_contact",
+        "why": "no trace; no single addition",
+        "test_that_would_tell": "",
+    }
+    some = VERDICTS["NULL"]["not_testable"]
+    words = told("NULL", not_testable=[*some, none])
+    assert "No single addition that was tried shows contact (stop)." in words
+    assert "contact (stop): " not in words
+    only = told("NULL", not_testable=[none])
+    assert "What would show them" not in only
+
+
+def test_a_formula_describes_and_names_nothing() -> None:
+    term = {
+        "specimen": "*",
+        "joint": "L4L5",
+        "coordinate": "right_bending",
+        "acts": "load",
+        "term": "bending x extension",
+        "coefficient": 2.0,
+        "sd": 0.1,
+        "unit": "N m",
+        "explained": 0.8,
+    }
+    formula = {
+        "terms": [term],
+        "text": "moment in right bending at L4L5 = +2 (SD 0.1) N m * bending x extension",
+        "explained": 0.83,
+        "held_out_closed": 0.7,
+        "threshold": 20.0,
+    }
+    unknown = VERDICTS["UNKNOWN"]["unknown"] | {"formula": formula}
+    table = {"place": "load in right_bending at L4L5", "gap": 0.3, "held_out_closed": None}
+    words = told("UNKNOWN", unknown=unknown, tabulated=table).replace("\u00a0", " ")
+    assert "A formula that describes it, and is no name: moment in lateral bending at L4L5" in words
+    assert "explains 83 % of what is above the noise, and closes 70 % in readings left out" in words
+    assert "leaves a gap of 0.30 noise SD." in words
