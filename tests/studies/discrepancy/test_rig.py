@@ -4,6 +4,7 @@ The data are made by one line of algebra, F = k q (1 + c q^2), with all rotation
 """
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,16 @@ from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.rows import _as_load, _rig
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.investigation import Prepared, _laid, prepared
+from spinepipe.studies.discrepancy.search.investigation import (
+    Investigation,
+    Prepared,
+    _laid,
+    investigate,
+    prepared,
+)
+from spinepipe.studies.discrepancy.search.model_files import fitted_values
 from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import Answer
 
 STEPS_MM = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 1.4, 0.6])
 STIFFNESS, FORCE_SD, MOTION_SD = 6e4, 1.0, 0.02
@@ -53,25 +62,28 @@ def force(q_mm: np.ndarray, growth_per_mm2: float) -> np.ndarray:
     return STIFFNESS * q_mm * 1e-3 * (1.0 + growth_per_mm2 * q_mm**2)
 
 
-def written(folder: Path, growth_per_mm2: float, noise_n: float = 0.0) -> tuple[Cohort, np.ndarray]:
-    """The cohort, and the forces (tests, T) N that its machine measured."""
+def written(
+    folder: Path, growth_per_mm2: float, noise_n: float = 0.0, specimens: str = "a"
+) -> tuple[Cohort, np.ndarray]:
+    """The cohort, and the forces (specimens x tests, T) N that its machine measured."""
     rng = np.random.default_rng(5)
     folder = folder / "rig"
     folder.mkdir()
     loads = ["specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm"]
     motion = ["specimen,test,step,joint,anterior_mm,superior_mm,right_mm"]
     forces = []
-    for test, side in (("anterior", 1.0), ("posterior", -1.0)):
+    for name, (test, side) in product(specimens, (("anterior", 1.0), ("posterior", -1.0))):
         q = side * STEPS_MM
         measured = force(q, growth_per_mm2) + noise_n * rng.normal(size=len(q))
         forces.append(measured)
         for step, (f, at) in enumerate(zip(measured, q, strict=True)):
-            loads.append(f"a,{test},{step},C6,{f:.12g},0,0,0,0,0,0,0,0")
-            motion.append(f"a,{test},{step},C6C7,{at:g},0,0")
+            loads.append(f"{name},{test},{step},C6,{f:.12g},0,0,0,0,0,0,0,0")
+            motion.append(f"{name},{test},{step},C6C7,{at:g},0,0")
     (folder / "cohort.yaml").write_text(YAML)
-    (folder / "specimens.csv").write_text("specimen\na\n")
+    (folder / "specimens.csv").write_text("\n".join(["specimen", *specimens]) + "\n")
     header = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg"
-    (folder / "joints.csv").write_text(f"{header}\na,C6C7,0,0,0,0,0,0\n")
+    poses = [f"{name},C6C7,0,0,0,0,0,0" for name in specimens]
+    (folder / "joints.csv").write_text("\n".join([header, *poses]) + "\n")
     (folder / "loads.csv").write_text("\n".join(loads) + "\n")
     (folder / "motion.csv").write_text("\n".join(motion) + "\n")
     (folder / "supports.csv").write_text(SUPPORTS)
@@ -158,3 +170,28 @@ def test_kinds_that_know_no_rig_refuse_the_cohort(tmp_path: Path) -> None:
     told: list[Problem] = [p for p in caught.value.problems if "supports.csv" in p.found]
     assert len(told) == 1
     assert "discrepancy" in told[0].allowed
+
+
+def searched(folder: Path, growth_per_mm2: float) -> Investigation:
+    """A search among a few effects for what the machine's forces show."""
+    cohort, _ = written(folder, growth_per_mm2, FORCE_SD, "abcd")
+    few = ("nonlinear_stiffening", "neutral_zone", "flexion_extension_asymmetry")
+    study = STUDY.model_copy(update={"effects": few})
+    return investigate(prepared(study, cohort, None), plain_run)
+
+
+def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) -> None:
+    """With the growth that made the forces, 0.15 per mm2, in its interval."""
+    found = searched(tmp_path, 0.15)
+    assert found.ended.verdict is Answer.NAMED
+    (standing,) = found.ended.named
+    assert standing.name == "nonlinear_stiffening"
+    assert dict(standing.supposed.form.variant.options)["coordinate"] == "anterior"
+    growth = next(v for v in fitted_values(found.found.final.fit, 0) if v.name == "growth")
+    assert growth.unit == "1/m^2"
+    assert growth.low < 0.15e6 < growth.high
+    assert growth.high - growth.low < 0.1 * growth.value
+
+
+def test_a_machine_that_measures_a_straight_line_shows_nothing(tmp_path: Path) -> None:
+    assert searched(tmp_path, 0.0).ended.verdict is Answer.NULL
