@@ -1,23 +1,27 @@
-"""Load offset: a constant moment on the top vertebra that is not listed (sensor bias, cable)."""
+"""Load offset: a constant load on the top vertebra that is not listed (sensor bias, cable)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.vertebra_points import centres
+from spinepipe.units import TRANSLATIONS
 
-TYPICAL_NM = 0.3
+TYPICAL_NM, LARGEST_NM = 0.3, 10.0
+TYPICAL_N, LARGEST_N = 5.0, 200.0
 
 
 def _moment(axis: str) -> Parameter:
     return Parameter(
         name=f"moment_{axis}",
         unit="N m",
-        low=-10.0,
-        high=10.0,
+        low=-LARGEST_NM,
+        high=LARGEST_NM,
         default=TYPICAL_NM,
         prior_scale=TYPICAL_NM,
         logarithmic=False,
@@ -26,36 +30,77 @@ def _moment(axis: str) -> Parameter:
     )
 
 
+def _force(direction: str) -> Parameter:
+    return Parameter(
+        name="force",
+        unit="N",
+        low=-LARGEST_N,
+        high=LARGEST_N,
+        default=TYPICAL_N,
+        prior_scale=TYPICAL_N,
+        logarithmic=False,
+        meaning=f"extra force towards {direction} in ground",
+        off=0.0,
+    )
+
+
+_MOMENTS = tuple(map(_moment, "xyz"))
+
+
 @register("load_offset")
 @dataclass(frozen=True)
 class LoadOffset(DeadLoad):
-    """A moment fixed in ground on the most cranial vertebra in scope, in every step; off at 0.
+    """A load fixed in ground on the most cranial vertebra in scope, in every step; off at 0.
 
-    It acts in unloaded steps too: all motion is from the pose without it.
+    Without a coordinate a moment; with one (a translation) a force at the vertebra's centre along
+    the ground axis that points that way: anterior x, superior y, right z. It acts in unloaded
+    steps too: all motion is from the pose without it.
     """
+
+    coordinate: str | None = None
 
     name: ClassVar[str] = "load_offset"
     kind: ClassVar[Kind] = Kind.LOAD
     per_joint: ClassVar[bool] = False
-    parameters: ClassVar[tuple[Parameter, ...]] = tuple(map(_moment, "xyz"))
     trial: ClassVar[Trial] = Trial(
-        variants=({},),
+        variants=({}, *({"coordinate": c} for c in TRANSLATIONS)),
         spreads=(Spread.SHARED, Spread.BY_SPECIMEN, Spread.BY_TEST),
         told_by="readings not zeroed at the unloaded step; if zeroed, a joint that is not linear, "
         "or loads large enough to turn the vertebrae in the moment",
     )
 
+    def __post_init__(self) -> None:
+        if self.coordinate is not None:
+            require(self.name, "coordinate", self.coordinate, TRANSLATIONS)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Three components of the moment, or the force."""
+        return _MOMENTS if self.coordinate is None else (_force(self.coordinate),)
+
     def wrenches(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
     ) -> Wrenches:
-        """The moment on the most cranial vertebra."""
-        moments = parameters[..., None, :]
-        bodies = np.full(moments.shape[:-1], int(joints.max()))
-        return Wrenches(bodies, np.zeros(moments.shape), np.zeros(moments.shape), moments)
+        """The load on the most cranial vertebra."""
+        top = int(joints.max())
+        zeros = np.zeros((*parameters.shape[:-1], 1, 3))
+        bodies = np.full(zeros.shape[:-1], top)
+        if self.coordinate is None:
+            return Wrenches(bodies, zeros, zeros, parameters[..., None, :])
+        points = np.broadcast_to(centres(neutral)[..., [top], :], zeros.shape)
+        return Wrenches(bodies, points, parameters[..., None] * self._axis, zeros)
 
     def slopes(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
     ) -> WrenchSlopes:
-        """The moment itself is what the parameters are."""
-        shape = (*parameters.shape[:-1], 1, 3, 3)
-        return WrenchSlopes(np.zeros(shape), np.broadcast_to(np.eye(3), shape))
+        """The load itself is what the parameters are."""
+        shape = (*parameters.shape[:-1], 1, 3, parameters.shape[-1])
+        zeros = np.zeros(shape)
+        if self.coordinate is None:
+            return WrenchSlopes(zeros, np.broadcast_to(np.eye(3), shape))
+        return WrenchSlopes(np.broadcast_to(self._axis[:, None], shape), zeros)
+
+    @property
+    def _axis(self) -> Array:
+        """(3,) of ground; of a force alone."""
+        return np.eye(3)[TRANSLATIONS.index(str(self.coordinate))]

@@ -36,6 +36,7 @@ EFFECTS = {
     "forces askew": ("load_misalignment", {"turns": "forces"}, (0.06, -0.04, 0.05)),
     "gain": ("load_gain", {}, (0.05,)),
     "offset": ("load_offset", {}, (0.3, -0.2, 0.4)),
+    "force offset": ("load_offset", {"coordinate": "right"}, (8.0,)),
 }
 
 
@@ -296,6 +297,15 @@ def test_offset_is_one_more_moment_also_without_load() -> None:
     assert_same_motion("offset", case=case, instead=system_with(case=more))
     unloaded = reported(system_with(effect_of("offset"), case=case))[0]
     assert np.rad2deg(np.abs(unloaded - reported(system_with(case=case))[0]).max()) > 0.1
+
+
+def test_a_force_offset_is_one_more_force_at_the_centre_of_the_top() -> None:
+    model = spine(3)
+    point, force = model.bodies[TOP].com, np.array([0.0, 0.0, 8.0])
+    case = with_wrenches(loaded(model), lambda w: (*w, Wrench(TOP, point, force, NOWHERE)))
+    assert_same_motion("force offset", instead=system_with(case=case))
+    with pytest.raises(ValueError, match="coordinate 'extension' is not one of anterior"):
+        create("load_offset", {"coordinate": "extension"})
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -242,6 +242,13 @@ def test_loose_markers_are_found_by_the_scatter_between_cycles(specimens: str, w
     assert (error.where, error.what) == (where, "markers of the joint")
 
 
+def test_one_of_two_joints_may_have_loose_markers_in_all_specimens() -> None:
+    clean = readings(3, joints=2)
+    (error,) = before_a_fit(changed(clean, shaken("abc", 1, 8.0)), JOINTS[:2], SDS, zeroed=False)
+    assert (error.where, error.what) == ("all specimens, L4L5", "markers of the joint")
+    assert before_a_fit(clean, JOINTS[:2], SDS, zeroed=False) == ()
+
+
 def test_a_joint_that_is_half_as_noisy_again_is_not_suspected() -> None:
     assert suspected(changed(readings(3), shaken("b", 2, 1.5))) == ()
 

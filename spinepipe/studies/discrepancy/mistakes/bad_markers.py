@@ -29,7 +29,7 @@ CHANCE = 1e-3
 """Of one false alarm in any place, were scatter the same everywhere."""
 
 USUAL_QUANTILE = 0.4
-"""Of the places' scatter: the usual one, even where nearly half of the places are bad."""
+"""Of the places' scatter: the usual one, even where half of the places are bad."""
 
 HARDLY = 0.1
 """Share of a joint's squared load of a kind up to which a coordinate counts as hardly loaded."""
@@ -66,7 +66,7 @@ def bad_markers(
         at = tuple(place)
         limit = f_distribution.isf(CHANCE / places, freedom[at], freedom.sum() - freedom[at])
         bad[at] = together[at] > max(MANY_TIMES, float(np.sqrt(limit)))
-    if bad.mean() >= 0.5:
+    if bad.mean() > 0.5:
         return []
     return _told(bad, together, specimens, joints)
 
@@ -92,8 +92,9 @@ def _usual(sd: Array) -> Array:
     found = np.full(6, np.nan)
     for coordinate in range(6):
         values = flat[np.isfinite(flat[:, coordinate]), coordinate]
-        if len(values) >= 3 and np.quantile(values, USUAL_QUANTILE) > 0.0:
-            found[coordinate] = np.quantile(values, USUAL_QUANTILE)
+        if len(values) >= 3:
+            usual = np.quantile(values, USUAL_QUANTILE, method="lower")
+            found[coordinate] = usual if usual > 0.0 else np.nan
     return found
 
 
