@@ -9,9 +9,10 @@ from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.studies.discrepancy.search.base import base_parameters
 from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant, base_parameters
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.inquiry import Found
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit

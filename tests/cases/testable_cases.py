@@ -9,16 +9,9 @@ from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.seen import seen_in
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
+from spinepipe.studies.discrepancy.search.base import BUSHING, DAMPING, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import (
-    BUSHING,
-    DAMPING,
-    Form,
-    Trials,
-    Variant,
-    base_parameters,
-    trials,
-)
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.prediction import Simulated

@@ -37,10 +37,11 @@ from spinepipe.studies.discrepancy.rows import (
     held_out_rows,
     where_rows,
 )
+from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.beyond import Beyond, beyond
 from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.hypothesis import BUSHING, Form
+from spinepipe.studies.discrepancy.search.hypothesis import Form
 from spinepipe.studies.discrepancy.search.imperfections import TakenUp, taken_up
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import (

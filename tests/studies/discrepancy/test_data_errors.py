@@ -12,12 +12,9 @@ from spring_chain_cases import JOINTS, SD, THERE_AND_BACK, Array, Yield, changed
 from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
+from spinepipe.studies.discrepancy.search.base import base_model, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import (
-    base_model,
-    base_parameters,
-    trials,
-)
+from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.inquiry import look
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors

@@ -12,6 +12,7 @@ from spinepipe.effects import Spread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
 from spinepipe.statics import moved
+from spinepipe.studies.discrepancy.search.base import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
     Form,
     Hypothesis,
@@ -19,7 +20,6 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Supposed,
     Unknown,
     Variant,
-    base_parameters,
     hypothesis,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit

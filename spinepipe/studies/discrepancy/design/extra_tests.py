@@ -33,8 +33,9 @@ from spinepipe.studies.discrepancy.design.plans import (
 )
 from spinepipe.studies.discrepancy.design.seen import Seen, candidates, seen
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
+from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import PER_SPECIMEN, Trials, base_parameters
+from spinepipe.studies.discrepancy.search.hypothesis import Trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
@@ -153,7 +154,7 @@ def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequen
     names = [name for name, there in zip(COORDINATES, read, strict=True) if there]
     solved = Solved(model, [one.case for one in plan.tests], plan.zeroed)
     plain = whitening(repeats, _noise(place, plan, read))
-    white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, tests))
+    white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, names))
     free = base_parameters(model, plan.grouping, names)
     return seen(solved, free, plain, white, candidates(trials, model.n_joints, tests))
 

@@ -18,12 +18,12 @@ from spinepipe.studies.discrepancy.design.extra_tests import PRELOAD, Bench
 from spinepipe.studies.discrepancy.design.patterns import Fitted, Pattern
 from spinepipe.studies.discrepancy.design.plans import Plan, Planned, as_made, thinned
 from spinepipe.studies.discrepancy.design.runs import Run, runs
-from spinepipe.studies.discrepancy.search.hypothesis import (
-    LOG_STIFFNESS_SD,
+from spinepipe.studies.discrepancy.search.base import (
     PER_SPECIMEN,
     base_parameters,
     bushing_stiffness,
 )
+from spinepipe.studies.discrepancy.search.hypothesis import LOG_STIFFNESS_SD
 from spinepipe.studies.discrepancy.search.imperfections import labels_of
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_labels, nuisance_signatures
@@ -221,17 +221,24 @@ def _among_all(fit: JointFit, name: str, own: Array) -> Array:
     return whole
 
 
-def refitted_gain(pattern: Fitted, place: Bench, words: str) -> float | None:
-    """The gain of a run with the fitted model refitted, nonlinearly, to what the other predicts.
+def refitted_gains(pattern: Fitted, place: Bench, every: Sequence[str]) -> dict[str, float]:
+    """The gain of runs with the fitted model refitted, nonlinearly, to what the other predicts.
 
-    A model of many shapes bends further than its tangent. None where there is no such fit.
+    A model of many shapes bends further than its tangent. Runs without such a fit are left out.
     """
-    runs_of = {
-        name: next((run for run in _menu(place, name) if run.words == words), None)
-        for name in pattern.grounds.readings
-    }
-    now, more = _refitted(pattern, place, {}), _refitted(pattern, place, runs_of)
-    return None if now is None or more is None else 0.5 * max(0.0, more - now)
+    menus = {name: _menu(place, name) for name in pattern.grounds.readings}
+    now = _refitted(pattern, place, {})
+    found = {}
+    for words in every if now is not None else ():
+        of = {name: _named(words, menu) for name, menu in menus.items()}
+        more = _refitted(pattern, place, of)
+        if more is not None and now is not None:
+            found[words] = 0.5 * max(0.0, more - now)
+    return found
+
+
+def _named(words: str, menu: Sequence[Run]) -> Run | None:
+    return next((run for run in menu if run.words == words), None)
 
 
 def _refitted(pattern: Fitted, place: Bench, added: Mapping[str, Run | None]) -> float | None:

@@ -14,13 +14,9 @@ import numpy as np
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.proof.formula_folds import Chosen, proof_of_terms
+from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import (
-    Form,
-    Supposed,
-    Variant,
-    bushing_stiffness,
-)
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.law_terms import (
     READING,

@@ -16,9 +16,9 @@ from scipy.stats import t as student
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
+from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import bushing_stiffness
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
 from spinepipe.studies.discrepancy.search.refit import standing

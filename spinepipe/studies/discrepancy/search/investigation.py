@@ -12,13 +12,9 @@ from spinepipe.model.file import ModelFile
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
+from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
-from spinepipe.studies.discrepancy.search.hypothesis import (
-    PER_SPECIMEN,
-    base_model,
-    base_parameters,
-    trials,
-)
+from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (

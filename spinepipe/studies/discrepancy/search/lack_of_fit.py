@@ -18,8 +18,8 @@ from scipy.special import logsumexp
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
+from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import BUSHING
 from spinepipe.studies.discrepancy.search.prediction import Solved
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
