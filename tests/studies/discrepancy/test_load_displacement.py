@@ -11,6 +11,7 @@ from spinepipe.effects import Wrench
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.figures.load_displacement import (
+    drawn_once,
     driven,
     unloading,
     ways,
@@ -144,3 +145,12 @@ def test_a_loop_is_drawn_with_both_branches(tmp_path: Path) -> None:
 def test_nothing_to_draw_is_said(tmp_path: Path) -> None:
     gap = frames("NAMED")["gap"].assign(base=np.nan, with_effects=np.nan)
     assert "no pose" in said(drawn("load_displacement", tmp_path, "NAMED", gap=gap))
+
+
+def test_a_line_that_comes_back_on_itself_is_drawn_once() -> None:
+    load = np.array([0.0, 1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0, 0.0])
+    way = np.arange(9)
+    once = drawn_once(load, 0.5 * load, way)
+    assert (np.diff(load[once]) >= 0.0).all()
+    loop = 0.5 * load - 0.1 * np.array([0, 1, 1, 1, -1, -1, -1, -1, 1])
+    assert drawn_once(load, loop, way).tolist() == way.tolist()

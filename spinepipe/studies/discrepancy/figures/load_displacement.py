@@ -47,6 +47,9 @@ _PANEL_MM, _KEY_MM = 51.0, 18.0
 _JUMP = 2.0
 """Times the usual change of load from which a change of side is a jump."""
 
+_ROUNDING = 1e-3
+"""Share of the motion by which both branches of a line may differ."""
+
 _BACK = 0.02
 """Share of the largest load by which a load must fall for its step to be one of unloading."""
 
@@ -127,7 +130,10 @@ def _off(rows: pd.DataFrame) -> float:
 
 
 def unloading(load: Array) -> NDArray[np.bool_]:
-    """(T,) steps that were come to from a larger load to the same side, the way back to zero."""
+    """(T,) steps that were come to from a larger load to the same side, the way back to zero.
+
+    On a rig that moves a joint, the motion stands for the load.
+    """
     before = np.concatenate([load[:1], load[:-1]])
     least = _BACK * float(np.abs(load).max(initial=0.0))
     same_side = load * before >= 0.0
@@ -144,15 +150,17 @@ def _draw(axis: Axes, curve: Curve, with_effects: bool) -> bool:
     def placed(seen: Array, steps: Steps | NDArray[np.bool_]) -> tuple[Array, Array]:
         return (along[steps], seen[steps]) if on_a_rig else (seen[steps], load[steps])
 
-    back, noise = unloading(load), BAND_SD * rows["noise_sd"].to_numpy(float)
+    drive = along if on_a_rig else load
+    back, noise = unloading(drive), BAND_SD * rows["noise_sd"].to_numpy(float)
     fill_between = axis.fill_between if on_a_rig else axis.fill_betweenx
-    for way in ways(load):
+    for way in ways(drive):
         for steps in _branches(way, back):
             low, high = measured[steps] - noise[steps], measured[steps] + noise[steps]
-            across = along[steps] if on_a_rig else load[steps]
-            fill_between(across, low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
+            fill_between(drive[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
         for name in _LINES if with_effects else ("base",):
-            axis.plot(*placed(rows[name].to_numpy(float), way), zorder=3, **_LINES[name])
+            modelled = rows[name].to_numpy(float)
+            line = placed(modelled, drawn_once(drive, modelled, way))
+            axis.plot(*line, zorder=3, **_LINES[name])
     for chosen, fill in ((~back, BLACK), (back, WHITE)):
         axis.plot(*placed(measured, chosen), mfc=fill, zorder=5, **_DOT)
     axis.axhline(0.0, color=GREY, lw=0.4, zorder=0)
@@ -169,6 +177,14 @@ def ways(load: Array) -> list[Steps]:
     found: list[Steps] = np.split(np.arange(len(load)), jumps)
     unloaded = abs(load[0]) <= _BACK * float(np.abs(load).max(initial=0.0))
     return [np.r_[0, way] if unloaded and way[0] else way for way in found]
+
+
+def drawn_once(drive: Array, seen: Array, way: Steps) -> Steps:
+    """The steps in the order of what drives them, if that is one line: no dash is drawn twice."""
+    order: Steps = way[np.argsort(drive[way], kind="stable")]
+    rise = np.diff(seen[order])
+    least = _ROUNDING * float(np.ptp(seen[way]))
+    return way if (rise > least).any() and (rise < -least).any() else order
 
 
 def _branches(way: Steps, back: NDArray[np.bool_]) -> list[Steps]:
