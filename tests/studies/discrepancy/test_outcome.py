@@ -293,6 +293,14 @@ def test_rivals_within_the_margin_make_a_set() -> None:
     assert "creep, hysteresis or load_offset" in result.why
 
 
+def test_what_was_not_recorded_excludes_no_rival() -> None:
+    """Without times creep is never fitted: evidence for friction is none against creep."""
+    friction = stands("hysteresis", rivals=[("creep", 40.0)])
+    result = outcome(ended(friction), MARGIN, not_excluded={"hysteresis": ("creep",)})
+    assert (result.verdict, result.tied) == (Answer.SET, ("hysteresis", "creep"))
+    assert says(ended(friction))[0] == "NAMED"
+
+
 def test_beside_a_tie_what_is_sure_is_named() -> None:
     sure = stands("local_laxity")
     result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)

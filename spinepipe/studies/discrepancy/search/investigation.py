@@ -15,6 +15,7 @@ from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_ou
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
 from spinepipe.studies.discrepancy.search.hypothesis import trials
+from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
@@ -99,16 +100,29 @@ def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> 
         When the base has no fit, or nothing tells how large the noise is.
     """
     study, rules = ready.study, _rules(ready)
-    grounds = _laid(ready, run)
+    grounds = base_fitted(ready, run)
     found = search(grounds, rules, run, progress)
     for fit in (found.base.fit, found.final.fit):
         run(on_record, fit, grounds.readings)
     errors = suspected_errors(grounds, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
-    ended = outcome(found, study.margin, proof, errors)
+    ended = outcome(found, study.margin, proof, errors, _not_excluded(study, found))
     told = Investigation(grounds, rules, found, errors, proof, ended)
     return _with_sure_effects(told, asked, run)
+
+
+def _not_excluded(study: Discrepancy, found: Found) -> dict[str, tuple[str, ...]]:
+    """By each standing effect, others that what was recorded cannot exclude, if they are tried."""
+    cases = {name: one.cases for name, one in found.base.readings.items()}
+    return {
+        effect.name: tuple(
+            name
+            for name in cannot_be_excluded(effect.name, cases)
+            if study.effects is None or name in study.effects
+        )
+        for effect in found.standing
+    }
 
 
 def _with_sure_effects(one: Investigation, asked: Asked, run: Run) -> Investigation:
@@ -164,7 +178,7 @@ def _declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
     return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
 
 
-def _laid(ready: Prepared, run: Run) -> Grounds:
+def base_fitted(ready: Prepared, run: Run) -> Grounds:
     """Grounds with the base fitted."""
     study = ready.study
     start = np.array(study.stiffness.in_order(), dtype=float)

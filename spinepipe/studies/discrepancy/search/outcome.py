@@ -4,8 +4,9 @@ Each effect that stands is doubted by itself, on the coordinates that it loads: 
 says nothing against it, but forbids to say that it is all that is missing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
@@ -68,16 +69,18 @@ def outcome(
     margin: float,
     proof: HeldOut | None = None,
     errors: Sequence[SuspectedError] = (),
+    not_excluded: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Outcome:
     """What a search's end means.
 
     Parameters
     ----------
     proof : on data held out; None where none was asked for. errors : suspected in the data.
+    not_excluded : by effect, others that nothing recorded speaks for or against.
     """
     doubts = {number: _doubt(found, number, margin) for number in range(len(found.standing))}
     kept = [one for number, one in enumerate(found.standing) if doubts[number] is None]
-    tied = _tied(kept, margin)
+    tied = _tied(kept, margin, not_excluded)
     named = tuple(one for one in kept if one.name not in tied)
     first = next((doubt for doubt in doubts.values() if doubt is not None), None)
     unexplained = (
@@ -245,12 +248,15 @@ def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tup
     return tuple(dict.fromkeys(said))
 
 
-def _tied(standing: Sequence[Standing], margin: float) -> tuple[str, ...]:
-    """Effects with a rival that is not clearly behind, and these rivals."""
+def _tied(
+    standing: Sequence[Standing], margin: float, not_excluded: Mapping[str, Sequence[str]]
+) -> tuple[str, ...]:
+    """Effects with a rival that is not clearly behind, or not excluded, and these rivals."""
     names = {one.name for one in standing}
     tied: dict[str, None] = {}
     for one in standing:
-        close = [r.name for r in one.rivals if r.margin < margin and r.name not in names]
+        near = [rival.name for rival in one.rivals if rival.margin < margin]
+        close = [n for n in (*near, *not_excluded.get(one.name, ())) if n not in names]
         if close:
             tied |= dict.fromkeys([one.name, *close])
     return tuple(tied)
