@@ -103,9 +103,11 @@ FORCE = ("fx_n", "fy_n", "fz_n")
 def check_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     """Problems of ``loads.csv`` beyond its cells and names."""
     yield from _repeated_loads(draft, applied)
-    yield from _on_the_fixed_vertebra(draft)
-    yield from _partial_points(draft)
+    for stem in ("loads", "preload"):
+        yield from _on_the_fixed_vertebra(draft, stem)
+        yield from _partial_points(draft, stem)
     yield from _without_a_point(draft, applied)
+    yield from _preload(draft, applied)
     yield from _times(draft)
 
 
@@ -125,20 +127,36 @@ def _repeated_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Proble
             yield Problem(draft.file("loads"), load.line, None, found, allowed, remedy)
 
 
-def _on_the_fixed_vertebra(draft: Draft) -> Iterator[Problem]:
-    for line, (vertebra,) in draft.rows("loads", "vertebra"):
+def _preload(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+    """A preload belongs to a test, and to a point of a vertebra if it is a force."""
+    if "loads" not in draft.tables and "loads" not in draft.absent:
+        return
+    tests = ("*", *dict.fromkeys(load.test for load in applied))
+    for line, (test, *cells) in draft.rows("preload", "test", *POINT, *FORCE):
+        if isinstance(test, str) and test not in tests:
+            place = (draft.file("preload"), line, "test")
+            remedy = did_you_mean(test, tests, "add its loads, zeros where nothing else acts")
+            yield Problem(*place, f"unknown test '{test}'", one_of(tests), remedy)
+        if _pulls_without_a_point(tuple(cells)):
+            place = (draft.file("preload"), line, "px_mm")
+            remedy = "fill px_mm, py_mm, pz_mm"
+            yield Problem(*place, "a force without a point", "a force with a point", remedy)
+
+
+def _on_the_fixed_vertebra(draft: Draft, stem: str) -> Iterator[Problem]:
+    for line, (vertebra,) in draft.rows(stem, "vertebra"):
         if draft.vertebrae and vertebra == draft.vertebrae[0]:
-            place = (draft.file("loads"), line, "vertebra")
+            place = (draft.file(stem), line, "vertebra")
             found = f"a load on '{vertebra}', which is fixed to ground"
             allowed = "one of " + ", ".join(draft.vertebrae[1:])
             yield Problem(*place, found, allowed, "load a moving vertebra or delete the row")
 
 
-def _partial_points(draft: Draft) -> Iterator[Problem]:
-    for line, point in draft.rows("loads", *POINT):
+def _partial_points(draft: Draft, stem: str) -> Iterator[Problem]:
+    for line, point in draft.rows(stem, *POINT):
         missing = [name for name, value in zip(POINT, point, strict=True) if isnan(value)]
         if 0 < len(missing) < len(POINT):
-            place = (draft.file("loads"), line, missing[0])
+            place = (draft.file(stem), line, missing[0])
             remedy = "fill the cell; without all three the force would act elsewhere"
             yield Problem(*place, "an incomplete point", "all of px, py, pz or none", remedy)
 
@@ -234,7 +252,12 @@ def _problem(file: str, line: int, key: tuple[object, ...], tests: list[str]) ->
     return Problem(file, line, column, found, allowed, remedy)
 
 
-FOR_ALL = {("loads", "specimen"), ("supports", "specimen"), ("supports", "joint")}
+FOR_ALL = {
+    ("loads", "specimen"),
+    ("preload", "specimen"),
+    ("supports", "specimen"),
+    ("supports", "joint"),
+}
 """Tables and columns in which * stands for all."""
 
 SPECIMEN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")

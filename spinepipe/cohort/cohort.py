@@ -86,6 +86,7 @@ class Cohort:
     loads : ``specimen`` may be ``*`` (all); ``cycle`` is float64, NaN stands for every cycle.
     motion : ``cycle`` is int64, 1 where the file says nothing.
     supports : joint coordinates that rigs fix; names may be ``*``.
+    preload : loads that act before step 0 and all along; specimen and test may be ``*``.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
     digest : sha256 over the names and bytes of the files that were read.
@@ -108,6 +109,7 @@ class Cohort:
     digest: str
     further: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     supports: pd.DataFrame | None = None
+    preload: pd.DataFrame | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -148,7 +150,8 @@ class Cohort:
             "measurement_sd": None if sd is None else sd.model_dump(mode="json", exclude_none=True),
             "tests": self.tests,
         }
-        names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", "supports")
+        rigs = ("supports", "preload")
+        names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", *rigs)
         tables = {name: getattr(self, name) for name in names}
         return _PartDigests(shared, {**tables, **self.further})
 

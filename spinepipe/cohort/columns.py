@@ -257,7 +257,22 @@ SUPPORTS = TableForm(
     keys=("specimen", "test", "joint", "coordinate"),
 )
 
+PRELOAD = TableForm(
+    "preload",
+    "specimen x test x vertebra with a load that acts before step 0 and all along; all rows act",
+    (
+        _key("specimen", "specimen, * stands for all"),
+        _key("test", "load case, * stands for all"),
+        _VERTEBRA,
+        *_loads(("fx_n", "fy_n", "fz_n"), "force", LARGEST_FORCE_N),
+        *_loads(("mx_nm", "my_nm", "mz_nm"), "moment", LARGEST_MOMENT_NM),
+        *_points(("px_mm", "py_mm", "pz_mm"), "point where the force acts", required=False),
+    ),
+    keys=("specimen", "test", "vertebra"),
+)
+
 TABLES = {
-    form.stem: form for form in (SPECIMENS, LANDMARKS, JOINTS, BODIES, LOADS, MOTION, SUPPORTS)
+    form.stem: form
+    for form in (SPECIMENS, LANDMARKS, JOINTS, BODIES, LOADS, MOTION, SUPPORTS, PRELOAD)
 }
 """Every CSV file that is read, by stem; other files in the folder are ignored."""

@@ -131,6 +131,7 @@ def _cohort(
         loads=final.get("loads"),
         motion=_numbered(final.get("motion")),
         supports=final.get("supports"),
+        preload=final.get("preload"),
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )

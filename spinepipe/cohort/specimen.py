@@ -1,6 +1,7 @@
 """From a cohort's tables to what the engine takes: frames, bodies, models, load cases. SI."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -156,8 +157,45 @@ def load_cases(
         for cycle in _cycles(cohort, specimen, test):
             of_cycle = of_test[of_test["cycle"].isna() | (of_test["cycle"] == cycle)]
             if len(of_cycle):
-                cases.append(LoadCase(test, cycle, _steps(cohort, of_cycle, coms, shift)))
+                steps = _steps(cohort, of_cycle, coms, shift)
+                cases.append(
+                    LoadCase(test, cycle, _preloaded(cohort, specimen, test, steps, shift))
+                )
     return tuple(cases)
+
+
+def _preloaded(
+    cohort: Cohort, specimen: str, test: str, steps: tuple[LoadStep, ...], shift: Array
+) -> tuple[LoadStep, ...]:
+    """The steps with what acts all along; it is there at step 0, before anything is read."""
+    table = cohort.preload
+    if table is None:
+        return steps
+    rows = table[table["specimen"].isin([specimen, "*"]) & table["test"].isin([test, "*"])]
+    places, forces, moments = _placed(cohort, rows, {})
+    preload = tuple(
+        Wrench(body, point + shift, force, moment)
+        for (body, point), force, moment in zip(places, forces, moments, strict=True)
+    )
+    return tuple(replace(step, wrenches=(*step.wrenches, *preload)) for step in steps)
+
+
+def _placed(
+    cohort: Cohort, rows: pd.DataFrame, coms: Mapping[str, Array]
+) -> tuple[list[tuple[int, Array]], Array, Array]:
+    """Body and point (3,) m, force (K, 3) N and moment (K, 3) N m of each row of loads.
+
+    Without a point a force acts at the vertebra's centre of mass; a moment has none.
+    """
+    moving = {name: index for index, name in enumerate(cohort.vertebrae[1:])}
+    points = rows[["px_mm", "py_mm", "pz_mm"]].to_numpy(dtype=float) / MM_PER_M
+    vertebrae = rows["vertebra"].tolist()
+    for place in np.flatnonzero(np.isnan(points).any(axis=1)):
+        points[place] = coms.get(vertebrae[place], np.zeros(3))
+    forces = rows[["fx_n", "fy_n", "fz_n"]].to_numpy(dtype=float)
+    moments = rows[["mx_nm", "my_nm", "mz_nm"]].to_numpy(dtype=float)
+    bodies_of = [moving[name] for name in vertebrae]
+    return list(zip(bodies_of, points, strict=True)), forces, moments
 
 
 def _cycles(cohort: Cohort, specimen: str, test: str) -> list[int]:
@@ -174,19 +212,13 @@ def _cycles(cohort: Cohort, specimen: str, test: str) -> list[int]:
 def _steps(
     cohort: Cohort, rows: pd.DataFrame, coms: Mapping[str, Array], shift: Array
 ) -> tuple[LoadStep, ...]:
-    moving = {name: index for index, name in enumerate(cohort.vertebrae[1:])}
-    points = rows[["px_mm", "py_mm", "pz_mm"]].to_numpy(dtype=float) / MM_PER_M
-    forces = rows[["fx_n", "fy_n", "fz_n"]].to_numpy(dtype=float)
-    moments = rows[["mx_nm", "my_nm", "mz_nm"]].to_numpy(dtype=float)
-    vertebrae, numbers = rows["vertebra"].tolist(), rows["step"].to_numpy()
-    times = rows["time_s"].to_numpy(dtype=float)
-    for place in np.flatnonzero(np.isnan(points).any(axis=1)):
-        points[place] = coms[vertebrae[place]]
+    where, forces, moments = _placed(cohort, rows, coms)
+    numbers, times = rows["step"].to_numpy(), rows["time_s"].to_numpy(dtype=float)
     steps = []
     for step in np.unique(numbers):
         places = np.flatnonzero(numbers == step)
         wrenches = tuple(
-            Wrench(moving[vertebrae[at]], points[at] + shift, forces[at], moments[at])
+            Wrench(where[at][0], where[at][1] + shift, forces[at], moments[at])
             for at in places.tolist()
         )
         told = times[places][~np.isnan(times[places])]

@@ -158,3 +158,41 @@ def test_line_numbers_are_those_of_the_file(tmp_path: Path) -> None:
     good = "*,*,L3L4,extension,held,"
     (problem,) = refused(tmp_path, rig(good, "*,*,L2L3,extension,hold,"))
     assert problem.row == 3
+
+
+PRELOAD = "specimen,test,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm\n"
+
+
+def preload(*rows: str) -> Change:
+    return text("preload.csv", PRELOAD + "".join(f"{row}\n" for row in rows))
+
+
+def test_a_preload_acts_at_every_step(tmp_path: Path) -> None:
+    """As if its wrench had been written into every step of loads.csv, step 0 too."""
+    cohort = read(tmp_path, preload("*,*,L2,0,-400,0,0,0,0,5,72,0", "a,flexion,L3,0,0,0,0,1,0,,,"))
+    plain = flexion(read(tmp_path / "plain"))
+    for specimen, count in (("a", 2), ("b", 1)):
+        one = flexion(cohort, specimen)
+        for step, bare in zip(one.case.steps, plain.case.steps, strict=True):
+            assert len(step.wrenches) == len(bare.wrenches) + count
+            axial = step.wrenches[len(bare.wrenches)]
+            assert (axial.body, axial.force.tolist()) == (1, [0.0, -400.0, 0.0])
+            np.testing.assert_allclose(axial.point, [0.005, 0.072, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "told"),
+    [
+        ("*,*,L4,0,-400,0,0,0,0,0,0,0", "vertebra", "fixed to ground"),
+        ("*,*,L2,0,-400,0,0,0,0,,,", "px_mm", "a force without a point"),
+        ("*,*,L2,0,-400,0,0,0,0,1,,", "py_mm", "an incomplete point"),
+        ("*,flexon,L2,0,-400,0,0,0,0,0,0,0", "test", "did you mean 'flexion'"),
+        ("c,*,L2,0,-400,0,0,0,0,0,0,0", "specimen", "unknown specimen"),
+    ],
+)
+def test_a_bad_preload_is_told_with_its_place(
+    row: str, column: str, told: str, tmp_path: Path
+) -> None:
+    (problem,) = refused(tmp_path, preload(row))
+    assert (problem.file, problem.row, problem.column) == ("small/preload.csv", 2, column)
+    assert told in str(problem)
