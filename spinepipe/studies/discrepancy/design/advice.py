@@ -8,10 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
-import numpy as np
-
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
-from spinepipe.studies.discrepancy.design.next_test import Offer, offers, refitted_gain
+from spinepipe.studies.discrepancy.design.next_test import Offer, offers, refitted_gains
 from spinepipe.studies.discrepancy.design.patterns import Fitted, generic, strengths
 from spinepipe.studies.discrepancy.design.withheld import (
     FACTORS,
@@ -155,11 +153,8 @@ def _of_pair(
     The others are taken to lose as much by it.
     """
     found = offers([first, second], place)
-    checked = {
-        one.words: gain
-        for one in found[:MOST_CHECKED]
-        if one.gain is not None and (gain := _checked(first, second, place, one.words)) is not None
-    }
+    likely = [one.words for one in found[:MOST_CHECKED] if (one.gain or 0.0) > LEAST_GAIN]
+    checked = _checked((first, second), place, likely)
     linear = sum(one.gain or 0.0 for one in found if one.words in checked)
     share = min(1.0, sum(checked.values()) / linear) if linear > 0.0 else 1.0
     told = [
@@ -173,10 +168,11 @@ def _of_pair(
     return _rows(subject, told, missing)
 
 
-def _checked(first: Fitted, second: Fitted, place: Bench, words: str) -> float | None:
-    gains = [refitted_gain(one, place, words) for one in (first, second)]
-    known = [gain for gain in gains if gain is not None]
-    return float(np.mean(known)) if len(known) == len(gains) else None
+def _checked(pair: tuple[Fitted, Fitted], place: Bench, every: Sequence[str]) -> dict[str, float]:
+    """Mean gain of each run by refits of both models; of those that both can be asked for."""
+    one, other = (refitted_gains(pattern, place, every) for pattern in pair)
+    both = [words for words in every if words in one and words in other]
+    return {words: 0.5 * (one[words] + other[words]) for words in both}
 
 
 def _how(one: Offer, checked: dict[str, float]) -> str:
@@ -203,7 +199,7 @@ def _rows(subject: str, found: Sequence[Offer], missing: float) -> list[Advice]:
         else:
             status = OFFERED if number else ADVISED
         message = one.message
-        if status == ADVISED and missing > 0.0 and one.gain:
+        if status == ADVISED and missing > 0.1 and one.gain:
             times = ceil(missing / one.gain)
             message += f"; {missing:.1f} is missing: do it {_times(times)}"
         rows.append(Advice(subject, one.words, one.cycles, one.gain, status, message))

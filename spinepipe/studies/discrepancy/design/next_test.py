@@ -242,7 +242,7 @@ def _named(words: str, menu: Sequence[Run]) -> Run | None:
 
 
 def _refitted(pattern: Fitted, place: Bench, added: Mapping[str, Run | None]) -> float | None:
-    """chi2 that stays between the models; None where a run cannot be asked or has no fit."""
+    """chi2 and priors that stay between the models; None where a run cannot be asked."""
     g = pattern.grounds
     readings, whitenings = {}, {}
     for name, one in g.readings.items():
@@ -257,7 +257,10 @@ def _refitted(pattern: Fitted, place: Bench, added: Mapping[str, Run | None]) ->
         whitenings[name] = white
     setting = Setting(readings, whitenings, g.noise.zeroed)
     fit = joint_fit(g.suppose(standing(pattern.fit)), setting)
-    return fit.chi2 if fit.usable else None
+    if not fit.usable:
+        return None
+    away = [(x - u.mean) / u.sd for x, u in zip(fit.x, fit.hypothesis.unknowns, strict=True)]
+    return fit.chi2 + float(np.sum(np.square(away)))
 
 
 def _pairs(one: SpecimenReadings, predicted: Sequence[Array]) -> Iterator[tuple[Repeats, Array]]:

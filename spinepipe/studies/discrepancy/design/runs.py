@@ -178,9 +178,16 @@ def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
                 direction = np.zeros(6)
                 direction[start + axis] = sign
                 if not any(_along(load, direction) for load in loads):
-                    case = replace(_turned(template.case, start, axis, sign), test=name)
+                    case = replace(_turned(template.case, start, axis, sign), test=f"added {name}")
                     loads += _large(case)  # a test to both sides needs no other
-                    yield Run(f"new test: {name}", replace(once, case=case), zeroed)
+                    words = f"new test: {name} ({_axis(start, axis, sign)})"
+                    yield Run(words, replace(once, case=case), zeroed)
+
+
+def _axis(start: int, axis: int, sign: float) -> str:
+    """``moment about -z of ground``."""
+    what = "moment about" if start else "force along"
+    return f"{what} {'+' if sign > 0.0 else '-'}{'xyz'[axis]} of ground"
 
 
 def _large(case: LoadCase) -> list[Array]:
