@@ -49,19 +49,19 @@ def _path(rng: np.random.Generator, share: float) -> Fields:
 
 def moments(rng: np.random.Generator) -> Fields:
     """Two to four joints in sweeps of moments, rotations read."""
-    joints = int(rng.integers(2, 5))
+    joints = int(rng.choice([2, 3, 4], p=[0.45, 0.4, 0.15]))
     return {
         "joints": joints,
         "lowest": int(rng.integers(0, 7 - joints)),
-        "n_specimens": int(rng.integers(2, 5)),
+        "n_specimens": int(rng.choice([2, 3, 4], p=[0.45, 0.45, 0.1])),
         "zeroed": bool(rng.random() < 0.25),
         **_path(rng, 0.35),
     }
 
 
 def six(rng: np.random.Generator) -> Fields:
-    """One to three joints, all six coordinates read."""
-    joints = int(rng.integers(1, 4))
+    """One or two joints, all six coordinates read: the searches that take longest."""
+    joints = int(rng.integers(1, 3))
     return {
         "joints": joints,
         "lowest": int(rng.integers(0, 7 - joints)),
@@ -105,7 +105,7 @@ def shear(rng: np.random.Generator) -> Fields:
 
 def thin(rng: np.random.Generator) -> Fields:
     """Two or three specimens, eleven steps, every test once."""
-    joints = int(rng.integers(2, 4))
+    joints = int(rng.integers(1, 4))
     return {
         "joints": joints,
         "lowest": int(rng.integers(0, 7 - joints)),
@@ -174,9 +174,9 @@ def design_of(recipe: dict[str, Any]) -> str:
         return "shear"
     if recipe["translations"]:
         return "six"
-    if recipe["joints"] == 1:
-        return "one_joint"
-    return "thin" if recipe["cycles"] == 1 else "moments"
+    if recipe["cycles"] == 1:
+        return "thin"
+    return "one_joint" if recipe["joints"] == 1 else "moments"
 
 
 def soiled(recipe: Recipe, share: float) -> Recipe:
