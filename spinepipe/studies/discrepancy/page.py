@@ -42,6 +42,13 @@ _TRIED = (
 )
 """Columns of what was tried; the others are in the file."""
 
+_PROOF = (
+    *("fold", "kind", "readings"),
+    *(f"gap_{model}{end}" for model in ("base", "with_effects") for end in ("", "_low", "_high")),
+    *("gap_surrogate", "closed", "worse", "message"),
+)
+"""Columns of the proof; residuals and one more interval are in the file."""
+
 _ONE_PLACE = "joint x coordinate x test"
 
 _WHERE = (
@@ -196,7 +203,8 @@ def file_tables(results: Results) -> Iterator[Parts]:
     if len(advised):
         yield "next_tests", "Which test next", _NEXT, advised, NEXT_TESTS.columns
     held_out, where = results.table("held_out"), results.table("where")
-    yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), HELD_OUT.columns
+    proof = tuple(column for column in HELD_OUT.columns if column.name in _PROOF)
+    yield "held_out", "Held-out proof", HELD_OUT.about, _worded(held_out), proof
     if len(where):
         yield "where", "Where the models are off", _WHERE, _worded(_above(where)), WHERE.columns
     candidates = results.table("candidates")

@@ -112,7 +112,9 @@ def described(verdict: Verdict) -> Iterator[str]:
 
 
 def _formula(formula: Formula) -> str:
-    lines = "; ".join(readable(line.strip()) for line in formula.text.splitlines() if line.strip())
+    lines = readable(formula.text)
+    for typed, printed in (("^2", "²"), ("^3", "³"), (" * ", " × ")):
+        lines = lines.replace(typed, printed)
     share = 100.0 * formula.explained
     closed = "" if formula.held_out_closed is None else _closed(formula.held_out_closed)
     return (

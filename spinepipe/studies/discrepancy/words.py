@@ -47,7 +47,7 @@ _UNCOUNTED = (
 _KEYS = ("per_joint", "per_specimen")
 _NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 _SPOKEN = "|".join(sorted((plain(name) for name in COORDINATES), key=len, reverse=True))
-_PLACED = re.compile(rf"(?P<before>\b(?:in|own|of) |, )(?P<name>{_SPOKEN})(?P<after>,|\b)")
+_PLACED = re.compile(rf"(?P<before>^|\b(?:in|own|of|over) |, )(?P<name>{_SPOKEN})(?P<after>,|\b)")
 
 
 def readable(sentence: str) -> str:

@@ -54,6 +54,23 @@ def test_the_best_form_of_an_effect_stands_for_it() -> None:
     assert first.shown["marker_bias"] == 0.4  # of the screen alone
 
 
+def test_an_effect_whose_refits_all_failed_is_marked(tmp_path: Path) -> None:
+    failed = looked("refit 1", "", marker_bias=np.nan)
+    first, *_ = rounds(search_of(SEARCH.iloc[1:], failed))
+    assert bool(first.evidence.loc["marker_bias", "no_fit"])
+    assert not first.evidence.loc[["creep", "neutral_zone"], "no_fit"].any()
+    candidates = frames("NAMED")["candidates"]
+    screened = candidates[
+        (candidates["stage"] == "screen 1") & (candidates["effect"] == "hysteresis")
+    ]
+    tried = screened.assign(stage="refit 1", log_evidence=np.nan, status="not_converged")
+    words = said(
+        drawn("evidence_by_round", tmp_path, "NAMED", candidates=pd.concat([candidates, tried]))
+    )
+    assert "(3.7)" in words
+    assert "no refit of it has a result" in words
+
+
 def test_rounds_say_what_they_were_and_led_to() -> None:
     found = rounds(SEARCH, ("hysteresis",))
     assert [one.words for one in found] == [

@@ -154,3 +154,13 @@ def test_a_line_that_comes_back_on_itself_is_drawn_once() -> None:
     assert (np.diff(load[once]) >= 0.0).all()
     loop = 0.5 * load - 0.1 * np.array([0, 1, 1, 1, -1, -1, -1, -1, 1])
     assert drawn_once(load, loop, way).tolist() == way.tolist()
+
+
+def test_a_gap_aside_of_the_load_is_pointed_to(tmp_path: Path) -> None:
+    gap = frames("NULL")["gap"]
+    assert "aside of the load" not in said(drawn("load_displacement", tmp_path, "NULL", gap=gap))
+    bent = (gap["test"] == "flexion") & (gap["coordinate"] == "right_bending")
+    coupled = gap.assign(measured=gap["measured"].where(~bent, gap["measured"] + 1.0))
+    words = said(drawn("load_displacement", tmp_path, "NULL", gap=coupled))
+    assert "aside of the load" in words
+    assert "lateral bending, in flexion" in words

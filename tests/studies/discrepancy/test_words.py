@@ -97,6 +97,9 @@ def test_sentences_of_results_read_as_words() -> None:
     assert readable("L4L5, left rotation, test flexion_extension (gap 4.5)") == (
         "L4L5, axial rotation, test flexion–extension (gap 4.5)"
     )
+    assert readable("right bending over extension at every joint") == (
+        "lateral bending over flexion–extension at every joint"
+    )
     assert "flexion" not in readable("flexion_extension_asymmetry would explain a part")
 
 

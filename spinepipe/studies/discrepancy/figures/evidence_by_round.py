@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import general
 from spinepipe.tables import Tables
 
-SCREEN, REFIT = "screen", "refit"
+SCREEN, REFIT, NO_FIT = "screen", "refit", "no_fit"
 ENTERED, LEFT, REPLACED = "entered", "left", "replaced"
 MOST_ROUNDS = 12
 _EVENTS = {
@@ -59,7 +59,8 @@ class Round:
     ----------
     beside : effects in the model. without : those in whose place the others were tried.
     trial : whether it tried a second effect in the place of one: no step of the search's own.
-    evidence : a row per effect with ``screen`` and ``refit``, of its best form; NaN where none.
+    evidence : a row per effect with ``screen`` and ``refit``, of its best form, NaN where none, and
+        ``no_fit``: whether it was refitted and no form has a result, so that it is no rival.
     events : what became of effects after it.
     """
 
@@ -96,11 +97,10 @@ def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[Round]:
     ----------
     end : effects that the verdict stands for; empty: the last round says no more.
     """
-    rows = candidates[candidates["log_evidence"].notna()]
-    if rows.empty:
+    if candidates["log_evidence"].isna().all():
         return []
-    way = rows["stage"].str.partition(" ")
-    looked = rows.assign(way=way[0], round=way[2])
+    way = candidates["stage"].str.partition(" ")
+    looked = candidates.assign(way=way[0], round=way[2])
     looked = looked[looked["way"].isin((SCREEN, REFIT))]
     found = [_round(str(name), part) for name, part in looked.groupby("round", sort=False)]
     steps = [one for one in found if not one.trial]
@@ -115,6 +115,8 @@ def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[Round]:
 def _round(stage: str, rows: pd.DataFrame) -> Round:
     best = rows.groupby(["effect", "way"])["log_evidence"].max().unstack("way")
     evidence = best.reindex(columns=[SCREEN, REFIT])
+    refitted = evidence.index.isin(rows.loc[rows["way"] == REFIT, "effect"])
+    evidence[NO_FIT] = refitted & evidence[REFIT].isna()
     place = _IN_PLACE.match(stage)
     beside = tuple(name for name in str(rows["beside"].iloc[0]).split(", ") if name)
     without = tuple(place["names"].split(" and ")) if place else ()
@@ -149,9 +151,11 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
     figure = blank(len(names) * _ROW_MM + labels + _KEY_MM)
     axis = _panel(figure, len(shown))
     threshold = verdict.threshold.log_evidence
-    levels, scale = _levels(grid, threshold)
+    forms = [one.evidence.reindex(names) for one in shown]
+    failed = np.column_stack([one[NO_FIT].fillna(False).to_numpy(bool) for one in forms])
+    levels, scale = _levels(np.where(failed, -np.inf, grid), threshold)
     image = draw_heat(axis, levels, scale, None, levels <= 0.0)
-    _numbers(axis, grid, [one.evidence.reindex(names) for one in shown], levels, scale)
+    _numbers(axis, grid, forms, levels, scale)
     _mark(axis, names, shown)
     heads = [f"{every.index(one) + 1}  {short(one.words, 34)}" for one in shown]
     if not turned:
@@ -161,7 +165,10 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
     if threshold is not None:
         _scale_bar(figure, axis, image, threshold, scale)
     hidden = len(wide) - len(names)
-    explain_marks(figure, _handles(shown, grid), _words(every, shown, hidden, verdict), 5)
+    told = _words(every, shown, hidden, verdict)
+    if failed.any():
+        told += " In brackets: screened, but no refit of it has a result, so it is no rival."
+    explain_marks(figure, _handles(shown, grid), told, 5)
     return figure
 
 
@@ -207,6 +214,7 @@ def _numbers(
         value = float(grid[row, column])
         refitted = np.isfinite(by_way[column][REFIT].iloc[row])
         words = fixed(value, 1) if abs(value) < 100.0 else number(value, 4)
+        words = f"({words})" if by_way[column][NO_FIT].iloc[row] else words
         dark = scale(levels[row, column]) > _DARK
         axis.text(
             column + 0.06,

@@ -236,5 +236,20 @@ def _words(gap: pd.DataFrame, curves: Sequence[Curve], cohort: Cohort) -> str:
     shown = some if each and places > len(curves) else "All curves"
     return (
         f"{shown} in the direction that the test drives, the base's farthest first"
-        f"{whose if each else ''}; the load at the joint is that of the neutral pose."
+        f"{whose if each else ''}; the load at the joint is that of the neutral pose.{_aside(gap)}"
+    )
+
+
+def _aside(gap: pd.DataFrame) -> str:
+    """That the base is farther off in a coordinate that no load drives there, if it is."""
+    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
+    drives = driven(rows)
+    off = {place: _off(part) for place, part in rows.groupby(PLACE[1:], sort=False)}
+    most = max(off, key=lambda place: off[place])
+    if most in drives or off[most] <= CLEARLY:
+        return ""
+    test, joint, coordinate = map(str, most)
+    return (
+        f" The base is farther off aside of the load: {joint}, {motion_of(coordinate)}, in "
+        f"{case(test).lower()} (the gap along the load has it)."
     )
