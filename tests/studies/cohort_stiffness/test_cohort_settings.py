@@ -247,11 +247,13 @@ PULLED = "free: [extension, right_bending, superior]\nrepresentations: [per_spec
 @pytest.mark.parametrize("translations", [True, False])
 @pytest.mark.parametrize("tests", [TESTS, (TESTS[0], TESTS[2])])
 def test_a_test_that_only_pulls(tests: tuple[str, ...], translations: bool, tmp_path: Path) -> None:
-    """It has no loaded coordinate, and errors of rotations only where these were read."""
+    """It drives a translation where that was read; errors of rotations are of what turned."""
     chains = Chains(TRUTH, tests, noise_deg=0.02, study=PULLED)
     found = analysed(with_a_pull(chains, TESTS[2], translations).write(tmp_path))
     turned = set(tests[:-1])
-    assert set(found["mae"]["test"]) == turned
+    assert set(found["mae"]["test"]) == (set(tests) if translations else turned)
+    assert set(found["mae"].loc[found["mae"]["test"] == TESTS[2], "unit"]) <= {"mm"}
+    assert set(found["mae"].loc[found["mae"]["test"] != TESTS[2], "unit"]) == {"deg"}
     tested = found["statistics"]
     family = tested["family"] == "between_levels/per_specimen/left_out_case"
     of = family & (tested["response"] == "rotation_error")

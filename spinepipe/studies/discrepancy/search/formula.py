@@ -97,7 +97,7 @@ def _pursued(
     """States with no term, one and so on; and what the first term had to explain."""
 
     def about(at: Grounds, terms: tuple[_Term, ...]) -> _State:
-        columns = _columns(at, coordinates)
+        columns = terms_of(at, coordinates)
         return _State(at, columns, pursuit_problem(at, columns, draws, seed), terms)
 
     states = [about(grounds, ())]
@@ -114,7 +114,8 @@ def _pursued(
     return states, threshold
 
 
-def _columns(grounds: Grounds, coordinates: Sequence[str]) -> dict[str, TermColumns]:
+def terms_of(grounds: Grounds, coordinates: Sequence[str]) -> dict[str, TermColumns]:
+    """Columns of all terms where the models of a fit stand, by specimen."""
     timed = all(tell_time(one.cases) for one in grounds.readings.values())
     return {
         name: term_columns(
