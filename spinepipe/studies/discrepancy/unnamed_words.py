@@ -46,7 +46,8 @@ def more_stays(verdict: Verdict, where: pd.DataFrame) -> str:
     size = "" if gap is None else f", a gap of {fixed(gap)} noise SD"
     place = shown_most(worst(where, WITH_EFFECTS), _coordinate(verdict))
     most = f", most at {place}" if place else ""
-    return f"That is a part of what is missing: more stays{size}{most}."
+    told = "That is a part of what is missing: more stays" if verdict.effects else "More stays"
+    return f"{told}{size}{most}."
 
 
 def why_no_name(verdict: Verdict) -> str:

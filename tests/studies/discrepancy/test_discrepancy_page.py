@@ -390,6 +390,8 @@ def test_a_set_may_stand_beside_what_is_certain_and_more_stay() -> None:
     assert words.startswith("The model lacks a neutral zone at L4L5, in flexion–extension. Besides")
     assert "hysteresis or creep" in words
     assert "more stays, a gap of 1.20 noise SD, most at L3L4, axial rotation" in words
+    alone = headline(verdict_of(both | {"effects": []}), frames("PART")["where"])
+    assert ". More stays, a gap of 1.20 noise SD" in alone  # a set names nothing that is a part
 
 
 def test_no_sentence_describes_one_motion_and_points_to_another() -> None:
