@@ -83,7 +83,9 @@ def equilibrium(
             return q, tangent
         if not np.isfinite(q).all():
             break
-    raise NoEquilibriumError(f"specimen {world.number}, {now}: last step {size.max():.1e}")
+    worst = int(np.argmax(np.where(np.isfinite(size), size, np.inf)))
+    at = f"specimen {world.number}, test {now.tests[worst]}, step {now.steps[worst]}"
+    raise NoEquilibriumError(f"{at}: last step {size[worst]:.1e}")
 
 
 def residual(
