@@ -6,7 +6,9 @@ import pandas as pd
 
 from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, fixed, listed, number
+from spinepipe.studies.discrepancy.advice_words import advice_sentences
 from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
+from spinepipe.studies.discrepancy.imperfection_words import imperfection_sentences
 from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.unnamed_words import (
     described,
@@ -145,6 +147,8 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
         not_testable(verdict),
+        *imperfection_sentences(verdict),
+        *advice_sentences(results.table("next_tests")),
         _noise(verdict),
     ]
     said = [sentence.replace(" %", "\u00a0%") for sentence in told if sentence]

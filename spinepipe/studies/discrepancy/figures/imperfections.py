@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
-from spinepipe.report.words import percent, plain
+from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
 from spinepipe.tables import Tables
@@ -24,7 +24,8 @@ _LEAST_REACH, _ROOM = 2.4, 1.08
 _HARDLY_TOLD = 0.7
 """Posterior SD from which readings hardly tell an imperfection: drawn pale."""
 
-_LEAST_SHARE = 0.005
+_LEAST_SHARE = 0.01
+"""Of chi2, less of which is not written."""
 
 _SHADES = ("#0B3C5D", "#0072B2", "#3FA7D6", "#56B4E9", "#009E73", "#7A9E00")
 """Of joints, caudal to cranial, again from the start where there are more."""
@@ -41,7 +42,8 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> 
     here = [joint for joint in lanes if (rows["joint"] == joint).any()]
     height = len(kinds) * (_ROW_MM + _LANE_MM * len(here)) + _AROUND_MM + _KEY_MM
     figure = blank(height)
-    reach = _ROOM * max(_LEAST_REACH, float(rows["in_prior_sds"].abs().max()))
+    drawn = rows[(rows["places"] == 1) | rows["common"]]
+    reach = _ROOM * max(_LEAST_REACH, float(drawn["in_prior_sds"].abs().max()))
     colors = _colors(cohort.joint_names)
     for index, (axis, name) in enumerate(
         zip(side_by_side(figure, len(shown), len(shown)), shown, strict=True)
@@ -93,7 +95,7 @@ def _draw(
             axis.plot([mean[0]], [y], "D", color=THEIRS, ms=4.5, mew=0.0, zorder=6)
         share = float(taken.get(kind, 0.0))
         if share > _LEAST_SHARE * whole:
-            words = percent(round(share), max(round(whole), 1))
+words = f"{100.0 * share / whole:.0f} %"
             note(axis, 0.99, y - 0.36, f"takes up {words} of it", OURS, ha="right")
         axis.axhline(y - 0.5, color="#DDDDDD", lw=0.5, zorder=0)
     axis.set_ylim(-0.5, len(kinds) - 0.5)
