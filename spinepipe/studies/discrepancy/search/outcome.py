@@ -199,7 +199,7 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
 
     beside = [other for other in found.standing if at(other) & at(one)]
     props = [other for other in beside if other.alone < ALONE * other.log_evidence]
-    if not props or len(beside) < 2:
+    if not props or len({other.name for other in beside}) < 2:
         return None
     names = _listed(list(dict.fromkeys(other.name for other in beside)), "and")
     alone = _listed(list(dict.fromkeys(other.name for other in props)), "and")
