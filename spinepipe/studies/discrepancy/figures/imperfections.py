@@ -95,7 +95,7 @@ def _draw(
             axis.plot([mean[0]], [y], "D", color=THEIRS, ms=4.5, mew=0.0, zorder=6)
         share = float(taken.get(kind, 0.0))
         if share > _LEAST_SHARE * whole:
-words = f"{100.0 * share / whole:.0f} %"
+            words = f"{100.0 * share / whole:.0f} %"
             note(axis, 0.99, y - 0.36, f"takes up {words} of it", OURS, ha="right")
         axis.axhline(y - 0.5, color="#DDDDDD", lw=0.5, zorder=0)
     axis.set_ylim(-0.5, len(kinds) - 0.5)
