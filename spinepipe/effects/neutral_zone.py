@@ -20,6 +20,10 @@ AS_BEFORE = 30.0
 """Sharpness of files that do not name it: the corner was then rounded over a tenth of the width to
 each side, and the law is the same to 0.3 % of the width times the stiffness lost in the zone."""
 
+SHARPNESS, SHARPNESS_SD = 12.0, 0.6
+"""Prior of the sharpness, its SD of the logarithm: from 4 to 40 by two SDs. Smoother zones, 3 at
+2.3 SDs, hardly differ from a joint that stiffens exponentially all the way."""
+
 # Half widths near those of lumbar joints: Yamamoto 1989 (Spine 14:1256), 1 to 2 deg in bending
 # of either kind and less in axial rotation. Shear and compression: zones of 0.3 to 1.2 mm.
 _HALF_WIDTH_DEG = {"extension": 1.5, "right_bending": 1.5, "left_rotation": 0.5}
@@ -69,8 +73,8 @@ class NeutralZone(CarriedShare):
             "1",
             2.0,
             50.0,
-            12.0,
-            0.8,
+            SHARPNESS,
+            SHARPNESS_SD,
             True,
             sharp,
             family=True,
