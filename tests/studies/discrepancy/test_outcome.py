@@ -155,6 +155,15 @@ def test_effects_that_only_mend_one_another_imitate_something_else() -> None:
     assert says(ended(stands(), enough))[0] == "NAMED"
 
 
+def test_a_small_prop_takes_no_name_from_what_explains_nearly_all() -> None:
+    """A tenth of what both explain is the limit: gains of 1000 and 100."""
+    prop = stands("load_offset", log_evidence=40.0, alone=1.0)
+    sure = replace(stands(), gain=1000.0)
+    result = outcome(ended(sure, prop, gain=1100.0), MARGIN)
+    assert (result.verdict, result.named) == (Answer.PART, (sure,))
+    assert_unknown(outcome(ended(replace(sure, gain=890.0), prop, gain=990.0), MARGIN), "imitate")
+
+
 def test_one_effect_has_nothing_to_mend() -> None:
     assert says(ended(stands(alone=1.0)))[0] == "NAMED"
 

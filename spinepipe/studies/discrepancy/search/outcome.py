@@ -191,7 +191,11 @@ def _share_left(found: Found, coordinate: str) -> float:
 
 
 def _imitated(found: Found, one: Standing) -> _NoName | None:
-    """Whether effects on the same coordinates stand only together."""
+    """Whether effects on the same coordinates stand only together.
+
+    A prop, for which by itself nothing speaks, is never sure. What it props is not either, unless
+    it explains nearly all by itself.
+    """
     read = tuple(found.base_at)
 
     def at(other: Standing) -> set[str]:
@@ -200,6 +204,10 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
     beside = [other for other in found.standing if at(other) & at(one)]
     props = [other for other in beside if other.alone < ALONE * other.log_evidence]
     if not props or len({other.name for other in beside}) < 2:
+        return None
+    propped = sum(prop.gain for prop in props)
+    is_prop = any(one is prop for prop in props)
+    if not is_prop and propped <= UNEXPLAINED_SHARE * (one.gain + propped):
         return None
     names = _listed(list(dict.fromkeys(other.name for other in beside)), "and")
     alone = _listed(list(dict.fromkeys(other.name for other in props)), "and")
