@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import discrepancy_cases as cases
+import pyarrow.parquet as pq
 import pytest
 from small_project import Project, Shared, copy_project
 
@@ -53,6 +54,7 @@ def build(folder: Path) -> Project:
     made = cases.results(project.folder, "NAMED")
     for name in ("model_base.yaml", "model_with_effects.yaml"):
         (made / name).write_text(model)
+    pq.read_table(made / "next_tests.parquet").to_pandas().to_csv(made / "design.csv", index=False)
     made.rename(project.path("made_up"))
     shutil.rmtree(project.path("results"))
     project.path("base.yaml").write_text(model)
