@@ -26,7 +26,7 @@ from tests.generators.hidden import make
 from tests.validation.discrepancy.designs import plain, soiled, with_effects
 from tests.validation.discrepancy.row import STUDY
 
-FIRST_SEED, COHORTS = 900_000, 60
+FIRST_SEED, COHORTS = 900_000, 24
 """Of each kind; apart from all seeds that searches are tuned or scored on."""
 
 DRAWS, FALSE_ALARM = 300, 0.01
