@@ -8,7 +8,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import largest_mean_motion
-from spinepipe.studies.cohort_stiffness.tables import MAE
+from spinepipe.studies.cohort_stiffness.tables import MAE, MAE_IN_DEG
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATE_UNITS
 
@@ -39,8 +39,14 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
             found = specimen_mae(part, error, motion)
             largest = largest_mean_motion(here, motion)
             unit = COORDINATE_UNITS[named["coordinate"]]
-            rows.append({**named, "unit": unit, "steps": steps, **_spread(found, largest)})
+            row = {**named, "unit": unit, "steps": steps, **_spread(found, largest)}
+            rows.append(row | _in_deg(row))
     return rows
+
+
+def _in_deg(row: dict[str, Any]) -> dict[str, Any]:
+    """The columns that hold rotations alone."""
+    return {f"{name}_deg": row[name] if row["unit"] == "deg" else None for name in MAE_IN_DEG}
 
 
 def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:

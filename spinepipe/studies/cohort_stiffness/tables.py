@@ -145,6 +145,15 @@ def _motion(name: str, meaning: str, low: float | None = 0.0, null: str | None =
     return Column(name, "number", meaning, "mm or deg, see unit", null, low=low)
 
 
+MAE_IN_DEG = ("mae", "low_quartile", "high_quartile", "largest_motion")
+"""Columns of `MAE` that stand there in deg as well, under the names that they had at first."""
+
+
+def _in_deg(name: str) -> Column:
+    null = "a translation, or no result"
+    return Column(f"{name}_deg", "number", f"{name}, of rotations", "deg", null, low=0.0)
+
+
 ERRORS = Table(
     "errors",
     "Errors of predicted motion, predicted less measured: one row per specimen, stiffness, test, "
@@ -285,6 +294,7 @@ MAE = Table(
             "largest over specimens of the mean measured motion over joints",
             null="not measured",
         ),
+        *(_in_deg(name) for name in MAE_IN_DEG),
         Column(
             "mae_percent",
             "number",
