@@ -31,7 +31,7 @@ MOMENTS_NM = np.arange(6.0)
 AXES = {"flexion": (2, -1.0), "extension": (2, 1.0), "bending": (0, 1.0)}
 NONE = NuisancePriors(*[0.0] * 8)
 ZONE = Form(Variant("neutral_zone", ()), Spread.SHARED)
-ZONE_VALUES = np.array([0.6, 0.03])
+ZONE_VALUES = np.array([0.6, 0.03, 12.0])
 
 
 def chain(name: str, nm_per_rad: float, *effects: ScopedEffect) -> SpineModel:
@@ -113,7 +113,7 @@ def found(base: Grounds, zone: bool, spread: Spread = Spread.SHARED) -> Found:
     """A search that ended with a neutral zone, or with nothing."""
     final = base
     if zone:
-        guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04]))
+        guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
     lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0, at={})
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)

@@ -169,7 +169,7 @@ def test_translations_alone_are_enough(tmp_path: Path) -> None:
         made.motion[degrees] = np.nan
     made.motion["anterior_mm"] = 0.5
     write(made, tmp_path)
-    assert complaints(tmp_path) == []
+    assert studies.check(tmp_path, STUDY)
 
 
 def test_noise_must_be_known_from_somewhere(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
-    _laid,
+    base_fitted,
     investigate,
     prepared,
 )
@@ -92,7 +92,7 @@ def written(
 
 def laid(cohort: Cohort) -> tuple[Prepared, Grounds]:
     ready = prepared(STUDY, cohort, None)
-    return ready, _laid(ready, plain_run)
+    return ready, base_fitted(ready, plain_run)
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
