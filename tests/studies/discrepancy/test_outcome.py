@@ -325,6 +325,17 @@ def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
     assert result.why.startswith("creep and hysteresis: ")
 
 
+def test_an_effect_on_another_coordinate_is_still_a_rival_here() -> None:
+    """Stiffening is sure in extension; in bending it is as likely as what stands there."""
+    sure = stands("nonlinear_stiffening", rivals=[("facet_contact", 90.0)])
+    here = stands(
+        "facet_contact", rivals=[("nonlinear_stiffening", 0.5)], coordinate="right_bending"
+    )
+    result = outcome(ended(sure, here), MARGIN)
+    assert (result.verdict, result.named) == (Answer.SET, (sure,))
+    assert result.tied == ("facet_contact", "nonlinear_stiffening")
+
+
 def test_an_effect_in_two_coordinates_has_one_name() -> None:
     result = outcome(ended(stands(), stands(), stands("load_offset")), MARGIN)
     assert result.why.startswith("creep and load_offset: ")

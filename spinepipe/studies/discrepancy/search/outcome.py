@@ -80,8 +80,16 @@ def outcome(
     """
     doubts = {number: _doubt(found, number, margin) for number in range(len(found.standing))}
     kept = [one for number, one in enumerate(found.standing) if doubts[number] is None]
-    tied = _tied(kept, margin, not_excluded)
-    named = tuple(one for one in kept if one.name not in tied)
+    close = [_close(one, found, margin, not_excluded) for one in kept]
+    tied = tuple(
+        dict.fromkeys(
+            name
+            for one, names in zip(kept, close, strict=True)
+            if names
+            for name in (one.name, *names)
+        )
+    )
+    named = tuple(one for one, names in zip(kept, close, strict=True) if not names)
     first = next((doubt for doubt in doubts.values() if doubt is not None), None)
     unexplained = (
         _mistaken(errors)
@@ -256,18 +264,23 @@ def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tup
     return tuple(dict.fromkeys(said))
 
 
-def _tied(
-    standing: Sequence[Standing], margin: float, not_excluded: Mapping[str, Sequence[str]]
+def _close(
+    one: Standing, found: Found, margin: float, not_excluded: Mapping[str, Sequence[str]]
 ) -> tuple[str, ...]:
-    """Effects with a rival that is not clearly behind, or not excluded, and these rivals."""
-    names = {one.name for one in standing}
-    tied: dict[str, None] = {}
-    for one in standing:
-        near = [rival.name for rival in one.rivals if rival.margin < margin]
-        close = [n for n in (*near, *not_excluded.get(one.name, ())) if n not in names]
-        if close:
-            tied |= dict.fromkeys([one.name, *close])
-    return tuple(tied)
+    """Rivals of an effect that are not clearly behind, or not excluded.
+
+    What stands beside it on the same coordinates is no rival; what stands on others alone is one.
+    """
+    read = tuple(found.base_at)
+    here = set(one.supposed.form.variant.coordinates(read))
+    beside = {
+        other.name
+        for other in found.standing
+        if other is one or here & set(other.supposed.form.variant.coordinates(read))
+    }
+    near = [rival.name for rival in one.rivals if rival.margin < margin]
+    every = dict.fromkeys((*near, *not_excluded.get(one.name, ())))
+    return tuple(name for name in every if name not in beside)
 
 
 def _listed(names: Sequence[str], word: str) -> str:
