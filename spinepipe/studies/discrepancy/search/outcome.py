@@ -211,7 +211,7 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
 
     beside = [other for other in found.standing if at(other) & at(one)]
     props = [other for other in beside if other.alone < ALONE * other.log_evidence]
-    if not props or len({other.name for other in beside}) < 2:
+    if not props or len(beside) < 2:  # two forms of one effect prop each other as well
         return None
     propped = sum(prop.gain for prop in props)
     is_prop = any(one is prop for prop in props)
