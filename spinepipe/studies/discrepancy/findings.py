@@ -8,7 +8,6 @@ from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, fixed, listed, number
 from spinepipe.studies.discrepancy.advice_words import advice_sentences
 from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
-from spinepipe.studies.discrepancy.imperfection_words import imperfection_sentences
 from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.unnamed_words import (
     described,
@@ -147,7 +146,7 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
         not_testable(verdict),
-        *imperfection_sentences(verdict),
+        *([readable(verdict.imperfections.message)] if verdict.imperfections else []),
         *advice_sentences(results.table("next_tests")),
         _noise(verdict),
     ]
