@@ -13,7 +13,7 @@ from spinepipe.studies.discrepancy.search.examination import examined
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
 from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Stage
-from spinepipe.studies.discrepancy.search.refit import Refit
+from spinepipe.studies.discrepancy.search.refit import Refit, preferred
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened
 
 MARGIN, NEEDED = 3.0, 5.0
@@ -153,3 +153,20 @@ def test_where_the_rest_has_no_fit_rivals_are_unknown_and_the_base_stands_in_for
     assert zone.rivals_known
     assert not contact.rivals_known
     assert (contact.log_evidence, contact.gain) == (34.0, 80.0)
+
+
+def a_refit(name: str, log_evidence: float, unknowns: int) -> Refit:
+    return cast(Refit, SimpleNamespace(name=name, log_evidence=log_evidence, unknowns=unknowns))
+
+
+@pytest.mark.parametrize(("behind", "first"), [(1.0, 1), (2.9, 1), (3.1, 3)])
+def test_a_plain_form_hardly_behind_stands_first(behind: float, first: int) -> None:
+    """Equal values predict a specimen that nobody measured; values of its own do not."""
+    found = [
+        a_refit("creep", 40.0, 3),
+        a_refit("creep", 40.0 - behind, 1),
+        a_refit("hysteresis", 39.5, 1),
+    ]
+    ranked = preferred(found)
+    assert (ranked[0].name, ranked[0].unknowns) == ("creep", first)
+    assert sorted(one.log_evidence for one in ranked) == sorted(o.log_evidence for o in found)

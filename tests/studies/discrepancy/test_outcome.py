@@ -13,7 +13,7 @@ from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOu
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
+from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Stage, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
@@ -46,17 +46,21 @@ def ended(
     generic_threshold: float = 2.0,
     left: Gap | None = None,
     elsewhere: float = -2.0,
+    neighbours: float = -2.0,
 ) -> Found:
     """A search whose effects lower chi2 by ``gain``, with the generic basis' evidence behind.
 
-    All of it in extension; ``elsewhere`` is the basis' evidence in right bending.
+    All of it in extension; ``elsewhere`` is the basis' evidence in right bending; ``neighbours``
+    that of the neighbouring joints' motion for what the base lacks in extension.
     """
 
     def grounds(chi2: float) -> Grounds:
         return cast(Grounds, SimpleNamespace(fit=SimpleNamespace(chi2=chi2)))
 
     def of(evidence: float, coordinate: str) -> Lack:
-        return Lack(evidence, np.zeros(1), "own", coordinate, Spread.SHARED, 0.0)
+        beside = neighbours if coordinate == "extension" else -2.0
+        shapes = {"own": evidence, "neighbour": beside, "drift": -2.0}
+        return Lack(evidence, np.zeros(1), "own", coordinate, Spread.SHARED, 0.0, shapes)
 
     at = {"extension": of(lack, "extension"), "right_bending": of(elsewhere, "right_bending")}
     whole = max(at.values(), key=lambda one: one.log_evidence)
@@ -68,7 +72,7 @@ def ended(
         base=grounds(500.0),
         final=grounds(500.0 - gain),
         standing=standing,
-        stages=(),
+        stages=(first_look(standing),),
         lack=basis,
         generic_threshold=generic_threshold,
         base_gap=of_base,
@@ -76,7 +80,20 @@ def ended(
         base_at={"extension": of_base, "right_bending": none},
         final_at={"extension": gap, "right_bending": none},
         generic_threshold_at=thresholds,
+        base_lack=basis,
     )
+
+
+def first_look(standing: Sequence[Standing]) -> Stage:
+    """Each effect on the screen with what it has alone."""
+    effects = [
+        SimpleNamespace(
+            forms=[SimpleNamespace(form=one.supposed.form, log_evidence=one.alone)],
+            log_evidence=one.alone,
+        )
+        for one in standing
+    ]
+    return cast(Stage, SimpleNamespace(screen=SimpleNamespace(effects=effects)))
 
 
 def proof(over_base: float | None) -> HeldOut:
@@ -368,3 +385,24 @@ def test_why_there_is_no_name_is_told_to_programs_too(
     result = outcome(found, MARGIN, **more)
     assert result.reason is reason
     assert (result.verdict is Answer.UNKNOWN) == (reason is not None)
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "verdict"),
+    [(-2.0, "NAMED"), (42.0, "NAMED"), (44.0, "UNKNOWN"), (400.0, "UNKNOWN")],
+)
+def test_a_shape_that_no_known_effect_has_and_that_fits_better_leaves_no_name(
+    neighbours: float, verdict: str
+) -> None:
+    """The effect has 40 alone; a name needs the generic shape to be no more than 3 ahead."""
+    assert says(ended(stands(), neighbours=neighbours))[0] == verdict
+
+
+def test_a_shape_that_all_effects_together_leave_behind_takes_no_name() -> None:
+    two = (stands("level_dependence"), stands("creep"))
+    assert says(ended(*two, neighbours=60.0))[0] == "NAMED"
+    assert says(ended(*two, neighbours=80.0))[0] == "UNKNOWN"
+
+
+def test_a_shape_on_another_coordinate_takes_no_name() -> None:
+    assert says(ended(stands(coordinate="right_bending"), neighbours=400.0))[0] != "UNKNOWN"

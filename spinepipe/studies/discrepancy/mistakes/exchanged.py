@@ -39,8 +39,11 @@ from spinepipe.studies.discrepancy.search.whitening import with_nuisances
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 
-NEEDED = 12.0
-"""Log evidence for an exchange: one cohort in a hundred has one, and a false charge costs more."""
+NEEDED = 8.0
+"""Log evidence for an exchange: one cohort in a hundred has one, and a false charge costs more.
+
+Without an exchange the likelihoods have a ratio above exp(8) in less than one pair of 2,900.
+"""
 
 HIDDEN = 0.05
 """Share of the base's excess chi2 that an exchange may seem to cost while an effect hides it."""

@@ -15,15 +15,17 @@ from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rival, Stage, Standing
-from spinepipe.studies.discrepancy.search.refit import Refit, in_place, standing
+from spinepipe.studies.discrepancy.search.refit import (
+    ANOTHER_FORM,
+    Refit,
+    in_place,
+    standing,
+)
 from spinepipe.studies.discrepancy.search.screen import Screen
 from spinepipe.units import COORDINATES
 
 IMITATED = 0.3
 """Share of an effect's evidence that a simpler one must have, to be tried beside a second."""
-
-ANOTHER_FORM = 1.0
-"""Log evidence by which another form of an effect must be better than the one that stands."""
 
 LEVELS = "level_dependence"
 """The effect by which joints differ in stiffness."""
@@ -76,10 +78,9 @@ def _one(
     if not settled:
         if not own.log_evidence > stage.screen.threshold:
             return without
-        best = max(tried, key=lambda other: other.log_evidence, default=own)
-        needed = ANOTHER_FORM if best.name == one.form.name else inquiry.rules.margin
-        if best.form != one.form and best.log_evidence > own.log_evidence + needed:
-            return without.at(best.fit)
+        given = _better(one.form, own, tried, inquiry.rules.margin)
+        if given is not None:
+            return without.at(given.fit)
     rivals = _rivals(own, tried, stage.screen)
     two = _two_simpler(without, own, tried, inquiry)
     if two is not None:
@@ -90,6 +91,22 @@ def _one(
     over = _over_stiffness(without, own, inquiry)
     alone = _alone(one, inquiry)
     return Standing(one, own.log_evidence, alone, own.gain, rivals, over)
+
+
+def _better(form: Form, own: Refit, tried: Sequence[Refit], margin: float) -> Refit | None:
+    """What takes the place of a form: another effect, or clearly a better form of the same."""
+    best = max(tried, key=lambda other: other.log_evidence, default=own)
+    if best.form == form:
+        return None
+    if best.name == form.name:
+        return best if best.log_evidence > own.log_evidence + ANOTHER_FORM else None
+    return best if best.log_evidence > _of_effect(own, tried) + margin else None
+
+
+def _of_effect(own: Refit, tried: Sequence[Refit]) -> float:
+    """Evidence of an effect whose plainest form stands: that of its best form, if that is near."""
+    same = [other.log_evidence for other in tried if other.name == own.name]
+    return min(max([own.log_evidence, *same]), own.log_evidence + ANOTHER_FORM)
 
 
 def _alone(one: Supposed, inquiry: Inquiry) -> float:
@@ -231,4 +248,5 @@ def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, 
     evidence |= refitted
     possible = [(n, v) for n, v in evidence.items() if n != own.name and np.isfinite(v)]
     ranked = sorted(possible, key=lambda item: -item[1])
-    return tuple(Rival(name, own.log_evidence - value) for name, value in ranked)
+    mine = _of_effect(own, tried)
+    return tuple(Rival(name, mine - value) for name, value in ranked)

@@ -104,6 +104,7 @@ class Found:
     generic_threshold, generic_threshold_at : evidence of the generic basis that the null seldom
         exceeds, as a whole and in any single coordinate.
     base_at, final_at : the gap at each coordinate that was read, by its name.
+    base_lack : the generic basis beside the base alone.
     """
 
     base: Grounds
@@ -117,6 +118,7 @@ class Found:
     base_at: Mapping[str, Gap]
     final_at: Mapping[str, Gap]
     generic_threshold_at: Mapping[str, float]
+    base_lack: LackOfFit
 
     def with_only(self, kept: Sequence[Standing], fit: JointFit) -> "Found":
         """The same with some of the effects, and the fit that has no others."""

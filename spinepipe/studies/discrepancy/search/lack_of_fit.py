@@ -40,8 +40,9 @@ LEAST_REACH = np.array([5e-5] * 3 + [np.deg2rad(0.2)] * 3)
 
 BUMPS, BUMP_WIDTH = (-0.6, -0.2, 0.2, 0.6), 0.25
 
+OWN = "own"
 FAMILIES = {
-    "own": "load over the joint's own {coordinate}",
+    OWN: "load over the joint's own {coordinate}",
     "cross": "load in {coordinate} over the joint's other motions",
     "neighbour": "load in {coordinate} over that of the neighbouring joints",
     "drift": "readings of {coordinate} that drift over the steps of a test",
@@ -118,7 +119,7 @@ def _counts(coordinates: int) -> dict[str, int]:
     """Terms of each family for one coordinate, in the order of `_loads`."""
     others = coordinates - 1
     cross = 4 * others + len(list(combinations(range(others), 2)))
-    return {"own": 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
+    return {OWN: 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
 
 
 def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
@@ -166,6 +167,7 @@ class Lack:
     ----------
     log_evidence : of the data. null : (D,) of each draw without a missing effect.
     family, coordinate, spread : where most is explained. explained : drop of chi2 there.
+    by_family : of each family alone, with its share of the whole taken off.
     """
 
     log_evidence: float
@@ -174,6 +176,7 @@ class Lack:
     coordinate: str
     spread: Spread
     explained: float
+    by_family: Mapping[str, float]
 
     @property
     def shape(self) -> str:
@@ -219,7 +222,13 @@ def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: 
 def _lack(parts: Sequence[_Part]) -> Lack:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
-    return Lack(float(logs[0]), logs[1:], best.family, best.coordinate, best.spread, best.explained)
+    share = np.log(len(parts))
+    by_family = {
+        family: float(logsumexp([p.logs[0] for p in parts if p.family == family]) - share)
+        for family in dict.fromkeys(part.family for part in parts)
+    }
+    where = (best.family, best.coordinate, best.spread)
+    return Lack(float(logs[0]), logs[1:], *where, best.explained, by_family)
 
 
 def _problem(

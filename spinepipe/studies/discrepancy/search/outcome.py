@@ -12,6 +12,7 @@ from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
 
@@ -146,7 +147,7 @@ def _doubt(found: Found, number: int, margin: float) -> _NoName | None:
     if not one.rivals_known:
         why = f"without {one.name} the other effects have no fit, so its rivals are not known"
         return Reason.RIVALS_UNKNOWN, why
-    return _most_stays(found, one) or _imitated(found, one)
+    return _most_stays(found, one) or _imitated(found, one) or _other_shape(found, one, margin)
 
 
 def _most_stays(found: Found, one: Standing) -> _NoName | None:
@@ -221,6 +222,41 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
     alone = _listed(list(dict.fromkeys(other.name for other in props)), "and")
     why = f"{names} imitate it together, but by itself nothing speaks for {alone}"
     return Reason.IMITATED_TOGETHER, why
+
+
+NEARLY_ALL = 0.9
+"""Share of the standing effects' evidence that a generic shape must have to be the truer one."""
+
+
+def _other_shape(found: Found, one: Standing, margin: float) -> _NoName | None:
+    """Whether what the base lacks follows what no known effect follows.
+
+    Beside the base alone, and to first order for all alike: where a load over what the neighbouring
+    joints or the other coordinates do, or a drift, has more evidence than any known effect on that
+    coordinate, and nearly as much as all that stand there together, these imitate it.
+    """
+    read = tuple(found.base_at)
+    for coordinate in one.supposed.form.variant.coordinates(read):
+        shapes = {f: e for f, e in found.base_lack.at[coordinate].by_family.items() if f != OWN}
+        family = max(shapes, key=lambda name: shapes[name])
+        needed = _best_known(found, coordinate) + margin
+        there = (
+            o for o in found.standing if coordinate in o.supposed.form.variant.coordinates(read)
+        )
+        together = sum(other.log_evidence for other in there)
+        if shapes[family] > max(needed, NEARLY_ALL * together):
+            shape = FAMILIES[family].format(coordinate=coordinate.replace("_", " "))
+            why = f"{one.name} would imitate what no known effect is: {shape}"
+            return Reason.NO_KNOWN_EFFECT, why
+    return None
+
+
+def _best_known(found: Found, coordinate: str) -> float:
+    """Log evidence of the best known effect on a coordinate, beside the base alone."""
+    read = tuple(found.base_at)
+    forms = (form for effect in found.stages[0].screen.effects for form in effect.forms)
+    on_it = (one.log_evidence for one in forms if coordinate in one.form.variant.coordinates(read))
+    return max(on_it, default=0.0)
 
 
 def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:

@@ -31,6 +31,9 @@ STARTS = (1.0, 0.5, 0.2)
 MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 1, 1)
 """Effects that lead the screen, and forms of each, that are refitted."""
 
+ANOTHER_FORM = 3.0
+"""Log evidence by which a form with more unknowns must be better than a plainer one."""
+
 SCREEN_SHARE, SCREEN_MARGIN = 0.75, 6.0
 """The screen is linear: an effect may trail the leader by this share of its evidence and more."""
 
@@ -81,7 +84,31 @@ def refits(
         refit(grounds, simple, by_name[simple.form.name], run)
         for simple in _simpler(found, screen, standing(grounds.fit))
     ]
-    return tuple(sorted(found, key=lambda one: -one.log_evidence))
+    return preferred(found)
+
+
+def preferred(found: Sequence[Refit]) -> tuple[Refit, ...]:
+    """Refits, best first; of one effect's forms that are hardly behind the best, the plainest.
+
+    What an effect is in a specimen that was not measured, a form with values of their own for each
+    specimen tells badly: where the data hardly ask for it, equal values predict better.
+    """
+    ranked = sorted(found, key=lambda one: -one.log_evidence)
+    first: dict[str, Refit] = {}
+    for one in ranked:
+        best = next(other for other in ranked if other.name == one.name)
+        near = one.log_evidence > best.log_evidence - ANOTHER_FORM
+        if near and one.unknowns < first.get(one.name, best).unknowns:
+            first[one.name] = one
+    taken: set[str] = set()
+    result: list[Refit] = []
+    for one in ranked:
+        if one.name not in taken and one.name in first:
+            result.append(first[one.name])
+        taken.add(one.name)
+        if one is not first.get(one.name):
+            result.append(one)
+    return tuple(result)
 
 
 def _simpler(

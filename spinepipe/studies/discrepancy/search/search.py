@@ -35,7 +35,7 @@ MOST_CHANGES = 6
 def search(base: Grounds, rules: Rules, run: Run, progress: Progress | None = None) -> Found:
     """Effects that the base lacks, each with its rivals."""
     inquiry = Inquiry(base, rules, run, progress or Progress())
-    base_at = gaps_at(base, base.fit)
+    base_at, base_lack = gaps_at(base, base.fit), inquiry.lack(base)
     current, stood = _settled(_forward(base, inquiry, base_at), inquiry, base_at)
     lack = inquiry.lack(current)
     single = rules.false_alarm / len(rules.coordinates)
@@ -51,6 +51,7 @@ def search(base: Grounds, rules: Rules, run: Run, progress: Progress | None = No
         base_at,
         gaps_at(current, current.fit),
         {name: exceeded(one.null, single) for name, one in lack.at.items()},
+        base_lack,
     )
 
 
@@ -84,7 +85,7 @@ def _admitted(
     names = {one.form.name for one in supposed}
     for one in stage.refits:
         if not one.log_evidence > stage.screen.threshold:
-            return None
+            continue
         coordinates = one.form.variant.coordinates(rules.coordinates)
         excess = sum(base_at[name].excess for name in coordinates)
         enough = not supposed or one.gain >= REAL_SHARE * excess
