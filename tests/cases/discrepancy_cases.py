@@ -15,6 +15,7 @@ from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     CONFUSIONS,
+    FIELD_NUMBERS,
     GAP,
     HELD_OUT,
     IMPERFECTIONS,
@@ -246,6 +247,7 @@ def _tables(answer: str) -> Mapping[str, tuple[Table, Rows]]:
         "held_out": (HELD_OUT, _held_out(wide, named)),
         "imperfections": (IMPERFECTIONS, _imperfections()),
         "next_tests": (NEXT_TESTS, _next_tests(answer)),
+        "field_numbers": (FIELD_NUMBERS, _field_numbers() if named else []),
     }
 
 
@@ -468,3 +470,29 @@ def _next_tests(answer: str) -> Rows:
         "message": "withheld until joint_centre is known to 0.5 mm instead of 2 mm",
     }
     return [*rows, known] if answer == "NULL" else rows
+
+
+def _field_numbers() -> Rows:
+    """A neutral zone at L4L5 in extension: soft at rest, twice 1.5 deg wide."""
+    told = {"stiffness_at_zero": (0.21, "N m/deg"), "zone": (3.0, "deg")}
+    told |= {f"stiffness_at_{side}": (1.0, "N m/deg") for side in ("minus", "plus")}
+    told |= {"break_minus": (-1.5, "deg"), "break_plus": (1.5, "deg")}
+    told["loop_area"] = (4.0, "N m deg")
+    return [
+        {
+            "model": "with_effects",
+            "specimen": specimen,
+            "joint": "L4L5",
+            "coordinate": "extension",
+            "number": number,
+            "load": 5.0,
+            "value": value,
+            "unit": unit,
+            "low": None if number == "loop_area" else value - 0.05,
+            "high": None if number == "loop_area" else value + 0.05,
+            "at_bound": False,
+            "specimens": 3 if specimen == "*" else 1,
+        }
+        for specimen in (*SPECIMENS, "*")
+        for number, (value, unit) in told.items()
+    ]

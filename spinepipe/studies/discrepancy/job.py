@@ -23,6 +23,7 @@ from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
+from spinepipe.studies.discrepancy.curve_numbers import field_number_rows, numbers_at, reaches
 from spinepipe.studies.discrepancy.design.advice import advice
 from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
@@ -61,6 +62,7 @@ from spinepipe.studies.discrepancy.store import Run, Store
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     CONFUSIONS,
+    FIELD_NUMBERS,
     GAP,
     HELD_OUT,
     IMPERFECTIONS,
@@ -127,6 +129,7 @@ def run(
     held_out: str,
     imperfections: str,
     next_tests: str,
+    field_numbers: str,
     design: str,
     model_base: str,
     model_with_effects: str,
@@ -144,6 +147,7 @@ def run(
         held_out: HELD_OUT,
         imperfections: IMPERFECTIONS,
         next_tests: NEXT_TESTS,
+        field_numbers: FIELD_NUMBERS,
     }
     for path, table in files.items():
         write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
@@ -213,14 +217,17 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     ended = ended.as_told()
     imperfect = _imperfections(ready.cohort.joint_names, ended, run)
     stays = _beyond(ended, run)
+    rows = _rows(ready.cohort.joint_names, ended, told)
+    numbers = _field_numbers(ended, rows[GAP.name])
     return Results(
         verdict=replace(
-            _verdict(ready, ended, told, stays),
+            _verdict(ready, ended, told, stays, numbers),
             imperfections=told_imperfections(imperfect["with_effects"]),
             tabulated=stays.table,
         ),
         rows={
-            **_rows(ready.cohort.joint_names, ended, told),
+            **rows,
+            FIELD_NUMBERS.name: numbers,
             IMPERFECTIONS.name: [
                 row for model, one in imperfect.items() for row in imperfection_rows(one, model)
             ],
@@ -273,6 +280,14 @@ def _rows(
     }
 
 
+def _field_numbers(ended: Investigation, gap: Sequence[Row]) -> Sequence[Row]:
+    """What a tester reads off the curves that effects which stand, named or tied, change."""
+    told = {one.name for one in ended.ended.named} | set(ended.ended.tied)
+    forms = [one.supposed.form for one in ended.found.standing if one.name in told]
+    fits = ended.found.base.fit, ended.found.final.fit
+    return field_number_rows(*fits, forms, reaches(gap)) if forms else ()
+
+
 def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
     file = ready.file
     base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
@@ -280,7 +295,11 @@ def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
 
 
 def _verdict(
-    ready: Prepared, investigation: Investigation, told: ToldApart, stays: Beyond
+    ready: Prepared,
+    investigation: Investigation,
+    told: ToldApart,
+    stays: Beyond,
+    numbers: Sequence[Row],
 ) -> Verdict:
     cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
@@ -296,7 +315,7 @@ def _verdict(
         cohort=cohort.name,
         verdict=ended.verdict,
         why=ended.why,
-        effects=tuple(_missing(found, one, cohort) for one in ended.named),
+        effects=tuple(_missing(found, one, cohort, numbers) for one in ended.named),
         candidates_in_set=ended.tied,
         not_testable=told.not_testable,
         noise=_noise(found.base.noise),
@@ -314,7 +333,7 @@ def _verdict(
     )
 
 
-def _missing(found: Found, one: Standing, cohort: Cohort) -> Missing:
+def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]) -> Missing:
     number = next(k for k, standing in enumerate(found.standing) if standing is one)
     form = one.supposed.form
     return Missing(
@@ -335,6 +354,7 @@ def _missing(found: Found, one: Standing, cohort: Cohort) -> Missing:
         ),
         log_evidence=one.log_evidence,
         rivals=tuple(Rival(other.name, other.margin) for other in one.rivals[:MOST_RIVALS]),
+        field_numbers=numbers_at(numbers, form, cohort.joint_names),
     )
 
 

@@ -9,6 +9,7 @@ from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     CONFUSIONS,
+    FIELD_NUMBERS,
     GAP,
     HELD_OUT,
     IMPERFECTIONS,
@@ -93,7 +94,7 @@ class DiscrepancyFiles(StudyFiles):
         return OTHERS
 
 
-TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS)
+TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS, FIELD_NUMBERS)
 
 KIND = Kind(
     settings=Discrepancy,

@@ -1,6 +1,7 @@
 """Tables of studies of kind discrepancy: where a model is wrong, and what was tried to mend it."""
 
 from spinepipe.effects import Kind, Spread
+from spinepipe.effects.field_numbers import NUMBERS
 from spinepipe.status import Status
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.units import COORDINATES
@@ -293,5 +294,58 @@ NEXT_TESTS = Table(
             allowed=ADVICE,
         ),
         MESSAGE,
+    ),
+)
+
+FIELD_NUMBERS = Table(
+    "field_numbers",
+    "What a tester reads off a joint's curve of load over motion, whatever the formula of its law: "
+    "one row per joint and coordinate that an effect which stands changes, number, specimen, and "
+    "model; and one per mean over the specimens. The joint is moved along one coordinate, the "
+    "others at rest; of the models, not of the readings. A number that is not there has no row.",
+    ("model", "specimen", "joint", "coordinate", "number"),
+    (
+        Column("model", "text", "base, or with the effects", allowed=MODELS),
+        _place("specimen"),
+        JOINT,
+        Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
+        Column(
+            "number",
+            "text",
+            "stiffness_at_zero: slope at rest. stiffness_at_..., motion_at_...: slope and motion "
+            "at the load, to its minus and plus side. break_...: motion at which the slope is half "
+            "way from that at rest to that at the load. zone: distance of the breaks, where the "
+            "joint is softer at rest than at both loads. loop_area: work lost in a cycle between "
+            "the loads. drift_per_decade: motion from 1 to 10 minutes under the plus load over "
+            "that at once",
+            allowed=NUMBERS,
+        ),
+        Column(
+            "load",
+            "number",
+            "at which it is told: 5 N m or 50 N, or what the tests reach, if that is less",
+            "N m of rotations, N of translations",
+            low=0.0,
+        ),
+        Column("value", "number", "the number", "see unit"),
+        Column(
+            "unit",
+            "text",
+            "of the value; 1: a share",
+            allowed=("N m/deg", "deg", "N m deg", "N/mm", "mm", "J", "1"),
+        ),
+        *(
+            Column(
+                end,
+                "number",
+                f"{word} end of the 95 % interval, by the errors of all fitted values to first "
+                "order",
+                "see unit",
+                "the number comes and goes within the errors",
+            )
+            for end, word in (("low", "lower"), ("high", "upper"))
+        ),
+        Column("at_bound", "flag", "whether a fitted value that it hangs on ended at a bound"),
+        Column("specimens", "integer", "specimens in it", low=1),
     ),
 )

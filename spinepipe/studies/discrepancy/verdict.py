@@ -86,6 +86,28 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class FieldNumber:
+    """A number that a tester reads off the curve of a joint, whatever the formula of its law.
+
+    Attributes
+    ----------
+    name : of `spinepipe.effects.field_numbers.NUMBERS`; minus and plus are the sides of the load.
+    specimens : whose mean it is. load : at which it is told, N m or N.
+    unit : N m/deg, deg, N m deg of rotations, N/mm, mm, J of translations, 1 for a share.
+    ci95 : by the errors of all fitted values; None where the number comes and goes within them.
+    """
+
+    name: str
+    joint: str
+    coordinate: str
+    specimens: int
+    load: float
+    value: float
+    unit: str
+    ci95: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class Missing:
     """An effect that is missing.
 
@@ -93,6 +115,8 @@ class Missing:
     ----------
     variant : its options. spread : how values may differ between places.
     log_evidence : against the model without it. rivals : best first.
+    field_numbers : of the joints it acts on, with all that the model has there; means over the
+        specimens. Those of each are in field_numbers.parquet.
     """
 
     name: str
@@ -103,6 +127,7 @@ class Missing:
     parameters: tuple[Estimate, ...]
     log_evidence: float
     rivals: tuple[Rival, ...]
+    field_numbers: tuple[FieldNumber, ...] = ()
 
 
 @dataclass(frozen=True)

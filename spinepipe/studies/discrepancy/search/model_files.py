@@ -164,6 +164,12 @@ def border(unit: str, value: float) -> tuple[float, str]:
 
 def standard_errors(fit: JointFit) -> Array:
     """(m,) of all unknowns, priors counted in."""
+    return np.sqrt(np.diagonal(covariance(fit)))
+
+
+def covariance(fit: JointFit) -> Array:
+    """(m, m) of all unknowns, priors counted in."""
     jacobian = fit.whole_jacobian()
     precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
-    return np.sqrt(np.diagonal(np.linalg.inv(precision)))
+    inverse: Array = np.linalg.inv(precision)
+    return inverse
