@@ -14,7 +14,7 @@ from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
 from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Stage
 from spinepipe.studies.discrepancy.search.refit import Refit, preferred
-from spinepipe.studies.discrepancy.search.screen import Screen, Screened
+from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
 
 MARGIN, NEEDED = 3.0, 5.0
 NAMES = ("neutral_zone", "nonlinear_stiffening", "facet_contact")
@@ -23,6 +23,10 @@ NAMES = ("neutral_zone", "nonlinear_stiffening", "facet_contact")
 def supposed(name: str) -> Supposed:
     variant = Variant(name, (("coordinate", "extension"),))
     return Supposed(Form(variant, Spread.SHARED), variant.off((0.0,) * len(variant.shapes)))
+
+
+def on_screen(name: str, log_evidence: float) -> Tried:
+    return Tried(supposed(name).form, (), (), log_evidence, np.zeros(0), 0.0)
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Says:
         evidence = self.evidence.get(place.names, {})
         tried = tuple(self._refit(place, name) for name in evidence)
         effects = tuple(
-            Screened(n, evidence.get(n, 0.0), np.zeros(1), ())
+            Screened(n, evidence.get(n, 0.0), np.zeros(1), (on_screen(n, evidence.get(n, 0.0)),))
             for n in sorted(NAMES, key=lambda name: -evidence.get(name, 0.0))
         )
         return Stage("", Screen(effects, NEEDED, 100), tried, bool(in_place_of))

@@ -86,8 +86,8 @@ def _one(
     if two is not None:
         if two.lead > inquiry.rules.margin and not settled:
             return two.grounds
-        for name in two.names:
-            rivals = _nearest(rivals, Rival(name, -two.lead))
+        for form in two.forms:
+            rivals = _nearest(rivals, Rival(form.name, -two.lead, form.variant.acts_on))
     over = _over_stiffness(without, own, inquiry)
     alone = _alone(one, inquiry)
     return Standing(one, own.log_evidence, alone, own.gain, rivals, over)
@@ -160,7 +160,7 @@ def _against_one(
     if best is None or not np.isfinite(best.log_evidence):
         return None, list(stood)
     clearly = best.log_evidence > both + inquiry.rules.margin
-    rival = Rival(best.name, both - best.log_evidence)
+    rival = Rival(best.name, both - best.log_evidence, best.form.variant.acts_on)
     return without.at(best.fit) if clearly else None, [
         replace(one, rivals=_nearest(one.rivals, rival)) if number in pair else one
         for number, one in enumerate(stood)
@@ -172,7 +172,7 @@ class _Two:
     """Two effects in the place of one, and the evidence by which they are ahead of it."""
 
     grounds: Grounds
-    names: tuple[str, str]
+    forms: tuple[Form, Form]
     lead: float
 
 
@@ -203,15 +203,16 @@ def _two_simpler(
     lead = first.log_evidence + second.log_evidence - own.log_evidence
     if lead < -inquiry.rules.margin:
         return None
-    return _Two(beside.at(second.fit), (first.name, second.name), lead)
+    return _Two(beside.at(second.fit), (first.form, second.form), lead)
 
 
 def _nearest(rivals: Sequence[Rival], further: Rival) -> tuple[Rival, ...]:
     """Rivals with one more, each by its smallest margin; nearest first."""
-    margins = {other.name: other.margin for other in rivals}
-    margins[further.name] = min(further.margin, margins.get(further.name, np.inf))
-    ranked = sorted(margins.items(), key=lambda item: item[1])
-    return tuple(Rival(name, margin) for name, margin in ranked)
+    nearest = {other.name: other for other in rivals}
+    known = nearest.setdefault(further.name, further)
+    if further.margin < known.margin:
+        nearest[further.name] = further
+    return tuple(sorted(nearest.values(), key=lambda one: one.margin))
 
 
 def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], inquiry: Inquiry) -> Refit:
@@ -241,12 +242,16 @@ def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, 
 
     Effects whose every refit was impossible are none.
     """
-    evidence = {one.effect: one.log_evidence for one in screen.effects}
-    refitted: dict[str, float] = {}
+    best: dict[str, tuple[float, Form]] = {}
     for other in tried:
-        refitted[other.name] = max(refitted.get(other.name, -np.inf), other.log_evidence)
-    evidence |= refitted
-    possible = [(n, v) for n, v in evidence.items() if n != own.name and np.isfinite(v)]
-    ranked = sorted(possible, key=lambda item: -item[1])
+        if other.log_evidence > best.get(other.name, (-np.inf,))[0] or other.name not in best:
+            best[other.name] = (other.log_evidence, other.form)
+    for effect in screen.effects:
+        best.setdefault(effect.effect, (effect.log_evidence, effect.forms[0].form))
     mine = _of_effect(own, tried)
-    return tuple(Rival(name, mine - value) for name, value in ranked)
+    found = [
+        Rival(name, mine - evidence, form.variant.acts_on)
+        for name, (evidence, form) in best.items()
+        if name != own.name and np.isfinite(evidence)
+    ]
+    return tuple(sorted(found, key=lambda one: one.margin))

@@ -42,10 +42,14 @@ class Rules:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another effect in the place of a named one, and by how much evidence it is behind."""
+    """Another effect in the place of a named one, and by how much evidence it is behind.
+
+    ``on`` : the coordinates that its best form loads; none where it names none.
+    """
 
     name: str
     margin: float
+    on: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
