@@ -114,6 +114,24 @@ def numbers_of(laws: Sequence[Law], coordinate: str, load: float) -> dict[str, A
     return {name: np.concatenate([part[name] for part in parts]) for name in NUMBERS}
 
 
+def load_over(laws: Sequence[Law], coordinate: str, along: str, motions: Array) -> Array:
+    """(n,) N m or N on a coordinate of a joint moved along a coordinate, m or rad, to motions (n,).
+
+    The others are at rest; laws that remember a path are at the start of it.
+    """
+    place = np.zeros((len(motions), 6))
+    place[:, COORDINATES.index(along)] = motions
+    load = np.zeros_like(place)
+    for effect, values in laws:
+        rows = np.repeat(np.asarray(values)[None], len(motions), axis=0)
+        if isinstance(effect, PathLaw):
+            state = np.zeros((len(motions), effect.n_states))
+            load = load + effect.respond_on_path(place, rows, state, 0.0, load).load
+        elif isinstance(effect, JointLaw):
+            load = load + effect.respond(place, rows, load).load
+    return load[:, COORDINATES.index(coordinate)]
+
+
 def _some(laws: Sequence[Law], coordinate: str, load: float) -> dict[str, Array]:
     joints = _Joints(laws, coordinate)
     rest = joints.slopes(np.zeros((joints.count, 1)))[:, 0]

@@ -20,6 +20,7 @@ from spinepipe.studies.discrepancy.tables import (
     HELD_OUT,
     IMPERFECTIONS,
     NEXT_TESTS,
+    TABULATED,
     WHERE,
 )
 from spinepipe.tables import Table, Tables, from_rows, write
@@ -248,6 +249,7 @@ def _tables(answer: str) -> Mapping[str, tuple[Table, Rows]]:
         "imperfections": (IMPERFECTIONS, _imperfections()),
         "next_tests": (NEXT_TESTS, _next_tests(answer)),
         "field_numbers": (FIELD_NUMBERS, _field_numbers() if named else []),
+        "tabulated": (TABULATED, _tabulated() if answer in ("PART", "UNKNOWN") else []),
     }
 
 
@@ -495,4 +497,27 @@ def _field_numbers() -> Rows:
         }
         for specimen in (*SPECIMENS, "*")
         for number, (value, unit) in told.items()
+    ]
+
+
+def _tabulated() -> Rows:
+    """Axial rotation at L3L4 that softens to the left."""
+    loads = {-2.0: -6.0, 0.0: 0.0, 2.0: 3.0}
+    return [
+        {
+            "specimen": specimen,
+            "joint": "L3L4",
+            "coordinate": "left_rotation",
+            "over": "left_rotation",
+            "motion": motion,
+            "motion_unit": "deg",
+            "load": load,
+            "low": load - 0.1 * abs(load),
+            "high": load + 0.1 * abs(load),
+            "base": 2.5 * motion,
+            "load_unit": "N m",
+            "specimens": 3 if specimen == "*" else 1,
+        }
+        for specimen in (*SPECIMENS, "*")
+        for motion, load in loads.items()
     ]

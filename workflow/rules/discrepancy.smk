@@ -18,6 +18,7 @@ rule discrepancy_search:
         imperfections=f"{DISCREPANCIES}/imperfections.parquet",
         next_tests=f"{DISCREPANCIES}/next_tests.parquet",
         field_numbers=f"{DISCREPANCIES}/field_numbers.parquet",
+        tabulated=f"{DISCREPANCIES}/tabulated.parquet",
         design=f"{DISCREPANCIES}/design.csv",
         model_base=f"{DISCREPANCIES}/model_base.yaml",
         model_with_effects=f"{DISCREPANCIES}/model_with_effects.yaml",

@@ -1,8 +1,6 @@
 """Numbers that a tester reads off the curves of fitted joints, with intervals.
 
-A number is that of the joint with all laws that the model has there. How it follows each fitted
-value is found by moving that value a little both ways and reading it off again; with the covariance
-of the fit that makes its interval (delta method).
+A number is that of the joint with all laws that the model has there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,18 +12,14 @@ import numpy as np
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
 from spinepipe.effects.field_numbers import NUMBERS, numbers_of, usual_load
-from spinepipe.model import SpineModel
-from spinepipe.statics import moved
+from spinepipe.studies.discrepancy.read_off import Laws, laws_at, mean_of, told
 from spinepipe.studies.discrepancy.search.hypothesis import Form
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import NORMAL_95, covariance
+from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY, FieldNumber
 from spinepipe.units import COORDINATES, DEG_PER_RAD, LOAD_UNITS, MM_PER_M, TRANSLATIONS
 
 Row = dict[str, Any]
-
-STEP = 0.05
-"""Standard errors that a fitted value is moved by."""
 
 NEARLY = 0.8
 """Share of the usual load from which tests are said to reach it."""
@@ -159,19 +153,6 @@ def _changes(fit: JointFit, form: Form, joint: int, coordinate: str, load: float
     return False
 
 
-Laws = list[tuple[Effect, Array]]
-
-
-def laws_at(model: SpineModel, joint: int) -> Laws:
-    """Laws of a joint in all tests, with their parameters (P,), in order."""
-    return [
-        (one.effect, one.values[one.joints.index(joint) if one.effect.per_joint else 0])
-        for one in model.effects
-        if isinstance(one.effect, JointLaw | PathLaw) and joint in one.joints
-        if one.tests == EVERY
-    ]
-
-
 def _read(joints: Sequence[Laws], coordinate: str, load: float) -> list[Array]:
     """(N,) numbers of each joint in the order of `NUMBERS`; joints with the same laws together."""
     alike: dict[tuple[Effect, ...], list[int]] = {}
@@ -190,31 +171,18 @@ def _read(joints: Sequence[Laws], coordinate: str, load: float) -> list[Array]:
     return found
 
 
-@dataclass(frozen=True)
-class _Told:
-    """Numbers (N,) of a joint of a specimen, their slopes (N, m) by all unknowns, and whether a
-    number hangs on one at a bound (N,)."""
-
-    values: Array
-    slopes: Array
-    at_bound: Array
-
-
 def _of_place(place: Row, fit: JointFit, specimens: Sequence[str], reach: Reach) -> Iterator[Row]:
     """Rows of each specimen, and of their mean, at a joint, coordinate and load."""
     coordinate, load = place["coordinate"], place["load"]
-    told = _told(fit, specimens, place["joint"], coordinate, load)
+    found = told(fit, specimens, place["joint"], lambda laws: _read(laws, coordinate, load))
     spread = covariance(fit)
     for number, name in enumerate(NUMBERS):
         if not _seen(name, reach, load):
             continue
-        there = {s: one for s, one in told.items() if np.isfinite(one.values[number])}
+        there = {s: one for s, one in found.items() if np.isfinite(one.values[number])}
         groups = [(specimen, [one]) for specimen, one in there.items()]
         for specimen, ones in [*groups, *([(EVERY[0], list(there.values()))] if there else [])]:
-            value = float(np.mean([one.values[number] for one in ones]))
-            slope = np.mean([one.slopes[number] for one in ones], axis=0)
-            variance = float(slope @ spread @ slope)
-            away = NORMAL_95 * np.sqrt(variance) if np.isfinite(variance) else None
+            value, away = mean_of(ones, number, spread)
             yield {
                 **place,
                 "specimen": specimen,
@@ -232,62 +200,6 @@ def _seen(number: str, reach: Reach, load: float) -> bool:
         return all(sides)
     side = _SIDES.get("plus" if number == "drift_per_decade" else number.rpartition("_")[2])
     return side is None or sides[side]
-
-
-def _told(
-    fit: JointFit, specimens: Sequence[str], joint: str, coordinate: str, load: float
-) -> dict[str, _Told]:
-    """Numbers by specimen, read off where the fit stands and beside it."""
-    errors = np.sqrt(np.diagonal(covariance(fit)))
-    asked: list[tuple[str, int | None, float]] = []
-    curves: list[Laws] = []
-    for specimen in specimens:
-        member = fit.hypothesis.members[specimen]
-        at = fit.models[specimen].joints.index(joint)
-        own = fit.x[list(member.numbers)]
-        here = laws_at(moved(member.model, member.free, own), at)
-        asked.append((specimen, None, 0.0))
-        curves.append(here)
-        for place, unknown in enumerate(member.numbers):
-            limits = fit.hypothesis.unknowns[unknown]
-            for side in (-1.0, 1.0):
-                to = np.clip(own[place] + side * STEP * errors[unknown], limits.low, limits.high)
-                there = laws_at(moved(member.model, member.free, _with(own, place, to)), at)
-                if any(np.any(a != b) for (_, a), (_, b) in zip(here, there, strict=True)):
-                    asked.append((specimen, unknown, float(to - own[place])))
-                    curves.append(there)
-    read = _read(curves, coordinate, load)
-    return {
-        specimen: _one(fit, specimen, asked, read)
-        for specimen, unknown, _ in asked
-        if unknown is None
-    }
-
-
-def _with(x: Array, place: int, value: float) -> Array:
-    changed = x.copy()
-    changed[place] = value
-    return changed
-
-
-def _one(
-    fit: JointFit, specimen: str, asked: Sequence[tuple[str, int | None, float]], read: list[Array]
-) -> _Told:
-    values = next(
-        found
-        for (name, unknown, _), found in zip(asked, read, strict=True)
-        if name == specimen and unknown is None
-    )
-    beside: dict[int, list[tuple[float, Array]]] = {}
-    for (name, unknown, away), found in zip(asked, read, strict=True):
-        if name == specimen and unknown is not None:
-            beside.setdefault(unknown, []).append((away, found))
-    slopes, at_bound = np.zeros((len(values), len(fit.x))), np.zeros(len(values), dtype=bool)
-    for unknown, sides in beside.items():
-        (low, first), (high, last) = sides if len(sides) == 2 else ((0.0, values), sides[0])
-        slopes[:, unknown] = (last - first) / (high - low)
-        at_bound |= fit.at_bound[unknown] & (slopes[:, unknown] != 0.0)
-    return _Told(values, slopes, at_bound)
 
 
 def _in_field_units(name: str, coordinate: str, value: float, away: float | None) -> Row:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from spinepipe.studies.discrepancy.design.withheld import Withheld
 from spinepipe.studies.discrepancy.search.imperfections import (
     EVERYWHERE,
     Imperfection,
@@ -16,6 +17,7 @@ from spinepipe.studies.discrepancy.verdict import (
     Imperfections,
     KindOfImperfection,
     LargeImperfection,
+    WithheldEffect,
 )
 
 Row = dict[str, Any]
@@ -74,6 +76,13 @@ def told_imperfections(taken: TakenUp) -> Imperfections:
         parts.append(_one_large(largest[0]))
     message = " ".join(part for part in parts if part)
     return Imperfections(without, taken.beside.gap, kinds, largest, common, message)
+
+
+def told_withheld(one: Withheld) -> WithheldEffect:
+    """An effect that an imperfection hides, and to what that would have to be known."""
+    allowed, unit = border(one.unit, one.prior)
+    known = None if one.needed is None else one.needed * allowed
+    return WithheldEffect(one.effect, one.kind, allowed, known, unit, one.now, one.at[0.0])
 
 
 def _large(one: Imperfection) -> LargeImperfection:

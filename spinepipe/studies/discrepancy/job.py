@@ -24,10 +24,14 @@ from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, wri
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
 from spinepipe.studies.discrepancy.curve_numbers import field_number_rows, numbers_at, reaches
-from spinepipe.studies.discrepancy.design.advice import advice
+from spinepipe.studies.discrepancy.design.advice import advice, hidden_effects
 from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
-from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
+from spinepipe.studies.discrepancy.imperfection_rows import (
+    imperfection_rows,
+    told_imperfections,
+    told_withheld,
+)
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
 from spinepipe.studies.discrepancy.rows import (
     candidate_rows,
@@ -59,6 +63,7 @@ from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store
+from spinepipe.studies.discrepancy.table_rows import tabulated_rows
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     CONFUSIONS,
@@ -67,6 +72,7 @@ from spinepipe.studies.discrepancy.tables import (
     HELD_OUT,
     IMPERFECTIONS,
     NEXT_TESTS,
+    TABULATED,
     WHERE,
 )
 from spinepipe.studies.discrepancy.verdict import (
@@ -130,6 +136,7 @@ def run(
     imperfections: str,
     next_tests: str,
     field_numbers: str,
+    tabulated: str,
     design: str,
     model_base: str,
     model_with_effects: str,
@@ -148,6 +155,7 @@ def run(
         imperfections: IMPERFECTIONS,
         next_tests: NEXT_TESTS,
         field_numbers: FIELD_NUMBERS,
+        tabulated: TABULATED,
     }
     for path, table in files.items():
         write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
@@ -217,17 +225,20 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     ended = ended.as_told()
     imperfect = _imperfections(ready.cohort.joint_names, ended, run)
     stays = _beyond(ended, run)
-    rows = _rows(ready.cohort.joint_names, ended, told)
+    hidden = hidden_effects(ended.found, ended.ended, ended.rules, run)
+    rows = _rows(ready.cohort.joint_names, ended, told, stays)
     numbers = _field_numbers(ended, rows[GAP.name])
     return Results(
         verdict=replace(
             _verdict(ready, ended, told, stays, numbers),
             imperfections=told_imperfections(imperfect["with_effects"]),
             tabulated=stays.table,
+            withheld=tuple(map(told_withheld, hidden)),
         ),
         rows={
             **rows,
             FIELD_NUMBERS.name: numbers,
+            TABULATED.name: _tabulated(ended, stays),
             IMPERFECTIONS.name: [
                 row for model, one in imperfect.items() for row in imperfection_rows(one, model)
             ],
@@ -238,6 +249,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
                     ended.rules,
                     bench(ended.grounds, ready.declared),
                     run,
+                    hidden,
                 )
             ),
         },
@@ -267,12 +279,24 @@ def _imperfections(joints: Sequence[str], ended: Investigation, run: Run) -> Map
     return {"base": base, "with_effects": final}
 
 
+def _tabulated(ended: Investigation, stays: Beyond) -> Sequence[Row]:
+    """The tables of what has no name, point by point."""
+    if stays.table is None:
+        return ()
+    return tabulated_rows(ended.found.base.fit, stays.grounds.fit)
+
+
 def _rows(
-    joints: Sequence[str], ended: Investigation, told: ToldApart
+    joints: Sequence[str], ended: Investigation, told: ToldApart, stays: Beyond
 ) -> Mapping[str, Sequence[Row]]:
     found, proof = ended.found, ended.proof
     return {
-        GAP.name: gap_rows(found, joints, held_out_readings(proof)),
+        GAP.name: gap_rows(
+            found,
+            joints,
+            held_out_readings(proof),
+            None if stays.table is None else stays.grounds.fit,
+        ),
         CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
         WHERE.name: where_rows(found, joints),
         CONFUSIONS.name: confusion_rows(told),

@@ -14,6 +14,7 @@ from spinepipe.studies.discrepancy.tables import (
     HELD_OUT,
     IMPERFECTIONS,
     NEXT_TESTS,
+    TABULATED,
     WHERE,
 )
 from spinepipe.studies.kind import Job, Kind
@@ -94,7 +95,10 @@ class DiscrepancyFiles(StudyFiles):
         return OTHERS
 
 
-TABLES = (GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS, FIELD_NUMBERS)
+TABLES = (
+    *(GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS),
+    *(FIELD_NUMBERS, TABULATED),
+)
 
 KIND = Kind(
     settings=Discrepancy,

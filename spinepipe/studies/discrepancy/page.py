@@ -10,11 +10,21 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
 from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.advice_words import shown_advice
+from spinepipe.studies.discrepancy.field_tables import (
+    FORMULA_ABOUT,
+    NUMBERS_ABOUT,
+    TABULATED_ABOUT,
+    WITHHELD_ABOUT,
+    formula_shown,
+    numbers_shown,
+    tabulated_shown,
+    withheld_shown,
+)
 from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
 from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TESTS, WHERE
-from spinepipe.studies.discrepancy.verdict import Answer, Missing, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import Answer, Formula, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import (
     called,
     differing,
@@ -103,11 +113,17 @@ _TITLES = {
 }
 """Tables from the verdict in their order: title, and what is said of each."""
 
+AFTER = "set"
+"""Behind this one stand the tables in the field's units."""
+
 QUESTION = (
     "Where do model and measurement disagree, which effect does the model lack, what happens when "
     "it is added, and how sure is that?"
 )
-READ = ("where", "candidates", "held_out", "confusions", "next_tests")
+READ = (
+    *("where", "candidates", "held_out", "confusions", "next_tests"),
+    *("field_numbers", "tabulated"),
+)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
@@ -141,13 +157,42 @@ def _joined(words: str) -> str:
 def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
     """Tables with rows, those that say most first."""
     made = _from_verdict(verdict)
-    found = [
-        sortable("verdict", *_TITLES[name], pd.DataFrame(made[name]), _COLUMNS[name])
-        for name in _TITLES
-        if made[name]
-    ]
+    found = []
+    for name in _TITLES:
+        if made[name]:
+            rows = pd.DataFrame(made[name])
+            found.append(sortable("verdict", *_TITLES[name], rows, _COLUMNS[name]))
+        if name == AFTER:
+            shown = in_field_units(verdict, results)
+            found += [sortable(*parts) for parts in shown if len(parts[3])]
     found += [sortable(*parts) for parts in file_tables(results) if len(parts[3])]
     return [table for table in found if table.rows]
+
+
+def in_field_units(verdict: Verdict, results: Results) -> Iterator[Parts]:
+    """File, title, what is said of it, rows and columns of tables in the field's units."""
+    told = verdict.part or verdict.unknown
+    formula = None if told is None else told.formula
+    numbers = numbers_shown(results.table("field_numbers"))
+    which = "" if verdict.effects else " Of the likeliest of those that cannot be told apart."
+    title = "What a tester reads off the curves"
+    yield "field_numbers", title, NUMBERS_ABOUT + which, *numbers
+    title = "A formula in the place of a name"
+    yield "verdict", title, FORMULA_ABOUT + _share(formula), *formula_shown(formula)
+    table = tabulated_shown(results.table("tabulated"))
+    yield "tabulated", "A table in the place of a name", TABULATED_ABOUT, *table
+    title = "Hidden by imperfections"
+    yield "verdict", title, WITHHELD_ABOUT, *withheld_shown(verdict.withheld)
+
+
+def _share(formula: Formula | None) -> str:
+    """How much the whole formula says, in the fit and held out."""
+    if formula is None:
+        return ""
+    told = f" Together {100.0 * formula.explained:.0f}\u00a0% of what is above the noise"
+    if formula.held_out_closed is None:
+        return f"{told}."
+    return f"{told}, and {100.0 * formula.held_out_closed:.0f}\u00a0% in readings left out."
 
 
 def _from_verdict(verdict: Verdict) -> dict[str, Records]:

@@ -15,6 +15,7 @@ from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, Place, places, residual_frame
 from spinepipe.studies.discrepancy.search.hypothesis import Form, shape_at
 from spinepipe.studies.discrepancy.search.inquiry import Found, Stage
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import border, fitted_values
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
@@ -31,20 +32,28 @@ NOT_FITTED = "the linear problem, no fit"
 DEGENERATE = "a shape ran to its bound: no more what its name says"
 
 
+_MODELLED = (
+    *("measured", "base", "with_effects", "with_table"),
+    *("held_out_base", "held_out_with_effects"),
+)
+
+
 def gap_rows(
     found: Found,
     joints: Sequence[str],
     held_out: Mapping[str, Sequence[tuple[Array, Array, Array]]],
+    tabulated: JointFit | None = None,
 ) -> list[Row]:
     """Every reading with both models; tests of one name with several load histories averaged.
 
     Parameters
     ----------
     held_out : by specimen, per load history (T, J, 6): fold, base and with effects held out.
+    tabulated : the fit with tables besides, where there are some.
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
     for name, readings in found.base.readings.items():
-        for key, row in _rows_of(found, name, readings, joints, held_out.get(name)):
+        for key, row in _rows_of(found, name, readings, joints, held_out.get(name), tabulated):
             collected.setdefault(key, []).append(row)
     return [_averaged(key, rows) for key, rows in collected.items()]
 
@@ -55,9 +64,11 @@ def _rows_of(
     readings: SpecimenReadings,
     joints: Sequence[str],
     held_out: Sequence[tuple[Array, Array, Array]] | None,
+    tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
     noise = found.base.noise
     base, final = found.base.fit.predicted[name], found.final.fit.predicted[name]
+    table = None if tabulated is None else tabulated.predicted[name]
     loads = readings.applied
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
@@ -81,6 +92,7 @@ def _rows_of(
                 "readings": count,
                 "base": float(base[number][t, j, c] * factor),
                 "with_effects": float(final[number][t, j, c] * factor),
+                "with_table": None if table is None else float(table[number][t, j, c] * factor),
                 "noise_sd": float(sd[t, c] / np.sqrt(count)),
                 "held_out_fold": fold,
                 "held_out_base": out_base,
@@ -100,8 +112,8 @@ def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
     assert rig.read_as is not None
     per, load = float(BORDER_PER_SI[coordinate]) * rig.read_as, row["load"]
     told: Row = {"noise_sd": row["noise_sd"] / per}
-    for name in ("measured", "base", "with_effects", "held_out_base", "held_out_with_effects"):
-        told[name] = None if row[name] is None else load + row[name] / per
+    for name in _MODELLED:
+        told[name] = None if row.get(name) is None else load + row[name] / per
     held_at = rig.value * float(BORDER_PER_SI[coordinate])
     return row | told | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
 
@@ -115,8 +127,9 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     found: Row = {"readings": readings, "unit": rows[0]["unit"]}
     held = [row["held_at"] for row in rows]
     found["held_at"] = None if None in held else sum(held) / len(held)
-    for name in ("load", "measured", "base", "with_effects"):
-        found[name] = sum(row[name] * row["readings"] for row in rows) / readings
+    for name in ("load", "measured", "base", "with_effects", "with_table"):
+        told = [row[name] * row["readings"] for row in rows if row[name] is not None]
+        found[name] = sum(told) / readings if len(told) == len(rows) else None
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
     same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
     found["held_out_fold"] = rows[0]["held_out_fold"] if same else ""

@@ -73,6 +73,12 @@ GAP = Table(
             "is named",
             _NO_POSE,
         ),
+        _motion(
+            "with_table",
+            "the same with tables in the place of what has no name, as model_with_effects.yaml has "
+            "them",
+            "there is no table",
+        ),
         Column("noise_sd", "number", "SD of the measured mean", _MOTION, low=0.0),
         Column("held_out_fold", "text", "fold in which this row was held out; empty: in none"),
         _motion("held_out_base", "motion of the base model fitted without this row", _NOT_HELD_OUT),
@@ -346,6 +352,35 @@ FIELD_NUMBERS = Table(
             for end, word in (("low", "lower"), ("high", "upper"))
         ),
         Column("at_bound", "flag", "whether a fitted value that it hangs on ended at a bound"),
+        Column("specimens", "integer", "specimens in it", low=1),
+    ),
+)
+
+TABULATED = Table(
+    "tabulated",
+    "What stays without a name, as a table of load over motion: one row per joint, pair of "
+    "coordinates, motion and specimen, and one per mean over specimens; none where the verdict has "
+    "no table. Between motions the load goes straight, and beyond as in the last stretch.",
+    ("specimen", "joint", "coordinate", "over", "motion"),
+    (
+        _place("specimen"),
+        JOINT,
+        Column("coordinate", "text", "coordinate that is loaded", allowed=COORDINATES),
+        Column("over", "text", "coordinate that the joint is moved along", allowed=COORDINATES),
+        Column("motion", "number", "that motion, the others at rest", "see motion_unit"),
+        Column("motion_unit", "text", "unit of the motion", allowed=("mm", "deg")),
+        Column(
+            "load",
+            "number",
+            "load that holds the joint there, springs and named effects included",
+            "see load_unit",
+        ),
+        *(
+            Column(end, "number", f"{word} end of its 95 % interval", "see load_unit")
+            for end, word in (("low", "lower"), ("high", "upper"))
+        ),
+        Column("base", "number", "the same of the base model", "see load_unit"),
+        Column("load_unit", "text", "unit of the loads", allowed=("N", "N m")),
         Column("specimens", "integer", "specimens in it", low=1),
     ),
 )

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.report.words import capital, fixed
+from spinepipe.studies.discrepancy.field_tables import formula_text
 from spinepipe.studies.discrepancy.gap_words import BASE, WITH_EFFECTS, places, shown_most, worst
 from spinepipe.studies.discrepancy.verdict import Formula, Reason, Verdict
 from spinepipe.studies.discrepancy.words import motion_of, readable
@@ -113,14 +114,11 @@ def described(verdict: Verdict) -> Iterator[str]:
 
 
 def _formula(formula: Formula) -> str:
-    lines = readable(formula.text)
-    for typed, printed in (("^2", "²"), ("^3", "³"), (" * ", " × ")):
-        lines = lines.replace(typed, printed)
     share = 100.0 * formula.explained
     closed = "" if formula.held_out_closed is None else _closed(formula.held_out_closed)
     return (
-        f"A formula that describes it, and is no name: {lines}. It explains {fixed(share, 0)} % of "
-        f"what is above the noise{closed}."
+        f"A formula that describes it, and is no name: {formula_text(formula)}. It explains "
+        f"{fixed(share, 0)} % of what is above the noise{closed}."
     )
 
 

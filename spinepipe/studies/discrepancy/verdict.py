@@ -327,6 +327,27 @@ class Imperfections:
 
 
 @dataclass(frozen=True)
+class WithheldEffect:
+    """An effect without a name, as it is no larger than an imperfection that is allowed for.
+
+    Attributes
+    ----------
+    imperfection : its kind. allowed : its prior SD, in ``unit``; 1 is a share.
+    known_to : largest SD at which the effect would be evident; None where knowing this kind alone
+        does not do, or it would have to be known better than anybody can.
+    log_evidence : as things are. log_evidence_if_known : were the imperfection known exactly.
+    """
+
+    name: str
+    imperfection: str
+    allowed: float
+    known_to: float | None
+    unit: str
+    log_evidence: float
+    log_evidence_if_known: float
+
+
+@dataclass(frozen=True)
 class SuspectedError:
     """A mistake that the data point to; nothing is corrected.
 
@@ -359,6 +380,7 @@ class Verdict:
     families : sets of effects that these tests cannot tell apart.
     imperfections : what those allowed for took up; None where the base has no fit.
     tabulated : of UNKNOWN and PART, what the model with effects has besides; None for nothing.
+    withheld : effects that imperfections hide, one for each kind of imperfection that does.
     """
 
     cohort: str
@@ -378,6 +400,7 @@ class Verdict:
     families: tuple[tuple[str, ...], ...] = ()
     imperfections: Imperfections | None = None
     tabulated: Tabulated | None = None
+    withheld: tuple[WithheldEffect, ...] = ()
 
     @property
     def named(self) -> tuple[str, ...]:

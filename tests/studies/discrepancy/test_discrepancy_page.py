@@ -246,8 +246,9 @@ def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
 def test_tables_of_the_page_hold_the_verdict() -> None:
     found = rows_of(frames("NAMED"))
     titles = [table.title for table in shown_tables(verdict_of(VERDICTS["NAMED"]), found)]
-    assert titles[:3] == [
+    assert titles[:4] == [
         "What is missing, and how large it is",
+        "What a tester reads off the curves",
         "Next best names",
         "What these tests cannot show",
     ]

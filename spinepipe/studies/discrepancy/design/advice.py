@@ -69,19 +69,27 @@ class Advice:
 
 
 def advice(
-    found: Found, ended: Outcome, rules: Rules, place: Bench, run: Run
+    found: Found,
+    ended: Outcome,
+    rules: Rules,
+    place: Bench,
+    run: Run,
+    hidden: Sequence[Withheld] | None = None,
 ) -> tuple[Advice, ...]:
-    """All advice; nothing where data are wrong or everything is named."""
+    """All advice; nothing where data are wrong or everything is named.
+
+    Parameters
+    ----------
+    hidden : what `hidden_effects` found, where that is known.
+    """
     if ended.reason is Reason.DATA_ERRORS:
         return ()
-    stands = bool(ended.named or ended.tied)
-    grounds = found.final if stands else found.base
+    grounds = _standing_on(found, ended)
     rows = [row for pair in _pairs(found, ended, rules) for row in run(_of_pair, *pair, place)]
     if ended.verdict in (Answer.PART, Answer.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
-    named = {one.name for one in ended.named} | set(ended.tied)
     threshold = found.stages[0].screen.threshold
-    hidden = withheld(grounds, rules.trials, threshold, sorted(named), run)
+    hidden = hidden_effects(found, ended, rules, run) if hidden is None else hidden
     for one in hidden:
         rows += _of_withheld(grounds, one, threshold)
     first = {one.effect: one for one in reversed(hidden)}
@@ -89,6 +97,19 @@ def advice(
         trials = next(t for t in rules.trials if t.effect == one.effect)
         rows += run(_of_effect, grounds, trials, one.form, one.sds, place)
     return tuple(rows)
+
+
+def hidden_effects(found: Found, ended: Outcome, rules: Rules, run: Run) -> tuple[Withheld, ...]:
+    """Effects that are no larger than the imperfections allowed for; none where data are wrong."""
+    if ended.reason is Reason.DATA_ERRORS:
+        return ()
+    named = {one.name for one in ended.named} | set(ended.tied)
+    threshold = found.stages[0].screen.threshold
+    return withheld(_standing_on(found, ended), rules.trials, threshold, sorted(named), run)
+
+
+def _standing_on(found: Found, ended: Outcome) -> Grounds:
+    return found.final if ended.named or ended.tied else found.base
 
 
 Pair = tuple[str, Fitted, Fitted, float]

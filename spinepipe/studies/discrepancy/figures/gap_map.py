@@ -36,6 +36,7 @@ from spinepipe.report.style import (
     saying,
 )
 from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
+from spinepipe.studies.discrepancy.figures.load_displacement import LABELS, models_shown
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.tables import Tables
 from spinepipe.units import COORDINATES
@@ -49,6 +50,7 @@ PLACE = ["specimen", "test", "joint", "coordinate"]
 LINES: dict[str, dict[str, Any]] = {
     "base": {"color": THEIRS, "ls": "--", "lw": 1.0, "marker": "s", "ms": 3.0, "mew": 0.0},
     "with_effects": {"color": OURS, "ls": "-", "lw": 1.2, "marker": "o", "ms": 2.6, "mew": 0.0},
+    "with_table": {"color": BLACK, "ls": ":", "lw": 1.2, "marker": "d", "ms": 2.6, "mew": 0.0},
 }
 """How each model is drawn."""
 
@@ -62,14 +64,14 @@ def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Fi
     places = worst_places(gap)
     if not places:
         return saying("No motion can be shown: the base model has no pose.")
-    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
+    lines = models_shown(gap)
     (panels,), figure = sections([(len(places), _PANEL_MM)], _STEPS_KEY_MM)
     for index, (axis, place) in enumerate(zip(panels, places, strict=True)):
         rows = gap[(gap[PLACE] == list(place)).all(axis=1)].sort_values("step")
-        _draw(axis, rows, added)
+        _draw(axis, rows, lines)
         _label_steps(axis, index, place, len(cohort.specimen_names))
         _reach(axis, rows["measured"].to_numpy(float), unit(place[-1]))
-    explain_marks(figure, _handles(added), _words_of_steps(places, gap), 4)
+    explain_marks(figure, _handles(lines), _words_of_steps(places, gap), 4)
     return figure
 
 
@@ -84,13 +86,13 @@ def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
     return [tuple(row) for row in like[PLACE].itertuples(index=False)]
 
 
-def _draw(axis: Axes, rows: pd.DataFrame, with_effects: bool) -> None:
+def _draw(axis: Axes, rows: pd.DataFrame, lines: Sequence[str]) -> None:
     x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
     band = _BAND_SD * rows["noise_sd"].to_numpy(float)
     axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
     axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
-    for name, look in LINES.items() if with_effects else [("base", LINES["base"])]:
-        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **look)
+    for name in lines:
+        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **LINES[name])
     axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
 
 
@@ -121,15 +123,13 @@ def _reach(axis: Axes, measured: np.ndarray, of: str) -> None:
     axis.margins(y=0.18)
 
 
-def _handles(with_effects: bool) -> list[Line2D | Patch]:
+def _handles(lines: Sequence[str]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
         Patch(facecolor=GREY, alpha=0.25, lw=0, label="noise of the mean of the cycles, 95 %"),
-        Line2D([], [], label="measured less base model", **LINES["base"]),
     ]
-    if with_effects:
-        label = "measured less model with the effects"
-        handles.append(Line2D([], [], label=label, **LINES["with_effects"]))
-    return handles
+    return handles + [
+        Line2D([], [], label=f"measured less {LABELS[name]}", **LINES[name]) for name in lines
+    ]
 
 
 def _words_of_steps(places: list[tuple[Any, ...]], gap: pd.DataFrame) -> str:

@@ -40,8 +40,13 @@ PLACE = ["specimen", "test", "joint", "coordinate"]
 _LINES: dict[str, dict[str, Any]] = {
     "base": {"color": THEIRS, "ls": (0, (4, 1.5)), "lw": 1.0},
     "with_effects": {"color": OURS, "ls": "-", "lw": 1.2},
+    "with_table": {"color": BLACK, "ls": (0, (1, 1.2)), "lw": 1.3},
 }
-_LABELS = {"base": "base model", "with_effects": "model with the effects"}
+LABELS = {
+    "base": "base model",
+    "with_effects": "model with the effects",
+    "with_table": "model with a table of what has no name",
+}
 _DOT: dict[str, Any] = {"marker": "o", "ms": 3.4, "lw": 0, "mec": BLACK, "mew": 0.6}
 _PANEL_MM, _KEY_MM = 51.0, 18.0
 _JUMP = 2.0
@@ -64,13 +69,13 @@ def load_displacement_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
         return saying(
             "No curve can be shown: the base model has no pose, or no test loads a joint."
         )
-    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
+    lines = models_shown(gap)
     (panels,), figure = sections([(len(curves), _PANEL_MM)], _KEY_MM)
     unloaded = False
     for index, (axis, curve) in enumerate(zip(panels, curves, strict=True)):
-        unloaded |= _draw(axis, curve, added)
+        unloaded |= _draw(axis, curve, lines)
         _label(axis, index, curve, len(cohort.specimen_names))
-    explain_marks(figure, _handles(added, unloaded), _words(gap, curves, cohort), 5)
+    explain_marks(figure, _handles(lines, unloaded), _words(gap, curves, cohort), 5)
     return figure
 
 
@@ -140,7 +145,14 @@ def unloading(load: Array) -> NDArray[np.bool_]:
     return same_side & (np.abs(before) - np.abs(load) > least)
 
 
-def _draw(axis: Axes, curve: Curve, with_effects: bool) -> bool:
+def models_shown(gap: pd.DataFrame) -> tuple[str, ...]:
+    """The models that differ: the base, that with effects, that with tables besides."""
+    added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
+    tabulated = "with_table" in gap and gap["with_table"].notna().any()
+    return ("base", *["with_effects"] * added, *["with_table"] * bool(tabulated))
+
+
+def _draw(axis: Axes, curve: Curve, lines: Sequence[str]) -> bool:
     """Points, their noise and the models' curves; whether there were unloading steps."""
     rows = curve.rows
     load, measured = rows["load"].to_numpy(float), rows["measured"].to_numpy(float)
@@ -157,7 +169,7 @@ def _draw(axis: Axes, curve: Curve, with_effects: bool) -> bool:
         for steps in _branches(way, back):
             low, high = measured[steps] - noise[steps], measured[steps] + noise[steps]
             fill_between(drive[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
-        for name in _LINES if with_effects else ("base",):
+        for name in lines:
             modelled = rows[name].to_numpy(float)
             line = placed(modelled, drawn_once(drive, modelled, way))
             axis.plot(*line, zorder=3, **_LINES[name])
@@ -216,16 +228,13 @@ def _label(axis: Axes, index: int, curve: Curve, specimens: int) -> None:
     )
 
 
-def _handles(with_effects: bool, unloaded: bool) -> list[Line2D | Patch]:
+def _handles(lines: Sequence[str], unloaded: bool) -> list[Line2D | Patch]:
     word = "measured, loading" if unloaded else "measured"
     handles: list[Line2D | Patch] = [Line2D([], [], mfc=BLACK, label=word, **_DOT)]
     if unloaded:
         handles.append(Line2D([], [], mfc=WHITE, label="measured, unloading", **_DOT))
     handles.append(Patch(facecolor=GREY, alpha=0.3, lw=0, label="noise of the mean, 2 SD"))
-    handles.append(Line2D([], [], label=_LABELS["base"], **_LINES["base"]))
-    if with_effects:
-        handles.append(Line2D([], [], label=_LABELS["with_effects"], **_LINES["with_effects"]))
-    return handles
+    return handles + [Line2D([], [], label=LABELS[name], **_LINES[name]) for name in lines]
 
 
 def _words(gap: pd.DataFrame, curves: Sequence[Curve], cohort: Cohort) -> str:

@@ -171,5 +171,4 @@ def covariance(fit: JointFit) -> Array:
     """(m, m) of all unknowns, priors counted in."""
     jacobian = fit.whole_jacobian()
     precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
-    inverse: Array = np.linalg.inv(precision)
-    return inverse
+    return np.asarray(np.linalg.inv(precision), dtype=np.float64)
