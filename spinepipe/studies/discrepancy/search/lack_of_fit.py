@@ -3,8 +3,8 @@
 A generic basis: what could be missing without being any known effect, joint by joint.
 
 Loads that are polynomials and bumps of a joint's own motion, cross terms of its other motions,
-terms of the neighbouring joints' motion, and readings that drift over the steps of a test; in each
-coordinate that was read.
+terms of the neighbouring joints' motion, and readings that drift over the steps of a test or are
+shifted in each test anew; in each coordinate that was read.
 """
 
 from collections.abc import Mapping, Sequence
@@ -46,6 +46,7 @@ FAMILIES = {
     "cross": "load in {coordinate} over the joint's other motions",
     "neighbour": "load in {coordinate} over that of the neighbouring joints",
     "drift": "readings of {coordinate} that drift over the steps of a test",
+    "shift": "readings of {coordinate} with a shift of its own in each test",
 }
 
 
@@ -73,12 +74,14 @@ def generic_columns(
     zeroed: bool,
     coordinates: Sequence[str],
     reached: Sequence[Array] | None = None,
+    shifted: Sequence[str] = (),
 ) -> GenericColumns:
     """The generic basis of a specimen where its model stands.
 
     Parameters
     ----------
     reached : motions (T, J, 6) whose largest is the unit of the terms; None for those of ``cases``.
+    shifted : tests that may have a shift of their own; none tells how that of another test is.
     """
     solved = Solved(model, cases, zeroed)
     motions = solved.poses
@@ -89,7 +92,7 @@ def generic_columns(
     moved: list[list[Array]] = [[] for _ in cases]
     for name in coordinates:
         at = COORDINATES.index(name)
-        for family, count in _counts(len(coordinates)).items():
+        for family, count in _counts(len(coordinates), len(shifted)).items():
             terms += [
                 Term(family, name, number, joint)
                 for number in range(count)
@@ -99,8 +102,12 @@ def generic_columns(
         loads = [_loads(motion / reach, at, coordinates) * size[:, None] for motion in motions]
         by_load = solved.by_loads([_alone(one, at) for one in loads])
         for place, motion in enumerate(motions):
-            drift = _drift(len(motion), SIZE * reach[:, at], at)
-            moved[place].append(np.concatenate([by_load[place], drift], axis=-1))
+            ramp = np.linspace(0.0, 1.0, len(motion))[:, None]
+            shift = np.tile(
+                [float(cases[place].test == test) for test in shifted], (len(motion), 1)
+            )
+            by_step = _readings(np.hstack([ramp, shift]), SIZE * reach[:, at], at)
+            moved[place].append(np.concatenate([by_load[place], by_step], axis=-1))
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
     seen = [less_step_0(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
@@ -115,11 +122,15 @@ def _stiffness(model: SpineModel) -> Array:
     return np.where(total > 0.0, total, 1.0)
 
 
-def _counts(coordinates: int) -> dict[str, int]:
-    """Terms of each family for one coordinate, in the order of `_loads`."""
+def _counts(coordinates: int, shifts: int) -> dict[str, int]:
+    """Terms of each family for one coordinate, in the order of `_loads` and `_readings`.
+
+    ``shifts``: tests that may have one.
+    """
     others = coordinates - 1
     cross = 4 * others + len(list(combinations(range(others), 2)))
-    return {OWN: 3 + len(BUMPS), "cross": cross, "neighbour": 2, "drift": 1}
+    of_load = {OWN: 3 + len(BUMPS), "cross": cross, "neighbour": 2}
+    return of_load | {"drift": 1, "shift": shifts}
 
 
 def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
@@ -146,14 +157,14 @@ def _alone(loads: Array, at: int) -> Array:
     return alone.reshape(steps, joints, 6, count * joints)
 
 
-def _drift(steps: int, size: Array, at: int) -> Array:
-    """(T, J, 6, J) readings that move on with the steps, a joint each."""
+def _readings(by_step: Array, size: Array, at: int) -> Array:
+    """(T, J, 6, K x J) readings that follow the steps as in (T, K), a joint each, terms first."""
+    steps, count = by_step.shape
     joints = len(size)
-    drift = np.zeros((steps, joints, 6, joints))
-    ramp = np.arange(steps) / max(steps - 1, 1)
+    found = np.zeros((steps, joints, 6, count, joints))
     for joint in range(joints):
-        drift[:, joint, at, joint] = ramp * size[joint]
-    return drift
+        found[:, joint, at, :, joint] = by_step * size[joint]
+    return found.reshape(steps, joints, 6, count * joints)
 
 
 SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
@@ -205,7 +216,7 @@ def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: 
     """Evidence of the generic basis beside the grounds' fit."""
     terms, problem = _problem(grounds, coordinates, draws, seed)
     spreads = [s for s in SPREADS if not (s is Spread.EACH and len(grounds.readings) == 1)]
-    families = [family for family, count in _counts(len(coordinates)).items() if count]
+    families = list(dict.fromkeys(term.family for term in terms))
     parts = {
         coordinate: [
             _part(problem, terms, family, coordinate, spread)
@@ -239,7 +250,9 @@ def _problem(
     taken = taken_out(grounds.fit)
     for number, (name, one) in enumerate(grounds.readings.items()):
         model = grounds.fit.models[name]
-        found = generic_columns(model, one.cases, grounds.noise.zeroed, coordinates)
+        zeroed = grounds.noise.zeroed
+        shifted = () if zeroed else grounds.tests  # counted from step 0 there is none
+        found = generic_columns(model, one.cases, zeroed, coordinates, shifted=shifted)
         plain = grounds.plain[name].noise_only(found.moved)
         white = grounds.setting.whitenings[name].shortened(plain)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))

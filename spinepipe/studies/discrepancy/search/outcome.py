@@ -232,31 +232,34 @@ def _other_shape(found: Found, one: Standing, margin: float) -> _NoName | None:
     """Whether what the base lacks follows what no known effect follows.
 
     Beside the base alone, and to first order for all alike: where a load over what the neighbouring
-    joints or the other coordinates do, or a drift, has more evidence than any known effect on that
-    coordinate, and nearly as much as all that stand there together, these imitate it.
+    joints or the other coordinates do, a drift or a shift, has more evidence than any effect of
+    that coordinate, and nearly as much as all that stand there together, these imitate it. An
+    effect of no coordinate must have more by itself.
     """
-    read = tuple(found.base_at)
-    for coordinate in one.supposed.form.variant.coordinates(read):
+    variant = one.supposed.form.variant
+    for coordinate in variant.coordinates(tuple(found.base_at)):
         shapes = {f: e for f, e in found.base_lack.at[coordinate].by_family.items() if f != OWN}
         family = max(shapes, key=lambda name: shapes[name])
-        needed = _best_known(found, coordinate) + margin
-        there = (
-            o for o in found.standing if coordinate in o.supposed.form.variant.coordinates(read)
-        )
-        together = sum(other.log_evidence for other in there)
-        if shapes[family] > max(needed, NEARLY_ALL * together):
+        rival = max(_best_of(found, coordinate), 0.0 if variant.acts_on else one.log_evidence)
+        if shapes[family] > max(rival + margin, NEARLY_ALL * _together(found, coordinate)):
             shape = FAMILIES[family].format(coordinate=coordinate.replace("_", " "))
             why = f"{one.name} would imitate what no known effect is: {shape}"
             return Reason.NO_KNOWN_EFFECT, why
     return None
 
 
-def _best_known(found: Found, coordinate: str) -> float:
-    """Log evidence of the best known effect on a coordinate, beside the base alone."""
-    read = tuple(found.base_at)
+def _best_of(found: Found, coordinate: str) -> float:
+    """Log evidence of the best effect of a coordinate, beside the base alone."""
     forms = (form for effect in found.stages[0].screen.effects for form in effect.forms)
-    on_it = (one.log_evidence for one in forms if coordinate in one.form.variant.coordinates(read))
-    return max(on_it, default=0.0)
+    of_it = (one.log_evidence for one in forms if coordinate in one.form.variant.acts_on)
+    return max(of_it, default=0.0)
+
+
+def _together(found: Found, coordinate: str) -> float:
+    """Log evidence of all effects that stand on a coordinate."""
+    read = tuple(found.base_at)
+    on_it = (o for o in found.standing if coordinate in o.supposed.form.variant.coordinates(read))
+    return sum(one.log_evidence for one in on_it)
 
 
 def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:
