@@ -9,7 +9,7 @@ import pytest
 import random_stacks as draw
 from example_effects import ExtraWeight
 
-from spinepipe.effects import Effect, Kind
+from spinepipe.effects import Effect, Kind, Parameter
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
@@ -27,6 +27,7 @@ from spinepipe.statics.equilibrium import factor
 from spinepipe.statics.many import (
     Acting,
     Answering,
+    Idle,
     Stack,
     by_joint_pose,
     by_load,
@@ -211,41 +212,68 @@ def test_an_effect_that_takes_no_stack_is_solved_by_the_engine() -> None:
 IDLE = [effect for effect in VARIANTS if isinstance(effect, Acting)]
 
 
+BEFORE = (
+    "nonlinear_stiffening",
+    "axes_tilt",
+    "hysteresis",
+    "creep",
+    "marker_bias",
+    "follower_load",
+)
+
+
+def named(*names: str) -> list[Effect]:
+    return [next(one for one in VARIANTS if one.name == name) for name in names]
+
+
+@pytest.mark.parametrize("before", [("nonlinear_stiffening",), BEFORE], ids=["laws", "every kind"])
 @pytest.mark.parametrize("effect", IDLE, ids=str)
-def test_what_idle_effects_would_do(effect: Effect) -> None:
+def test_what_idle_effects_would_do(effect: Effect, before: tuple[str, ...]) -> None:
     """Without solving anew: as the derivatives of a model that has them, switched off."""
     rng = np.random.default_rng(8)
-    stiffening = next(one for one in VARIANTS if one.name == "nonlinear_stiffening")
-    (model, case), _ = draw.model(rng, 3, [stiffening], 0.5), None
+    (model, case), _ = draw.model(rng, 3, named(*before), 0.5), None
     plain = stack_of([(model, case)])
     q = plain.solve().q
     answering = Answering.of(plain, q)
     assert answering is not None
     parameters = effect.parameters
     off = np.array([p.default if p.off is None else p.off for p in parameters])
-    idle = ScopedEffect(effect, (0, 1, 2), np.tile(off, (3, 1)))
-    full = model.with_effects((*model.effects, idle))
+    values = np.stack([off, [_elsewhere(p, x) for p, x in zip(parameters, off, strict=True)]])
     strengths = [number for number, p in enumerate(parameters) if p.off is not None]
-    free = [
-        FreeParameter("", len(model.effects), column, (joint,), False)
-        for column in strengths
-        for joint in range(3)
-    ]
-    expected = poses_by(stack_of([(full, case)]), q, [free])
-    found = answering.by_strengths(effect, off)[..., strengths]
-    found = np.moveaxis(found, (2, 3), (1, 2)).reshape(expected.shape)
-    largest = np.maximum(np.abs(expected).max(axis=(0, 1, 2)), 1e-9)
-    np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-11)
+    ((by_points),) = answering.by_strengths([Idle(effect, values)])
+    reached = 0.0
+    for point, at in enumerate(values):
+        idle = ScopedEffect(effect, (0, 1, 2), np.tile(at, (3, 1)))
+        full = model.with_effects((*model.effects, idle))
+        free = [
+            FreeParameter("", len(model.effects), column, (joint,), False)
+            for column in strengths
+            for joint in range(3)
+        ]
+        stack = stack_of([(full, case)])
+        expected = readings_by(stack, q, poses_by(stack, q, [free]), [free])
+        found = np.moveaxis(by_points[..., point, strengths], (2, 3), (1, 2))
+        largest = np.maximum(np.abs(expected).max(axis=(0, 1, 2)), 1e-9)
+        found = found.reshape(expected.shape)
+        np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-11)
+        reached = max(reached, np.abs(expected).max())
     late = effect.name == "facet_contact" or getattr(effect, "shape", "") == "bilinear"
-    assert np.abs(expected).max() > 0.0 or late  # a gap, or a break, not reached here
+    assert reached > 0.0 or late  # a gap, or a break, not reached here
 
 
-def test_effects_in_between_need_a_model_of_their_own() -> None:
+def _elsewhere(parameter: Parameter, off: float) -> float:
+    """Off still, but of another shape."""
+    if parameter.off is not None:
+        return off
+    return float(np.clip(off * 1.1 + 0.1 * parameter.prior_scale, parameter.low, parameter.high))
+
+
+def test_runs_for_the_engine_are_not_answered() -> None:
     rng = np.random.default_rng(9)
-    for name in ("axes_tilt", "hysteresis", "marker_bias"):
-        effect = next(one for one in VARIANTS if one.name == name)
-        stack = stack_of([draw.model(rng, 2, [effect])])
-        assert Answering.of(stack, np.zeros((len(stack.run), 2, 6))) is None
+    model, case = draw.model(rng, 2, [])
+    weight = ScopedEffect(ExtraWeight(((0.0, 0.1, 0.0),)), (0,), np.array([[20.0]]))
+    stack = stack_of([(model.with_effects((*model.effects, weight)), case)])
+    assert Answering.of(stack, np.zeros((len(stack.run), 2, 6))) is None
 
 
 def test_derivatives_by_loads_and_joint_poses() -> None:

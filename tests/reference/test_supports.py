@@ -33,6 +33,7 @@ from spinepipe.statics import (
 from spinepipe.statics.equilibrium import factor
 from spinepipe.statics.many import (
     Answering,
+    Idle,
     Stack,
     by_load,
     poses_by,
@@ -274,7 +275,8 @@ def test_what_is_off_moves_reactions_too() -> None:
     q = plain.solve().q
     answering = Answering.of(plain, q)
     assert answering is not None
-    by_strength = answering.by_strengths(effect, off)[..., column]  # lanes, joints, n
+    (found,) = answering.by_strengths([Idle(effect, off[None])])
+    by_strength = found[..., 0, column]  # lanes, joints, n
     expected = readings_by(other, q, poses_by(other, q, [free]), [free])
     found = np.moveaxis(by_strength, 1, 2).reshape(expected.shape)
     np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())

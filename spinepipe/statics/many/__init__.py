@@ -10,7 +10,7 @@ from spinepipe.statics.many.derive import (
 )
 from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.given import by_joint_pose, by_load
-from spinepipe.statics.many.idle import Acting, Answering
+from spinepipe.statics.many.idle import Acting, Answering, Idle
 from spinepipe.statics.many.settling import Ends, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
@@ -22,6 +22,7 @@ __all__ = [
     "Answering",
     "Cases",
     "Ends",
+    "Idle",
     "ManySolved",
     "Moving",
     "Poses",

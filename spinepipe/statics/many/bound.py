@@ -33,13 +33,19 @@ PathStates = Mapping[int, Array]
 class Slopes:
     """Derivatives (K, P, m) of the values by the unknowns, of laws, geometry effects, cables.
 
-    By number among those of the stack; what does not act on the lanes is not there.
+    By number among those of the stack; what does not act on the lanes, or does not move, is not
+    there.
     """
 
     laws: Mapping[int, Array]
     geometry: Mapping[int, Array]
     cables: Mapping[int, Array]
     m: int
+
+    @classmethod
+    def none(cls, m: int) -> "Slopes":
+        """No value moves by any of m unknowns."""
+        return cls({}, {}, {}, m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +169,9 @@ class Bound:
         """(N, J, 6, m) derivative of the loads by the unknowns at fixed q (N, J, 6)."""
         by_x = self._laws_by(q, slopes, states_by_x).reshape(*q.shape, slopes.m)
         for number, one in self.cables.items():
-            slope = slopes.cables[number]
+            slope = slopes.cables.get(number)
+            if slope is None:
+                continue
             own = one.effect.across_by_parameter(q[one.lanes], one.neutral, one.values)
             by_x[one.lanes] += one.there[..., None, None] * (own @ slope[:, None])
         return by_x
@@ -182,12 +190,14 @@ class Bound:
                 by_x[at, rows] += by_carried @ by_x[j]
                 tangent[at, rows] += by_carried @ tangent[j]
             self._add_own(
-                by_x, law, here, carried, slopes.laws[law.index], states_by_x.get(law.index)
+                by_x, law, here, carried, slopes.laws.get(law.index), states_by_x.get(law.index)
             )
             tangent[j] += response.tangent
             load[j] += response.load
         if seen.first is None:
             return by_x
+        if not slopes.geometry:
+            return seen.first.swapaxes(1, 2) @ by_x
         pulled: Array = seen.first.swapaxes(1, 2) @ (by_x + tangent @ seen.q_by_x)
         return pulled + np.einsum("jkcm,jk->jcm", seen.first_by_x, load)
 
@@ -197,12 +207,12 @@ class Bound:
         law: Law,
         here: Array,
         carried: Array,
-        slope: Array,
+        slope: Array | None,
         state_by_x: Array | None,
     ) -> None:
         """Add what a law's own unknowns, and its state, do to its load."""
-        used = np.flatnonzero(slope.any(axis=(0, 1)))
-        if len(used):
+        used = NOTHING if slope is None else np.flatnonzero(slope.any(axis=(0, 1)))
+        if slope is not None and len(used):
             own = law.by_parameter(here, carried, self.states) @ slope[:, :, used]
             by_x[law.joints[:, None, None], np.arange(6)[:, None], used] += own
         if isinstance(law, ActivePath):
@@ -210,18 +220,28 @@ class Bound:
             by_x[law.joints] += law.by_state(here, carried, self.states) @ state_by_x
 
     def after_by(
-        self, q: Array, dq: Array, slopes: Slopes, states_by_x: PathStates
+        self,
+        q: Array,
+        dq: Array,
+        slopes: Slopes,
+        states_by_x: PathStates,
+        shift: Array | None = None,
     ) -> dict[int, Array]:
         """(K, S, m) derivative of each path law's state after steps that ended at q.
 
         Parameters
         ----------
-        q, dq : (N, J, 6) and (N, J, 6, m).
+        q, dq : (N, J, 6) and (N, J, 6, m). shift : (N, J, 6, m) by how much what the laws see moves
+            besides.
         """
         seen = self._seen_by(q, slopes)
         moved = dq.reshape(self.count, 6, slopes.m)
         if seen.first is not None:
-            moved = seen.first @ moved + seen.q_by_x
+            moved = seen.first @ moved
+            if slopes.geometry:
+                moved += seen.q_by_x
+        if shift is not None:
+            moved = moved + shift.reshape(moved.shape)
         load, load_by_x = np.zeros_like(seen.q), np.zeros_like(moved)
         found: dict[int, Array] = {}
         for law in self.laws:
@@ -230,7 +250,8 @@ class Bound:
             if isinstance(law, ActivePath):
                 after = law.advance(here, carried, self.states)
                 by_x = after.by_coordinate @ moved[j] + after.by_state @ states_by_x[law.index]
-                by_x += after.by_parameter @ slopes.laws[law.index]
+                if law.index in slopes.laws:
+                    by_x += after.by_parameter @ slopes.laws[law.index]
                 if after.by_carried is not None:
                     by_x += after.by_carried @ carried_by_x
                 found[law.index] = by_x
@@ -239,7 +260,7 @@ class Bound:
             if response.by_carried is not None:
                 rows = np.flatnonzero(response.by_carried.any(axis=(0, 2)))
                 load_by_x[j[:, None], rows] += response.by_carried[:, rows] @ carried_by_x
-            own, state = slopes.laws[law.index], states_by_x.get(law.index)
+            own, state = slopes.laws.get(law.index), states_by_x.get(law.index)
             self._add_own(load_by_x, law, here, carried, own, state)
             load[j] += response.load
         return found
@@ -249,6 +270,9 @@ class Bound:
         flat = q.reshape(-1, 6)
         if not self.geometry:
             return _Seen(flat, None, NOTHING, NOTHING)
+        if not slopes.geometry:
+            placed = self.placed(q)
+            return _Seen(placed.q, placed.by_coordinate, NOTHING, NOTHING)
         m = slopes.m
         seen, first = flat.copy(), np.tile(np.eye(6), (self.count, 1, 1))
         q_by_x, first_by_x = np.zeros((self.count, 6, m)), np.zeros((self.count, 6, 6, m))
@@ -272,7 +296,8 @@ class _Seen:
 
     Attributes
     ----------
-    first : (N J, 6, 6), None without geometry effects. q_by_x, first_by_x : with a last axis m.
+    first : (N J, 6, 6), None without geometry effects. q_by_x, first_by_x : with a last axis m;
+        empty where none of these moves.
     """
 
     q: Array

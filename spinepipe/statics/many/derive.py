@@ -31,12 +31,16 @@ Unknowns = Sequence[Sequence[FreeParameter]]
 """For each model of a stack, what moves."""
 
 
-def answered(stack: Stack, q: Array, sources: Array) -> Array:
+def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> Array:
     """(L, J, 6, m) how what is read at poses q (L, J, 6) answers loads on the axes (L, J, 6, m).
 
-    States of laws that remember are as at the start; nothing is between poses and instruments.
+    States of laws that remember are as at the start.
+
+    Parameters
+    ----------
+    observed : read through the instruments' effects; without it nothing is between.
     """
-    found = np.zeros(sources.shape)
+    found, held = np.zeros(sources.shape), np.zeros(sources.shape)
     for runs in stack.chunks(np.arange(len(stack.remembers))):
         lanes = stack.lanes(runs)
         bound = stack.bound(lanes, stack.initial_states())
@@ -44,8 +48,42 @@ def answered(stack: Stack, q: Array, sources: Array) -> Array:
         seen = survey(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
         found[lanes], _ = answers(seen, Changes(sources[lanes]))
         if stack.loads.supports.there:
-            held = missing(seen, found[lanes]) - sources[lanes]
-            found[lanes] = _with_reactions(stack, lanes, found[lanes], held)
+            held[lanes] = missing(seen, found[lanes]) - sources[lanes]
+    if observed:
+        found = _observed(stack, q, found, None)
+    if stack.loads.supports.there:
+        found = _with_reactions(stack, np.arange(len(q)), found, held)
+    return found
+
+
+def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
+    """(L, J, 6, m) how what is read at poses q answers loads, laws that remember led along.
+
+    Parameters
+    ----------
+    own : (L, J, 6, m) what the joints would hold besides. shift : (L, J, 6, m) by how much what
+        the laws see would move, its load in ``own`` already; None for nothing.
+    """
+    found, held, still = np.zeros(own.shape), np.zeros(own.shape), Slopes.none(own.shape[3])
+    states, states_by_x = stack.initial_states(), stack.initial_states(still.m)
+    for runs in stack.chunks(np.arange(len(stack.remembers)), stepwise=True):
+        for _, lanes in stack.steps(runs):
+            bound, there = stack.bound(lanes, states), q[lanes]
+            before = {
+                n: states_by_x[n][places] for n, places in bound.places.items() if n in states
+            }
+            loads = own[lanes] + bound.held_by(there, still, before)
+            seen = survey(stack.chains, part(stack.loads, lanes), there, bound.held(there).tangent)
+            dq = answers(seen, Changes(-loads))[0]
+            found[lanes] = dq
+            if stack.loads.supports.there:
+                held[lanes] = missing(seen, dq) + loads
+            moved = None if shift is None else shift[lanes]
+            stack.remember(states_by_x, bound, bound.after_by(there, dq, still, before, moved))
+            stack.remember(states, bound, bound.after(there))
+    found = _observed(stack, q, found, None)
+    if stack.loads.supports.there:
+        found = _with_reactions(stack, np.arange(len(q)), found, held)
     return found
 
 
@@ -264,6 +302,20 @@ def readings(stack: Stack, q: Array) -> Array:
 
 def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
     """(L, J, 6, m) derivative of what is reported, from that of the poses (L, J, 6, m)."""
+    by_x = _observed(stack, q, dq, unknowns)
+    if not stack.loads.supports.there:
+        return by_x
+    every, held = np.arange(len(q)), reactions_by(stack, q, dq, unknowns)
+    return _with_reactions(stack, every, by_x, held)
+
+
+def _observed(stack: Stack, q: Array, dq: Array, unknowns: Unknowns | None) -> Array:
+    """(L, J, 6, m) what instruments make of the motion dq (L, J, 6, m) of poses q (L, J, 6).
+
+    ``unknowns`` that move the instruments' own effects besides; None for none.
+    """
+    if not stack.effects.measurement:
+        return dq
     seen, by_x = q.reshape(-1, 6).copy(), dq.reshape(q.size // 6, *dq.shape[2:]).copy()
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
@@ -271,12 +323,10 @@ def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
         effect = observing(one)
         around = _beside(stack, effect, seen, flat)
         observed = read(effect, seen[flat], one.values[rows], around)
-        own = read_by(effect, seen[flat], one.values[rows], around)
-        slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
         neighbours = None if around is None else _neighbours(stack, by_x, flat)
-        by_x[flat] = followed(observed, by_x[flat], neighbours) + own @ slope
+        by_x[flat] = followed(observed, by_x[flat], neighbours)
+        if unknowns is not None:
+            slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
+            by_x[flat] += read_by(effect, seen[flat], one.values[rows], around) @ slope
         seen[flat] = observed.q
-    if not stack.loads.supports.there:
-        return by_x.reshape(dq.shape)
-    every, held = np.arange(len(q)), reactions_by(stack, q, dq, unknowns)
-    return _with_reactions(stack, every, by_x.reshape(dq.shape), held)
+    return by_x.reshape(dq.shape)

@@ -2,25 +2,62 @@
 
 An idle law holds nothing, whatever its state, so that to first order only its own load grows with a
 strength; one on geometry moves and turns what the laws hold. The chain answers these loads as it
-answers any: its answers to unit loads on each axis serve all of them.
+answers any. Without memory its answers to unit loads on each axis serve all of them; laws that
+remember are led through all loads at once, step by step.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, GeometryEffect, JointLaw, PathLaw
-from spinepipe.statics.holding import Holding
-from spinepipe.statics.many.derive import answered
+from spinepipe.effects.contract import Array, GeometryEffect, Indices, JointLaw, PathLaw
+from spinepipe.statics.holding import hold
+from spinepipe.statics.many.bound import Bound
+from spinepipe.statics.many.derive import answered, answered_on_path
 from spinepipe.statics.many.stack import Stack
 
 Acting = JointLaw | PathLaw | GeometryEffect
 
 
+class Idle(NamedTuple):
+    """An effect that is off, at S points of its shapes: values (S, P)."""
+
+    effect: Acting
+    values: Array
+
+
+class _Held(NamedTuple):
+    """What the laws see (L J, 6), the loads (L J, 6) and tangents (L J, 6, 6) that they hold there.
+
+    ``first`` (L J, 6, 6): how that follows the joints' own coordinates; None where it is these.
+    """
+
+    q: Array
+    load: Array
+    tangent: Array
+    first: Array | None
+
+    def pulled(self, own: Array) -> Array:
+        """(L J, 6, m) loads on the joints' own coordinates, from those on what the laws see."""
+        return own if self.first is None else np.swapaxes(self.first, 1, 2) @ own
+
+
+class _Own(NamedTuple):
+    """Of each joint's own idle effect: loads (L, J, 6, m) that it would hold at fixed coordinates.
+
+    ``shift`` (L, J, 6, m): by how much it would move what the laws see; None for laws.
+    """
+
+    load: Array
+    shift: Array | None
+
+
 @dataclass(frozen=True, eq=False)
 class Answering:
-    """Solved runs whose laws act on the joints' own coordinates and remember nothing.
+    """Solved runs that may be asked what effects behind their own, all off, would do.
 
     Attributes
     ----------
@@ -32,56 +69,129 @@ class Answering:
 
     @classmethod
     def of(cls, stack: Stack, q: Array) -> "Answering | None":
-        """The runs at poses q, or None where effects of other kinds stand in between."""
-        effects = stack.effects
-        between = effects.geometry or effects.measurement
-        return None if between or stack.remembers.any() or stack.alone.any() else cls(stack, q)
+        """The runs at poses q, or None where any is solved by the engine of record."""
+        return None if stack.alone.any() else cls(stack, q)
+
+    def by_strengths(self, idle: Sequence[Idle]) -> list[Array]:
+        """Derivative of all that is read, n = 6 J in each lane, by each parameter at each joint.
+
+        Returns
+        -------
+        of each effect (L, J, n, S, P).
+        """
+        every = [self._own(one) for one in idle]
+        if self.stack.remembers.any():
+            found = self._on_path(every)
+        else:
+            found = [self.to_unit_loads @ own.load for own in every]
+        return [
+            by_own.reshape(*by_own.shape[:3], *one.values.shape)
+            for by_own, one in zip(found, idle, strict=True)
+        ]
 
     @cached_property
     def to_unit_loads(self) -> Array:
-        """(L, J, n, 6) how all n coordinates answer a unit load that each joint holds besides."""
+        """(L, J, n, 6) how all that is read answers a unit load that each joint holds besides."""
         lanes, joints, _ = self.q.shape
         n = 6 * joints
         unit = np.broadcast_to(-np.eye(n).reshape(joints, 6, n), (lanes, joints, 6, n))
-        found = answered(self.stack, self.q, unit).reshape(lanes, n, joints, 6)
+        found = answered(self.stack, self.q, unit, observed=True).reshape(lanes, n, joints, 6)
         return np.ascontiguousarray(found.swapaxes(1, 2))
 
-    @cached_property
-    def held(self) -> Holding:
-        """Loads (L, J, 6) that the laws hold, and tangents (L, J, 6, 6)."""
-        load, tangent = np.zeros_like(self.q), np.zeros((*self.q.shape, 6))
-        for runs in self.stack.chunks(np.arange(len(self.stack.remembers))):
-            lanes = self.stack.lanes(runs)
-            found = self.stack.bound(lanes, {}).held_by_laws(self.q[lanes])
-            load[lanes] = found.load.reshape(load[lanes].shape)
-            tangent[lanes] = found.tangent.reshape(tangent[lanes].shape)
-        return Holding(load, tangent)
-
-    def by_strengths(self, effect: Acting, off: Array) -> Array:
-        """(L, J, n, P) derivative of all coordinates by each parameter (P,) at each joint."""
-        return self.to_unit_loads @ self._own(effect, off).reshape(*self.q.shape, -1)
-
-    def _own(self, effect: Acting, off: Array) -> Array:
-        """(L J, 6, P) derivative of what is held at each joint at fixed coordinates."""
-        q, load = self.q.reshape(-1, 6), self.held.load.reshape(-1, 6)
-        values = np.tile(off, (len(q), 1))
-        if isinstance(effect, PathLaw):
-            return self._on_path(effect, off)
-        if isinstance(effect, GeometryEffect):
-            moved, tangent = effect.by_parameter(q, values), self.held.tangent.reshape(-1, 6, 6)
-            turned = (moved.by_coordinate * load[:, :, None, None]).sum(axis=1)
-            return turned + tangent @ moved.q
-        return effect.by_parameter(q, values, load)
-
-    def _on_path(self, law: PathLaw, off: Array) -> Array:
-        """The same of a law that remembers, step by step."""
+    def _on_path(self, every: Sequence[_Own]) -> list[Array]:
+        """(L, J, n, m) of each, where laws remember: all that is not zero, led through at once."""
         lanes, joints, _ = self.q.shape
-        own = np.zeros((lanes, joints, 6, len(off)))
-        state = np.zeros((len(self.stack.remembers), joints, law.n_states))
+        used = [np.flatnonzero(one.load.any(axis=(0, 1, 2))) for one in every]
+        loads = np.concatenate(
+            [_alone(one.load[..., some]) for one, some in zip(every, used, strict=True)], axis=-1
+        )
+        shift = None
+        if any(one.shift is not None for one in every):
+            shifts = (np.zeros(one.load.shape) if one.shift is None else one.shift for one in every)
+            moved = [_alone(s[..., some]) for s, some in zip(shifts, used, strict=True)]
+            shift = np.concatenate(moved, axis=-1)
+        found = answered_on_path(self.stack, self.q, loads, shift).reshape(lanes, 6 * joints, -1)
+        result = []
+        ends = np.cumsum([joints * len(some) for some in used])[:-1]
+        for one, some, part in zip(every, used, np.split(found, ends, axis=-1), strict=True):
+            whole = np.zeros((lanes, joints, 6 * joints, one.load.shape[-1]))
+            by_joint = part.reshape(lanes, 6 * joints, joints, len(some))
+            whole[..., some] = np.moveaxis(by_joint, 2, 1)
+            result.append(whole)
+        return result
+
+    @cached_property
+    def held(self) -> _Held:
+        """Loads and tangents where the laws of all lanes act."""
+        joints, count = self.stack.joints, self.q.size // 6
+        q, first = np.zeros((count, 6)), np.zeros((count, 6, 6))
+        load, tangent = np.zeros((count, 6)), np.zeros((count, 6, 6))
+        for lanes, bound in self._walked():
+            at = (joints * lanes[:, None] + np.arange(joints)).ravel()
+            placed = bound.placed(self.q[lanes])
+            found = hold(placed, bound.laws, bound.states, moved=False)
+            q[at], load[at], tangent[at] = placed.q, found.load, found.tangent
+            first[at] = placed.by_coordinate if bound.geometry else np.eye(6)
+        return _Held(q, load, tangent, first if self.stack.effects.geometry else None)
+
+    def _walked(self) -> Iterator[tuple[Indices, Bound]]:
+        """All lanes in portions, with what acts on them and what that remembers there."""
+        stack, states = self.stack, self.stack.initial_states()
+        for runs in stack.chunks(np.flatnonzero(~stack.remembers)):
+            lanes = stack.lanes(runs)
+            yield lanes, stack.bound(lanes, states)
+        for runs in stack.chunks(np.flatnonzero(stack.remembers), stepwise=True):
+            for _, lanes in stack.steps(runs):
+                bound = stack.bound(lanes, states)
+                yield lanes, bound
+                stack.remember(states, bound, bound.after(self.q[lanes]))
+
+    def _own(self, idle: Idle) -> _Own:
+        """What each joint's own effect would do; m = S P, shapes first."""
+        effect, values = idle
+        held, (points, count) = self.held, (len(values), self.q.size // 6)
+        shape = (*self.q.shape, -1)
+        if isinstance(effect, PathLaw):
+            own = self._by_step(effect, values)
+            return _Own(held.pulled(own).reshape(shape), None)
+        q, every = np.tile(held.q, (points, 1)), np.repeat(values, count, axis=0)
+        load = np.tile(held.load, (points, 1))
+        if isinstance(effect, GeometryEffect):
+            moved = effect.by_parameter(q, every)
+            turned = (moved.by_coordinate * load[:, :, None, None]).sum(axis=1)
+            shift = _shapes_last(moved.q, points)
+            own = _shapes_last(turned, points) + held.tangent @ shift
+            return _Own(held.pulled(own).reshape(shape), shift.reshape(shape))
+        own = _shapes_last(effect.by_parameter(q, every, load), points)
+        return _Own(held.pulled(own).reshape(shape), None)
+
+    def _by_step(self, law: PathLaw, values: Array) -> Array:
+        """(L J, 6, S P) derivative of what a law that remembers holds, all its shapes at once."""
+        (lanes, joints, _), (points, p) = self.q.shape, values.shape
+        q, load = (one.reshape(lanes, 1, joints, 6) for one in (self.held.q, self.held.load))
+        own = np.zeros((lanes, points, joints, 6, p))
+        state = np.zeros((len(self.stack.remembers), points, joints, law.n_states))
+        by_joint = np.repeat(values, joints, axis=0)
         for runs, at in self.stack.steps(np.arange(len(state))):
-            q, load = self.q[at].reshape(-1, 6), self.held.load[at].reshape(-1, 6)
-            values, seconds = np.tile(off, (len(q), 1)), np.repeat(self.stack.seconds[at], joints)
-            there = (q, values, state[runs].reshape(len(q), -1), seconds, load)
+            here, carried = (np.repeat(one[at], points, axis=1).reshape(-1, 6) for one in (q, load))
+            seconds = np.repeat(self.stack.seconds[at], points * joints)
+            before = state[runs].reshape(len(here), -1)
+            there = (here, np.tile(by_joint, (len(at), 1)), before, seconds, carried)
             own[at] = law.by_parameter_on_path(*there).reshape(own[at].shape)
             state[runs] = law.advance(*there).state.reshape(state[runs].shape)
-        return own
+        return own.transpose(0, 2, 3, 1, 4).reshape(lanes * joints, 6, points * p)
+
+
+def _shapes_last(of_points: Array, points: int) -> Array:
+    """(N, 6, S P) from (S N, 6, P)."""
+    found = np.moveaxis(of_points.reshape(points, -1, *of_points.shape[1:]), 0, 2)
+    return found.reshape(*found.shape[:2], -1)
+
+
+def _alone(own: Array) -> Array:
+    """(L, J, 6, J m) each joint's own columns (L, J, 6, m) apart, joints first."""
+    lanes, joints, _, m = own.shape
+    found = np.zeros((lanes, joints, 6, joints, m))
+    every = np.arange(joints)
+    found[:, every, :, every] = own.swapaxes(0, 1)
+    return found.reshape(lanes, joints, 6, joints * m)

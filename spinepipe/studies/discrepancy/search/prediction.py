@@ -12,8 +12,8 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import FreeParameter, moved
 from spinepipe.statics.many import (
-    Acting,
     Answering,
+    Idle,
     Poses,
     Stack,
     answered,
@@ -228,19 +228,23 @@ class Solved:
 
     @cached_property
     def answering(self) -> Answering | None:
-        """How the tests answer what is off; None where effects of the model are in between."""
+        """How the tests answer what is off; None where the engine of record solves any of them."""
         return Answering.of(self._stack, self._q)
 
-    def by_strengths(self, effect: Acting, off: Array) -> tuple[Array, ...]:
-        """(T, J, 6, J, P) derivatives of each test by each parameter (P,) of an effect that is off.
+    def by_strengths(self, idle: Sequence[Idle]) -> list[tuple[Array, ...]]:
+        """(T, J, 6, J, S, P) derivatives of each test by each parameter of effects that are off.
 
         The second J: the joint whose parameter it is.
         """
         assert self.answering is not None
         lanes, joints, _ = self._q.shape
-        found = np.moveaxis(self.answering.by_strengths(effect, off), 1, 2)
-        every = found.reshape(lanes, joints, 6, joints, len(off))
-        return tuple(less_step_0(one, self.zeroed) for one in self._by_test(every))
+        found = []
+        for by_strength in self.answering.by_strengths(idle):
+            every = np.moveaxis(by_strength, 1, 2)
+            every = every.reshape(lanes, joints, 6, joints, *every.shape[3:])
+            tests = self._by_test(every)
+            found.append(tuple(less_step_0(one, self.zeroed) for one in tests))
+        return found
 
     def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:
         """(T, J, 6, m) motion by loads (T, J, 6, m) that hold the joints besides their laws."""

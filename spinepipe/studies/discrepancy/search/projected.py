@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from spinepipe.decomposition import pinvh, svd
-from spinepipe.effects import Spread
-from spinepipe.effects.contract import Array
+from spinepipe.effects import Effect, Kind, Spread
+from spinepipe.effects.contract import AcrossJoints, Array
+from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import FreeParameter
-from spinepipe.statics.many import Acting
+from spinepipe.statics.many import Acting, Idle
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.prediction import Solved
@@ -206,9 +207,8 @@ def signatures_of_each(
     parts: dict[Variant, list[_Moved]] = {}
     for one in every:
         parts.setdefault(one.variant, []).append(one)
-    found = [_derived(solved, some) for some in parts.values()] or [_by_model(solved, [])]
+    found, places = _derived(solved, list(parts.values()))
     whole = [np.concatenate(of_test, axis=-1) for of_test in zip(*found, strict=True)]
-    places = {one: place for place, one in enumerate(m for some in parts.values() for m in some)}
     for columns in groups:
         at = [places[_Moved.of(column)] for column in columns]
         scales = np.array([column.scale for column in columns])
@@ -233,18 +233,60 @@ class _Moved(NamedTuple):
         return cls(column.variant, column.sds, column.strength, column.joint)
 
 
-def _derived(solved: Solved, moved: Sequence[_Moved]) -> tuple[Array, ...]:
-    """(T, J, 6, m) derivative of each test's readings by strengths of an idle variant."""
-    effect = moved[0].variant.create()
-    if solved.answering is None or not isinstance(effect, Acting):
-        return _by_model(solved, moved)
-    shapes = dict.fromkeys(one.sds for one in moved)
-    made = {sds: solved.by_strengths(effect, moved[0].variant.off(sds)) for sds in shapes}
-    columns = []
-    for variant, sds, strength, joint in moved:
-        slope = variant.off(sds)[strength] if effect.parameters[strength].logarithmic else 1.0
-        columns.append([slope * of_test[..., joint, strength] for of_test in made[sds]])
-    return tuple(np.stack(of_test, axis=-1) for of_test in zip(*columns, strict=True))
+def _derived(
+    solved: Solved, parts: Sequence[Sequence[_Moved]]
+) -> tuple[list[tuple[Array, ...]], dict[_Moved, int]]:
+    """(T, J, 6, m) derivatives of each test's readings by strengths of idle variants.
+
+    Parameters
+    ----------
+    parts : of one variant each.
+
+    Returns
+    -------
+    columns in a few portions, and the place of each strength among all.
+    """
+    acting: list[tuple[Acting, Sequence[_Moved]]] = []
+    together: dict[object, list[_Moved]] = {}
+    for some in parts:
+        effect = some[0].variant.create()
+        if solved.answering is not None and isinstance(effect, Acting):
+            acting.append((effect, some))
+        else:
+            together.setdefault(_stands_with(effect), []).extend(some)
+    found = _answered(solved, acting) if acting else []
+    found += [_by_model(solved, some) for some in together.values()]
+    every = [one for some in (*(some for _, some in acting), *together.values()) for one in some]
+    places = {one: place for place, one in enumerate(every)}
+    return found or [_by_model(solved, [])], places
+
+
+def _stands_with(effect: Effect) -> object:
+    """Idle effects for which this is the same may stand in one model: none knows of the others."""
+    if effect.kind is Kind.MEASUREMENT or isinstance(effect, DeadLoad | AcrossJoints):
+        return effect.kind
+    return effect
+
+
+def _answered(
+    solved: Solved, parts: Sequence[tuple[Acting, Sequence[_Moved]]]
+) -> list[tuple[Array, ...]]:
+    """The same of what the solved runs answer as they are."""
+    idle, at = [], []
+    for effect, some in parts:
+        variant = some[0].variant
+        shapes = {sds: place for place, sds in enumerate(dict.fromkeys(one.sds for one in some))}
+        values = np.stack([variant.off(sds) for sds in shapes])
+        rows = np.array([(one.joint, shapes[one.sds], one.strength) for one in some]).T
+        logarithmic = np.array([p.logarithmic for p in effect.parameters])[rows[2]]
+        at.append((*rows, np.where(logarithmic, values[rows[1], rows[2]], 1.0)))
+        idle.append(Idle(effect, values))
+    return [
+        tuple(of_test[:, :, :, joint, shape, strength] * slope for of_test in by_test)
+        for by_test, (joint, shape, strength, slope) in zip(
+            solved.by_strengths(idle), at, strict=True
+        )
+    ]
 
 
 def _by_model(solved: Solved, moved: Sequence[_Moved]) -> tuple[Array, ...]:
