@@ -19,7 +19,8 @@ from spinepipe.studies.discrepancy.unnamed_words import (
     why_not_all,
     without_a_name,
 )
-from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Reason, Verdict
+from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
     called,
     differing,

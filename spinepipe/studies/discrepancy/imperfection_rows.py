@@ -12,7 +12,7 @@ from spinepipe.studies.discrepancy.search.imperfections import (
     TakenUp,
 )
 from spinepipe.studies.discrepancy.search.model_files import border
-from spinepipe.studies.discrepancy.verdict import (
+from spinepipe.studies.discrepancy.verdict_imperfections import (
     CommonImperfection,
     Imperfections,
     KindOfImperfection,

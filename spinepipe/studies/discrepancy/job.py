@@ -11,10 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from spinepipe.cohort import Cohort
-from spinepipe.effects.contract import Array
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
@@ -23,7 +20,7 @@ from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
-from spinepipe.studies.discrepancy.curve_numbers import field_number_rows, numbers_at, reaches
+from spinepipe.studies.discrepancy.curve_numbers import field_number_rows, reaches
 from spinepipe.studies.discrepancy.design.advice import advice, hidden_effects
 from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
@@ -44,11 +41,8 @@ from spinepipe.studies.discrepancy.rows import (
 )
 from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.beyond import Beyond, beyond
-from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.hypothesis import Form
 from spinepipe.studies.discrepancy.search.imperfections import TakenUp, taken_up
-from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
@@ -57,10 +51,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
     prepared,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import fitted_values, model_file
-from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
-from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.search.model_files import model_file
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import Run, Store
 from spinepipe.studies.discrepancy.table_rows import tabulated_rows
@@ -75,25 +66,11 @@ from spinepipe.studies.discrepancy.tables import (
     TABULATED,
     WHERE,
 )
-from spinepipe.studies.discrepancy.verdict import (
-    EVERY,
-    Answer,
-    Estimate,
-    Gaps,
-    Missing,
-    Noise,
-    Part,
-    Reason,
-    Rival,
-    Scope,
-    Sizes,
-    Threshold,
-    Unknown,
-    Verdict,
-    plain_data,
-)
+from spinepipe.studies.discrepancy.verdict import EVERY, Answer, Threshold, Verdict, plain_data
+from spinepipe.studies.discrepancy.verdict_found import noise_told, verdict_found
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason, Unknown
 from spinepipe.tables import from_rows, write
-from spinepipe.units import BORDER_PER_SI, STIFFNESS_COLUMNS
+from spinepipe.units import STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 
@@ -104,8 +81,6 @@ STARTED_FROM = "not_fitted"
 """In the names of the model files: they are where the fit started, not where it ended."""
 
 NO_SHAPE = "not known: there is no motion of the base model to compare with"
-
-MOST_RIVALS, MOST_PLACES = 5, 3
 
 
 @dataclass(frozen=True)
@@ -194,7 +169,7 @@ def _without_base(ready: Prepared, trouble: NoBase) -> Results:
         cohort=cohort.name,
         verdict=Answer.UNKNOWN,
         why=f"the base model cannot be fitted: {trouble}",
-        noise=_noise(noise),
+        noise=noise_told(noise),
         unknown=Unknown(str(trouble), NO_SHAPE, Reason.NO_BASE),
         suspected_data_errors=errors,
         threshold=Threshold(false_alarm=ready.study.false_alarm),
@@ -230,7 +205,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     numbers = _field_numbers(ended, rows[GAP.name])
     return Results(
         verdict=replace(
-            _verdict(ready, ended, told, stays, numbers),
+            verdict_found(ready, ended, told, stays, numbers),
             imperfections=told_imperfections(imperfect["with_effects"]),
             tabulated=stays.table,
             withheld=tuple(map(told_withheld, hidden)),
@@ -316,126 +291,3 @@ def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
     file = ready.file
     base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
     return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base)
-
-
-def _verdict(
-    ready: Prepared,
-    investigation: Investigation,
-    told: ToldApart,
-    stays: Beyond,
-    numbers: Sequence[Row],
-) -> Verdict:
-    cohort = ready.cohort
-    found, proof, ended = investigation.found, investigation.proof, investigation.ended
-    final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
-    screen = found.stages[0].screen
-    gaps = {
-        "base": found.base_gap,
-        "with_effects": found.final_gap,
-        "held_out_base": proof.base and proof.base.against(proof.expected),
-        "held_out_with_effects": proof.with_effects and proof.with_effects.against(proof.expected),
-    }
-    return Verdict(
-        cohort=cohort.name,
-        verdict=ended.verdict,
-        why=ended.why,
-        effects=tuple(_missing(found, one, cohort, numbers) for one in ended.named),
-        candidates_in_set=ended.tied,
-        not_testable=told.not_testable,
-        noise=_noise(found.base.noise),
-        rms_residual=Sizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
-        gap=Gaps(
-            **{name: gap.gap if gap else None for name, gap in gaps.items()},
-            held_out_closed=proof.closed,
-        ),
-        smallest_detectable=told.smallest_detectable,
-        unknown=_unknown(found, ended, final, stays),
-        part=_part(found, ended, final, stays),
-        suspected_data_errors=investigation.errors,
-        threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
-        families=told.families,
-    )
-
-
-def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]) -> Missing:
-    number = next(k for k, standing in enumerate(found.standing) if standing is one)
-    form = one.supposed.form
-    return Missing(
-        name=one.name,
-        kind=form.variant.create().kind.value,
-        scope=_scope(form, cohort),
-        variant=dict(form.variant.options),
-        spread=form.spread.value,
-        parameters=tuple(
-            Estimate(
-                "@".join([value.name, *value.place]),
-                value.value,
-                value.unit,
-                (value.low, value.high),
-                value.at_bound,
-            )
-            for value in fitted_values(found.final.fit, number)
-        ),
-        log_evidence=one.log_evidence,
-        rivals=tuple(Rival(other.name, other.margin) for other in one.rivals[:MOST_RIVALS]),
-        field_numbers=numbers_at(numbers, form, cohort.joint_names),
-    )
-
-
-def _scope(form: Form, cohort: Cohort) -> Scope:
-    return Scope(
-        joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
-        coordinates=form.variant.acts_on or EVERY,
-        specimens=EVERY if form.specimen is None else (form.specimen,),
-    )
-
-
-def _noise(noise: FittedNoise) -> Noise:
-    """SDs of one reading in the units of tables, and how they are known."""
-    sd = noise.sd * BORDER_PER_SI
-    return Noise(
-        source=noise.source,
-        rotation_sd_deg=_rms(sd[3:]),
-        translation_sd_mm=_rms(sd[:3]),
-        serial_correlation=noise.correlation,
-        outliers_left_out=noise.outliers,
-    )
-
-
-def _rms(sd: Array) -> float | None:
-    """Of what was read; None where nothing was."""
-    read = sd[np.isfinite(sd)]
-    return float(np.sqrt(np.mean(read**2))) if len(read) else None
-
-
-def _unknown(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Unknown | None:
-    if ended.reason is None:
-        return None
-    shape = _shape(found)
-    coordinate = found.lack.coordinate if shape else None
-    return Unknown(_where(final), shape, ended.reason, coordinate, stays.formula)
-
-
-def _part(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Part | None:
-    """What stays beside the effects that are certain; None where nothing is said to."""
-    if not ended.left:
-        return None
-    shape, gap = _shape(found), found.final_gap.gap
-    coordinate = found.lack.coordinate if shape else None
-    return Part(gap, _where(final), shape, ended.left, coordinate, stays.formula)
-
-
-def _where(final: Sequence[Place]) -> str:
-    """The largest gaps that are left, in words."""
-    named = "; ".join(
-        f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
-        f"(gap {p.gap.gap:.1f})"
-        for p in worst(final, MOST_PLACES)
-    )
-    return named or "no single place stands out"
-
-
-def _shape(found: Found) -> str | None:
-    """What the generic basis sees there; None without evidence."""
-    evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
-    return found.lack.shape if evident else None

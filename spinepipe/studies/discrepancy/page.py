@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
-from spinepipe.report.words import plain
+from spinepipe.report.words import listed, plain
 from spinepipe.studies.discrepancy.advice_words import shown_advice
 from spinepipe.studies.discrepancy.field_tables import (
     FORMULA_ABOUT,
@@ -24,12 +24,14 @@ from spinepipe.studies.discrepancy.findings import findings, headline, how_sure,
 from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TESTS, WHERE
-from spinepipe.studies.discrepancy.verdict import Answer, Formula, Missing, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, Answer, Missing, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import (
     called,
     differing,
     general,
     motion_of,
+    name_at,
     readable,
     where_of,
 )
@@ -87,7 +89,11 @@ _COLUMNS: Mapping[str, tuple[Column, ...]] = {
         Column("rival", "text", "another name for the same discrepancy"),
         Column("margin", "number", "log evidence by which it is behind"),
     ),
-    "set": (_EFFECT,),
+    "set": (
+        _EFFECT,
+        Column("where", "text", "coordinates that it would load; none where it names none"),
+        Column("behind", "text", "log evidence by which it is behind the likeliest"),
+    ),
     "not_testable": (
         _EFFECT,
         Column("why", "text", "why these tests cannot show it"),
@@ -212,7 +218,14 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
             for effect in verdict.effects
             for one in quantities(effect)
         ],
-        "set": [{"effect": general(name)} for name in verdict.candidates_in_set],
+        "set": [
+            {
+                "effect": name_at(one.name, one.coordinates),
+                "where": "" if one.coordinates == EVERY else listed(map(plain, one.coordinates)),
+                "behind": "not told" if one.behind is None else f"{one.behind:.1f}",
+            }
+            for one in verdict.in_set
+        ],
         "rivals": [
             {
                 "effect": called(effect),

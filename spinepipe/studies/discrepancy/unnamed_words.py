@@ -10,7 +10,8 @@ import pandas as pd
 from spinepipe.report.words import capital, fixed
 from spinepipe.studies.discrepancy.field_tables import formula_text
 from spinepipe.studies.discrepancy.gap_words import BASE, WITH_EFFECTS, places, shown_most, worst
-from spinepipe.studies.discrepancy.verdict import Formula, Reason, Verdict
+from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula, Reason
 from spinepipe.studies.discrepancy.words import motion_of, readable
 
 _SPREADS = {

@@ -13,6 +13,9 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from spinepipe.studies.discrepancy.verdict_imperfections import Imperfections, WithheldEffect
+from spinepipe.studies.discrepancy.verdict_unnamed import Part, Reason, Tabulated, Unknown
+
 EVERY = ("*",)
 """All joints, coordinates or specimens."""
 
@@ -34,21 +37,6 @@ class Answer(StrEnum):
     SET = "SET"
     NULL = "NULL"
     UNKNOWN = "UNKNOWN"
-
-
-class Reason(StrEnum):
-    """Why no name is given where something is missing."""
-
-    NO_BASE = "no_base"
-    DATA_ERRORS = "data_errors"
-    NO_KNOWN_EFFECT = "no_known_effect"
-    A_PART_STAYS = "a_part_stays"
-    MOST_STAYS = "most_stays"
-    IMITATED_TOGETHER = "imitated_together"
-    NONE_KEEPS_ITS_PLACE = "none_keeps_its_place"
-    STIFFNESS_OF_EACH_JOINT = "stiffness_of_each_joint"
-    RIVALS_UNKNOWN = "rivals_unknown"
-    NOT_PROVEN = "not_proven"
 
 
 @dataclass(frozen=True)
@@ -79,10 +67,29 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another name, and by how much log evidence it is behind."""
+    """Another name, and by how much log evidence it is behind.
+
+    ``coordinates`` : those that its best form loads; ``*`` where it names none.
+    """
 
     name: str
     log_evidence_margin: float
+    coordinates: tuple[str, ...] = ("*",)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One name of a set.
+
+    Attributes
+    ----------
+    coordinates : those it would load; ``*`` where it names none.
+    behind : log evidence by which it is behind the likeliest; None where nothing recorded tells.
+    """
+
+    name: str
+    coordinates: tuple[str, ...]
+    behind: float | None
 
 
 @dataclass(frozen=True)
@@ -177,177 +184,6 @@ class SmallestDetectable:
 
 
 @dataclass(frozen=True)
-class FormulaTerm:
-    """One term of a formula.
-
-    Attributes
-    ----------
-    joint, specimen : ``*`` for all. acts : load or reading. term : what the coefficient multiplies,
-        in words; of : the motions that it is a product of, empty for other terms.
-    explained : share of what is above the noise that the term adds to those before it.
-    """
-
-    specimen: str
-    joint: str
-    coordinate: str
-    acts: str
-    term: str
-    coefficient: float
-    sd: float
-    unit: str
-    explained: float
-    of: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Formula:
-    """What would describe a discrepancy that has no name; it is no effect.
-
-    Attributes
-    ----------
-    terms : as they entered. text : a line for each place. explained : share of what is above the
-        noise, in the fit. held_out_closed : of that in readings left out; None where none tells.
-    threshold : drop of chi2 that noise alone seldom shows for the best of all terms.
-    """
-
-    terms: tuple[FormulaTerm, ...]
-    text: str
-    explained: float
-    held_out_closed: float | None
-    threshold: float
-
-
-@dataclass(frozen=True)
-class Tabulated:
-    """Tables in the model file in the place of effects that have no name.
-
-    Attributes
-    ----------
-    place : what is tabulated, and where, in words. gap : noise SD, in the fit with them.
-    held_out_closed : share of what is above the noise in readings left out that they close; None
-        where none tells.
-    """
-
-    place: str
-    gap: float
-    held_out_closed: float | None
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """What is missing without a name.
-
-    Attributes
-    ----------
-    where : the largest gaps, in words. shape : as generic shapes see it, None without evidence.
-    reason : why there is no name. coordinate : of the shape; None without one.
-    formula : what would describe it; it is no name either.
-    """
-
-    where: str
-    shape: str | None
-    reason: Reason
-    coordinate: str | None = None
-    formula: Formula | None = None
-
-
-@dataclass(frozen=True)
-class Part:
-    """What stays beside effects that are certain.
-
-    Attributes
-    ----------
-    left_gap : noise SD, with the effects; None where it was not told.
-    left_where : the largest gaps that stay, in words. left_shape : None without evidence.
-    reasons : why it is not said that nothing else is missing.
-    coordinate : of the shape; None without one. formula : what would describe what stays.
-    """
-
-    left_gap: float | None
-    left_where: str
-    left_shape: str | None
-    reasons: tuple[str, ...] = ()
-    coordinate: str | None = None
-    formula: Formula | None = None
-
-
-@dataclass(frozen=True)
-class KindOfImperfection:
-    """What a kind of imperfection takes up of chi2, all joints, tests and specimens together."""
-
-    kind: str
-    taken_chi2: float
-
-
-@dataclass(frozen=True)
-class LargeImperfection:
-    """The most likely size of one imperfection, in prior SDs and in ``unit``."""
-
-    kind: str
-    where: str
-    in_prior_sds: float
-    value: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class CommonImperfection:
-    """An imperfection that is alike in so many places that it is no random error.
-
-    Attributes
-    ----------
-    mean_in_prior_sds, se : the mean, and its standard error by the scatter of the places.
-    """
-
-    kind: str
-    where: str
-    mean_in_prior_sds: float
-    se: float
-    value: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class Imperfections:
-    """What the small imperfections took up that the study allows for.
-
-    Attributes
-    ----------
-    gap_without, gap_with : noise SD, of the model that the verdict stands for; the first refitted
-        without any, None where that has no fit. by_kind, largest : most first.
-    common : those that are no random errors. message : all this in sentences.
-    """
-
-    gap_without: float | None
-    gap_with: float
-    by_kind: tuple[KindOfImperfection, ...]
-    largest: tuple[LargeImperfection, ...]
-    common: tuple[CommonImperfection, ...]
-    message: str
-
-
-@dataclass(frozen=True)
-class WithheldEffect:
-    """An effect without a name, as it is no larger than an imperfection that is allowed for.
-
-    Attributes
-    ----------
-    imperfection : its kind. allowed : its prior SD, in ``unit``; 1 is a share.
-    known_to : largest SD at which the effect would be evident; None where knowing this kind alone
-        does not do, or it would have to be known better than anybody can.
-    log_evidence : as things are. log_evidence_if_known : were the imperfection known exactly.
-    """
-
-    name: str
-    imperfection: str
-    allowed: float
-    known_to: float | None
-    unit: str
-    log_evidence: float
-    log_evidence_if_known: float
-
-
-@dataclass(frozen=True)
 class SuspectedError:
     """A mistake that the data point to; nothing is corrected.
 
@@ -377,6 +213,7 @@ class Verdict:
     Attributes
     ----------
     effects : missing for certain. candidates_in_set : names that cannot be told apart.
+    candidates : the same with their coordinates, once for each.
     families : sets of effects that these tests cannot tell apart.
     imperfections : what those allowed for took up; None where the base has no fit.
     tabulated : of UNKNOWN and PART, what the model with effects has besides; None for nothing.
@@ -388,6 +225,7 @@ class Verdict:
     why: str = ""
     effects: tuple[Missing, ...] = ()
     candidates_in_set: tuple[str, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
     not_testable: tuple[NotTestable, ...] = ()
     noise: Noise = field(default_factory=Noise)
     rms_residual: Sizes = field(default_factory=Sizes)
@@ -406,6 +244,12 @@ class Verdict:
     def named(self) -> tuple[str, ...]:
         """Names of the effects that are missing for certain."""
         return tuple(effect.name for effect in self.effects)
+
+    @property
+    def in_set(self) -> tuple[Candidate, ...]:
+        """Names that cannot be told apart, with their coordinates where the file has them."""
+        names = (Candidate(name, EVERY, None) for name in self.candidates_in_set)
+        return self.candidates or tuple(names)
 
     @property
     def reason(self) -> Reason | None:

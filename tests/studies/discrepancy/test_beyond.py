@@ -21,7 +21,8 @@ from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer, Tabulated, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict import Answer, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict_unnamed import Tabulated
 from spinepipe.units import ROTATIONS
 
 

@@ -32,13 +32,8 @@ from spinepipe.studies.discrepancy.findings import findings, headline, how_sure,
 from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import (
-    Answer,
-    Reason,
-    Verdict,
-    plain_data,
-    verdict_of,
-)
+from spinepipe.studies.discrepancy.verdict import Answer, Verdict, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import general
 from spinepipe.studies.read import check
 from spinepipe.tables import Tables

@@ -12,7 +12,8 @@ from spinepipe.studies.discrepancy.field_tables import (
     tabulated_shown,
     withheld_shown,
 )
-from spinepipe.studies.discrepancy.verdict import Formula, FormulaTerm, WithheldEffect
+from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import DEG_PER_RAD
 
 

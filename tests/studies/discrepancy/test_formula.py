@@ -17,7 +17,7 @@ from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
 from spinepipe.studies.discrepancy.search.prediction import Solved
 from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Candidate, Problem, _Part
-from spinepipe.studies.discrepancy.verdict import Formula, FormulaTerm
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import ROTATIONS
 
 DRAWS, FALSE_ALARM = 200, 0.01

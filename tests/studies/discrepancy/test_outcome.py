@@ -16,7 +16,8 @@ from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Vari
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Stage, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
-from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 MARGIN = 3.0
 SHAPE = "load over the joint's own extension, shared"

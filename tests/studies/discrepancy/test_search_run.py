@@ -34,7 +34,10 @@ SIGN = {"flexion": -1.0, "extension": 1.0}
 RISE = 4000.0
 """N m/rad3; the stiffness is in N m/rad."""
 
-TABLES = ("gap", "candidates", "where", "confusions", "held_out", "imperfections", "next_tests")
+TABLES = (
+    *("gap", "candidates", "where", "confusions", "held_out", "imperfections"),
+    *("field_numbers", "tabulated", "next_tests"),
+)
 
 
 def turned(moment: float, k: float) -> float:
@@ -88,7 +91,7 @@ def test_every_result_is_there_and_holds_its_schema(searched: Project) -> None:
         rows[name] = table.num_rows
     assert rows["gap"] == 2 * 2 * 6 * 3 * 3  # specimens, tests, steps, joints, rotations
     assert rows["held_out"] == 2 + 2  # specimens and tests
-    assert rows.pop("next_tests") == 0  # all is named
+    assert rows.pop("next_tests") == rows.pop("tabulated") == 0  # all is named
     assert min(rows.values()) > 0
     assert searched.path(f"{FOLDER}/design.csv").read_text().startswith("effect_or_pair,test,")
     figures = {path.stem for path in searched.path(f"{FOLDER}/figures").glob("*.svg")}

@@ -18,7 +18,8 @@ from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, wo
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.investigation import Investigation
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer, Reason
+from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 Told = dict[str, Any]
 

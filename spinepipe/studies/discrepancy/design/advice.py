@@ -27,7 +27,8 @@ from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.tables import ADVICE
-from spinepipe.studies.discrepancy.verdict import Answer, Reason
+from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 ADVISED, OFFERED, TELLS_NOTHING, NO_POSE, WOULD_DO, NOT_ENOUGH = ADVICE
 

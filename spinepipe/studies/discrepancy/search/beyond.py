@@ -23,7 +23,8 @@ from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit, la
 from spinepipe.studies.discrepancy.search.refit import laplace, standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, exceeded
 from spinepipe.studies.discrepancy.store import Run
-from spinepipe.studies.discrepancy.verdict import EVERY, Formula, Tabulated
+from spinepipe.studies.discrepancy.verdict import EVERY
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula, Tabulated
 from spinepipe.units import COORDINATES
 
 TABLE = "tabulated_law"

@@ -34,7 +34,8 @@ from spinepipe.studies.discrepancy.search.pursuit import (
     pursuit_problem,
 )
 from spinepipe.studies.discrepancy.search.refit import STARTS, standing, weaker
-from spinepipe.studies.discrepancy.verdict import EVERY, Formula, FormulaTerm
+from spinepipe.studies.discrepancy.verdict import EVERY
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 
 MOST_TERMS = 4
 """More terms describe anything."""

@@ -14,7 +14,8 @@ from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
-from spinepipe.studies.discrepancy.verdict import Answer, Reason, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 UNEXPLAINED_SHARE = 0.1
 """Of what effects and generic basis explain together: more left to the basis is unknown."""

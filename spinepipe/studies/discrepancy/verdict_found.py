@@ -1,0 +1,192 @@
+"""The verdict, from what a search found: names, sets, what stays, and where."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.curve_numbers import numbers_at
+from spinepipe.studies.discrepancy.design.told_apart import ToldApart
+from spinepipe.studies.discrepancy.search.beyond import Beyond
+from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
+from spinepipe.studies.discrepancy.search.hypothesis import Form
+from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
+from spinepipe.studies.discrepancy.search.model_files import fitted_values
+from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
+from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.verdict import (
+    EVERY,
+    Candidate,
+    Estimate,
+    Gaps,
+    Missing,
+    Noise,
+    Rival,
+    Scope,
+    Sizes,
+    Threshold,
+    Verdict,
+)
+from spinepipe.studies.discrepancy.verdict_unnamed import Part, Unknown
+from spinepipe.units import BORDER_PER_SI
+
+Row = dict[str, Any]
+
+MOST_RIVALS, MOST_PLACES = 5, 3
+
+
+def verdict_found(
+    ready: Prepared,
+    investigation: Investigation,
+    told: ToldApart,
+    stays: Beyond,
+    numbers: Sequence[Row],
+) -> Verdict:
+    """What a search found, in a few words.
+
+    Parameters
+    ----------
+    told : what these tests can tell. stays : what describes what has no name.
+    numbers : rows of the field's numbers.
+    """
+    cohort = ready.cohort
+    found, proof, ended = investigation.found, investigation.proof, investigation.ended
+    final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
+    screen = found.stages[0].screen
+    gaps = {
+        "base": found.base_gap,
+        "with_effects": found.final_gap,
+        "held_out_base": proof.base and proof.base.against(proof.expected),
+        "held_out_with_effects": proof.with_effects and proof.with_effects.against(proof.expected),
+    }
+    return Verdict(
+        cohort=cohort.name,
+        verdict=ended.verdict,
+        why=ended.why,
+        effects=tuple(_missing(found, one, cohort, numbers) for one in ended.named),
+        candidates_in_set=ended.tied,
+        candidates=tuple(_candidates(found, ended)),
+        not_testable=told.not_testable,
+        noise=noise_told(found.base.noise),
+        rms_residual=Sizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
+        gap=Gaps(
+            **{name: gap.gap if gap else None for name, gap in gaps.items()},
+            held_out_closed=proof.closed,
+        ),
+        smallest_detectable=told.smallest_detectable,
+        unknown=_unknown(found, ended, final, stays),
+        part=_part(found, ended, final, stays),
+        suspected_data_errors=investigation.errors,
+        threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
+        families=told.families,
+    )
+
+
+def _candidates(found: Found, ended: Outcome) -> Iterator[Candidate]:
+    """Names of the set: what stands there, then its rivals, by how far they are behind."""
+    told: set[tuple[str, tuple[str, ...]]] = set()
+    for one in found.standing:
+        if one.name not in ended.tied or any(one is named for named in ended.named):
+            continue
+        own = one.supposed.form.variant.acts_on or EVERY
+        near = {rival.name: rival for rival in one.rivals}
+        every = [Candidate(one.name, own, 0.0)]
+        for name in ended.tied:
+            if name in near:
+                every.append(Candidate(name, near[name].on or EVERY, near[name].margin))
+            elif name != one.name:
+                every.append(Candidate(name, own, None))
+        for candidate in every:
+            if (place := (candidate.name, candidate.coordinates)) not in told:
+                told.add(place)
+                yield candidate
+
+
+def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]) -> Missing:
+    number = next(k for k, standing in enumerate(found.standing) if standing is one)
+    form = one.supposed.form
+    return Missing(
+        name=one.name,
+        kind=form.variant.create().kind.value,
+        scope=_scope(form, cohort),
+        variant=dict(form.variant.options),
+        spread=form.spread.value,
+        parameters=tuple(
+            Estimate(
+                "@".join([value.name, *value.place]),
+                value.value,
+                value.unit,
+                (value.low, value.high),
+                value.at_bound,
+            )
+            for value in fitted_values(found.final.fit, number)
+        ),
+        log_evidence=one.log_evidence,
+        rivals=tuple(
+            Rival(other.name, other.margin, other.on or EVERY) for other in one.rivals[:MOST_RIVALS]
+        ),
+        field_numbers=numbers_at(numbers, form, cohort.joint_names),
+    )
+
+
+def _scope(form: Form, cohort: Cohort) -> Scope:
+    return Scope(
+        joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
+        coordinates=form.variant.acts_on or EVERY,
+        specimens=EVERY if form.specimen is None else (form.specimen,),
+    )
+
+
+def noise_told(noise: FittedNoise) -> Noise:
+    """SDs of one reading in the units of tables, and how they are known."""
+    sd = noise.sd * BORDER_PER_SI
+    return Noise(
+        source=noise.source,
+        rotation_sd_deg=_rms(sd[3:]),
+        translation_sd_mm=_rms(sd[:3]),
+        serial_correlation=noise.correlation,
+        outliers_left_out=noise.outliers,
+    )
+
+
+def _rms(sd: Array) -> float | None:
+    """Of what was read; None where nothing was."""
+    read = sd[np.isfinite(sd)]
+    return float(np.sqrt(np.mean(read**2))) if len(read) else None
+
+
+def _unknown(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Unknown | None:
+    if ended.reason is None:
+        return None
+    shape = _shape(found)
+    coordinate = found.lack.coordinate if shape else None
+    return Unknown(_where(final), shape, ended.reason, coordinate, stays.formula)
+
+
+def _part(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Part | None:
+    """What stays beside the effects that are certain; None where nothing is said to."""
+    if not ended.left:
+        return None
+    shape, gap = _shape(found), found.final_gap.gap
+    coordinate = found.lack.coordinate if shape else None
+    return Part(gap, _where(final), shape, ended.left, coordinate, stays.formula)
+
+
+def _where(final: Sequence[Place]) -> str:
+    """The largest gaps that are left, in words."""
+    named = "; ".join(
+        f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
+        f"(gap {p.gap.gap:.1f})"
+        for p in worst(final, MOST_PLACES)
+    )
+    return named or "no single place stands out"
+
+
+def _shape(found: Found) -> str | None:
+    """What the generic basis sees there; None without evidence."""
+    evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
+    return found.lack.shape if evident else None
