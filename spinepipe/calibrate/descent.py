@@ -74,15 +74,20 @@ def descend(
     size : number of residuals.
     """
     nowhere = np.full(size, np.nan)
+    last: list[Array] = []
 
     def residual(x: Array) -> Array:
         found = point(x)
-        return nowhere if found is None else found[0]
+        if found is None:
+            return nowhere
+        last[:] = [found[1]]
+        return found[0]
 
     def jacobian(x: Array) -> Array:
+        # asked where residuals were finite just before, but for x that is put onto its bounds: a
+        # rounding error away, and where a segment is about to snap that is without equilibrium
         found = point(x)
-        assert found is not None  # steps are taken to points with an equilibrium only
-        return found[1]
+        return last[0] if found is None else found[1]
 
     result = bounded_least_squares(
         residual,
