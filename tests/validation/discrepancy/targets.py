@@ -94,6 +94,22 @@ def _part(number: int, seed: int) -> Target:
     return Target("part", f"{known}+{alien}", with_effects(recipe, known, alien))
 
 
+OF_SEVERAL_JOINTS = ("swapped_specimens", "bad_markers")
+"""Mistakes that one joint alone does not show: its stiffness, or all noise, would be another."""
+
+TWO_JOINTS: Mapping[str, Any] = {
+    "region": "lumbar",
+    "joints": 2,
+    "lowest": 1,
+    "design": "sweeps",
+    "peak_nm": 7.5,
+    "peak_n": 0.0,
+    "gravity": True,
+    "only": (),
+    "noise_sd_mm": 0.1,
+}
+
+
 def _mistake(number: int, seed: int) -> Target:
     """Each mistake in the files, without and with a real effect."""
     names = [*ERRORS, LOAD_UNIT]
@@ -105,6 +121,8 @@ def _mistake(number: int, seed: int) -> Target:
     effect = (str(rng.choice(OF_LAWS)),) if real else ()
     fields = {"errors": {name: options}, "noise": "white", "n_specimens": 3, "cycles": 3}
     recipe = plain(seed, *effect, **fields)
+    if name in OF_SEVERAL_JOINTS and recipe.joints == 1:
+        recipe = plain(seed, *effect, **fields, **TWO_JOINTS)
     if name == "flipped_sign":
         flipped = {"coordinate": str(rng.choice(_loaded(recipe)))}
         recipe = replace(recipe, errors={name: flipped})
