@@ -126,11 +126,23 @@ def orth(matrix: ArrayLike, rcond: float) -> Array:
 def eigh(matrix: ArrayLike) -> tuple[Array, Array]:
     """Eigenvalues (N,), rising, and eigenvectors (N, N) in columns, of a symmetric matrix (N, N).
 
+    Or of each of a stack (..., N, N).
+
     Raises
     ------
     NotFiniteError : where an entry is not finite.
     """
     given = _finite(matrix)
+    try:
+        values, vectors = np.linalg.eigh(given)
+    except LinAlgError:  # one matrix stops all of them
+        values, vectors = np.empty(given.shape[:-1]), np.empty(given.shape)
+        for place in np.ndindex(*given.shape[:-2]):
+            values[place], vectors[place] = _eigh(given[place])
+    return values, vectors
+
+
+def _eigh(given: Array) -> tuple[Array, Array]:
     try:
         values, vectors = np.linalg.eigh(given)
     except LinAlgError:

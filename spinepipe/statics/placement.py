@@ -52,9 +52,10 @@ def _then(before: Placed, active: ActiveGeometry, with_parameters: bool) -> Plac
     q, first, second = before.q.copy(), before.by_coordinate.copy(), before.by_coordinates.copy()
     q[j] = step.q
     first[j] = step.by_coordinate @ before.by_coordinate[j]
-    second[j] = np.einsum(
-        "jkab,jac,jbd->jkcd", step.by_coordinates, before.by_coordinate[j], before.by_coordinate[j]
-    ) + np.einsum("jka,jacd->jkcd", step.by_coordinate, before.by_coordinates[j])
+    slope, bent = before.by_coordinate[j][:, None], before.by_coordinates[j]
+    with np.errstate(over="ignore", invalid="ignore"):  # steps that run away are given up later
+        second[j] = np.swapaxes(slope, 2, 3) @ step.by_coordinates @ slope
+        second[j] += (step.by_coordinate @ bent.reshape(len(j), 6, 36)).reshape(bent.shape)
     by_parameter = {}
     if with_parameters:
         carried = before.by_parameter.items()

@@ -275,6 +275,19 @@ def test_eigenvectors_are_orthonormal_and_make_the_matrix(
     assert np.all(np.diff(values) >= 0.0)
 
 
+@either_way
+def test_eigenvalues_of_a_stack_are_those_of_each(
+    lapack: Callable[[], Iterator[list[str]]],
+) -> None:
+    half = np.random.default_rng(4).normal(size=(3, 2, 5, 5))
+    stack = half + half.swapaxes(2, 3)
+    with lapack():  # type: ignore[attr-defined]
+        values, vectors = eigh(stack)
+    made_again = (vectors * values[..., None, :]) @ vectors.swapaxes(2, 3)
+    np.testing.assert_allclose(made_again, stack, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(values, np.linalg.eigvalsh(stack), rtol=0, atol=1e-12)
+
+
 # Inside bounds -----------------------------------------------------------------------------------
 
 

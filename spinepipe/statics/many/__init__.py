@@ -10,7 +10,7 @@ from spinepipe.statics.many.derive import (
 )
 from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.given import by_joint_pose, by_load
-from spinepipe.statics.many.idle import Acting, Answering, Idle
+from spinepipe.statics.many.idle import Acting, Answering, Idle, acts_here
 from spinepipe.statics.many.settling import Ends, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
@@ -28,6 +28,7 @@ __all__ = [
     "Poses",
     "Spines",
     "Stack",
+    "acts_here",
     "answered",
     "by_joint_pose",
     "by_load",

@@ -280,7 +280,7 @@ class Bound:
             slope, j, here = slopes.geometry[active.index], active.joints, seen[active.joints]
             step = active.effect.place(here, active.values)
             own = active.effect.by_parameter(here, active.values)
-            bent = np.einsum("jkab,jbm->jkam", step.by_coordinates, q_by_x[j])
+            bent = step.by_coordinates @ q_by_x[j][:, None]
             bent += np.einsum("jkap,jpm->jkam", own.by_coordinate, slope)
             turned = np.einsum("jka,jacm->jkcm", step.by_coordinate, first_by_x[j])
             first_by_x[j] = turned + np.einsum("jkam,jac->jkcm", bent, first[j])

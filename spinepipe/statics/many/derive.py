@@ -286,7 +286,15 @@ def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]
 
 
 def readings(stack: Stack, q: Array) -> Array:
-    """(L, J, 6) what the instruments report at poses q (L, J, 6)."""
+    """(L, J, 6) what is read at poses q (L, J, 6)."""
+    seen = reported(stack, q)
+    if not stack.loads.supports.there:
+        return seen
+    return _with_reactions(stack, np.arange(len(q)), seen, reactions(stack, q))
+
+
+def reported(stack: Stack, q: Array) -> Array:
+    """(L, J, 6) what the instruments make of poses q (L, J, 6)."""
     seen = q.reshape(-1, 6).copy()
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
@@ -294,10 +302,26 @@ def readings(stack: Stack, q: Array) -> Array:
         effect = observing(one)
         around = _beside(stack, effect, seen, flat)
         seen[flat] = read(effect, seen[flat], one.values[one.row[places]], around).q
-    if not stack.loads.supports.there:
-        return seen.reshape(q.shape)
-    every = np.arange(len(q))
-    return _with_reactions(stack, every, seen.reshape(q.shape), reactions(stack, q))
+    return seen.reshape(q.shape)
+
+
+def reported_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
+    """(S, L J, 6, P) how one more instrument, that is off, would change what is reported.
+
+    Parameters
+    ----------
+    seen : (L, J, 6) what those there report. values : (S, P) at S points of its shapes.
+    """
+    joints, every = seen.reshape(-1, 6), np.arange(seen.size // 6)
+    around = _beside(stack, effect, joints, every)
+    found = [
+        read_by(effect, joints, np.tile(one, (len(every), 1)), around)
+        for one in values  # few: instruments have no shapes, or one
+    ]
+    if stack.loads.supports.there:  # a load that is measured is none that instruments report
+        moves = stack.loads.supports.read_as.reshape(-1, 6, 1) <= 0.0
+        found = [one * moves for one in found]
+    return np.stack(found)
 
 
 def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:

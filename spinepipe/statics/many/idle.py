@@ -1,25 +1,32 @@
-"""What laws, and effects on geometry, that are switched off would do to solved runs.
+"""What laws, effects on geometry and instruments that are switched off would do to solved runs.
 
 An idle law holds nothing, whatever its state, so that to first order only its own load grows with a
 strength; one on geometry moves and turns what the laws hold. The chain answers these loads as it
 answers any. Without memory its answers to unit loads on each axis serve all of them; laws that
-remember are led through all loads at once, step by step.
+remember are led through all loads at once, step by step. An instrument changes its own reading.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
 
+from spinepipe.effects import Effect, Kind
 from spinepipe.effects.contract import Array, GeometryEffect, Indices, JointLaw, PathLaw
 from spinepipe.statics.holding import hold
+from spinepipe.statics.instruments import Instrument
 from spinepipe.statics.many.bound import Bound
-from spinepipe.statics.many.derive import answered, answered_on_path
+from spinepipe.statics.many.derive import answered, answered_on_path, reported, reported_by
 from spinepipe.statics.many.stack import Stack
 
-Acting = JointLaw | PathLaw | GeometryEffect
+Acting = JointLaw | PathLaw | GeometryEffect | Instrument
+
+
+def acts_here(effect: Effect) -> TypeGuard[Acting]:
+    """Whether what an effect that is off would do can be told without a model of its own."""
+    return effect.kind is not Kind.LOAD
 
 
 class Idle(NamedTuple):
@@ -79,14 +86,20 @@ class Answering:
         -------
         of each effect (L, J, n, S, P).
         """
-        every = [self._own(one) for one in idle]
-        if self.stack.remembers.any():
-            found = self._on_path(every)
+        found: dict[int, Array] = {}
+        loads: dict[int, _Own] = {}
+        for number, one in enumerate(idle):
+            if one.effect.kind is Kind.MEASUREMENT:
+                found[number] = self._reported(cast(Instrument, one.effect), one.values)
+            else:
+                loads[number] = self._own(one)
+        if loads and self.stack.remembers.any():
+            found |= zip(loads, self._on_path(list(loads.values())), strict=True)
         else:
-            found = [self.to_unit_loads @ own.load for own in every]
+            found |= {number: self.to_unit_loads @ own.load for number, own in loads.items()}
         return [
-            by_own.reshape(*by_own.shape[:3], *one.values.shape)
-            for by_own, one in zip(found, idle, strict=True)
+            found[number].reshape(*found[number].shape[:3], *one.values.shape)
+            for number, one in enumerate(idle)
         ]
 
     @cached_property
@@ -97,6 +110,20 @@ class Answering:
         unit = np.broadcast_to(-np.eye(n).reshape(joints, 6, n), (lanes, joints, 6, n))
         found = answered(self.stack, self.q, unit, observed=True).reshape(lanes, n, joints, 6)
         return np.ascontiguousarray(found.swapaxes(1, 2))
+
+    def _reported(self, effect: Instrument, values: Array) -> Array:
+        """(L, J, n, S P) what each joint's own instrument would change of what it reports."""
+        own = reported_by(self.stack, self.reported, effect, values)
+        of_joints = _shapes_last(own.reshape(-1, *own.shape[2:]), len(values))
+        alone = _alone(of_joints.reshape(*self.q.shape, -1))
+        lanes, joints, _ = self.q.shape
+        by_joint = alone.reshape(lanes, 6 * joints, joints, -1)
+        return np.moveaxis(by_joint, 2, 1)
+
+    @cached_property
+    def reported(self) -> Array:
+        """(L, J, 6) what the instruments report."""
+        return reported(self.stack, self.q)
 
     def _on_path(self, every: Sequence[_Own]) -> list[Array]:
         """(L, J, n, m) of each, where laws remember: all that is not zero, led through at once."""
@@ -148,21 +175,21 @@ class Answering:
 
     def _own(self, idle: Idle) -> _Own:
         """What each joint's own effect would do; m = S P, shapes first."""
-        effect, values = idle
+        (effect, values), kind = idle, idle.effect.kind
         held, (points, count) = self.held, (len(values), self.q.size // 6)
         shape = (*self.q.shape, -1)
-        if isinstance(effect, PathLaw):
-            own = self._by_step(effect, values)
+        if kind is Kind.PATH:
+            own = self._by_step(cast(PathLaw, effect), values)
             return _Own(held.pulled(own).reshape(shape), None)
         q, every = np.tile(held.q, (points, 1)), np.repeat(values, count, axis=0)
         load = np.tile(held.load, (points, 1))
-        if isinstance(effect, GeometryEffect):
-            moved = effect.by_parameter(q, every)
+        if kind is Kind.GEOMETRY:
+            moved = cast(GeometryEffect, effect).by_parameter(q, every)
             turned = (moved.by_coordinate * load[:, :, None, None]).sum(axis=1)
             shift = _shapes_last(moved.q, points)
             own = _shapes_last(turned, points) + held.tangent @ shift
             return _Own(held.pulled(own).reshape(shape), shift.reshape(shape))
-        own = _shapes_last(effect.by_parameter(q, every, load), points)
+        own = _shapes_last(cast(JointLaw, effect).by_parameter(q, every, load), points)
         return _Own(held.pulled(own).reshape(shape), None)
 
     def _by_step(self, law: PathLaw, values: Array) -> Array:

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, ncx2, norm
 from spring_chain_cases import SD, readings
 
-from spinepipe.effects import Spread
+from spinepipe.effects import Spread, registered
 from spinepipe.model import SpineModel
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
@@ -23,8 +23,10 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Hypothesis,
     Member,
     Supposed,
+    Trials,
     Unknown,
     Variant,
+    shape_grid,
     trials,
 )
 from spinepipe.studies.discrepancy.search.inquiry import look
@@ -35,6 +37,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     EVERY_TEST,
     Column,
     Linearised,
+    columns_of,
     drawn,
     linearised,
     products,
@@ -47,6 +50,7 @@ from spinepipe.studies.discrepancy.search.screen import (
     Index,
     Screen,
     exceeded,
+    screened,
     summed,
 )
 from spinepipe.studies.discrepancy.store import at_once
@@ -180,6 +184,45 @@ def test_products_are_those_of_dense_projections(spread: Spread, shared: int) ->
     residual = -np.concatenate([fit.residuals["a"], fit.residuals["b"]])
     np.testing.assert_allclose(one.gram, left.T @ left, atol=1e-9)
     np.testing.assert_allclose(one.moments[:, 0], left.T @ residual, atol=1e-9)
+
+
+def test_evidence_of_many_forms_at_once_is_that_of_each() -> None:
+    """Forms of all ways to differ, some of one place; shapes and signs as the effects have them."""
+    rng = np.random.default_rng(6)
+    members = {"a": (0, 1, 4), "b": (4, 2, 3)}
+    fit = made_up_fit({name: rng.normal(size=(60, 3)) for name in members}, members)
+    variants = [
+        Variant(name, tuple(options.items()))
+        for name in ("local_laxity", "neutral_zone")
+        for options in registered()[name].trial.variants[:2]  # type: ignore[attr-defined]
+    ]
+    places = [(None, None), (0, None), (1, "a"), (0, "b")]
+    forms = tuple(
+        Form(variant, spread, joint, specimen)
+        for variant in variants
+        for spread in (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
+        for joint, specimen in places
+    )
+    trials = Trials("made up", tuple(variants), forms)
+    index = Index(columns_of(trials, 2, ()))
+    signatures = {name: rng.normal(size=(60, len(index.columns))) for name in members}
+    problem = problem_of(fit, signatures, 3)
+    whole = screened(trials, index, problem, tuple(members), ())
+    shares = []
+    for form in forms:
+        grid = shape_grid(form.variant)
+        alone = [summed(index, problem, form, sds, tuple(members), ()) for sds in grid]
+        logs = [Group.of(one.gram, one.group.signs).log_evidence(one.moments)[0] for one in alone]
+        tried = next(one for one in whole.forms if one.form == form)
+        best = alone[int(np.argmax(logs))]
+        assert (tried.sds, tried.strengths) == (best.sds, best.strengths)
+        share = -np.log(len(variants) * 3 * len(places))
+        assert tried.log_evidence == pytest.approx(max(logs) + share, rel=1e-9)
+        b = best.group.estimate(best.moments[:, 0])
+        np.testing.assert_allclose(tried.estimate, b, atol=1e-12)
+        assert tried.explained == pytest.approx(2.0 * b @ best.moments[:, 0] - b @ best.gram @ b)
+        shares.append(logsumexp(logs) - np.log(len(grid)) + share)
+    assert whole.log_evidence == pytest.approx(logsumexp(shares), rel=1e-9)
 
 
 def test_draws_of_the_null_have_the_covariance_of_the_products() -> None:

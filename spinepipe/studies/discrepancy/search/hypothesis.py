@@ -4,8 +4,10 @@ An effect has a form: which variant, and how its values may differ where. Unknow
 between specimens or of one; each moves rows of an effect's values.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -30,7 +32,7 @@ class Variant:
 
     def create(self) -> Effect:
         """The effect itself."""
-        return create(self.effect, dict(self.options))
+        return _created(self, registered().get(self.effect))
 
     def coordinates(self, read: Sequence[str]) -> tuple[str, ...]:
         """Those of the read coordinates that it loads by its options; all, if it names none."""
@@ -92,9 +94,23 @@ class Trials:
 
     def log_share(self, form: Form) -> float:
         """Logarithm of a form's share of its effect: equal for variants, ways to differ, places."""
-        spreads = len({one.spread for one in self.forms})
-        like = [f for f in self.forms if (f.variant, f.spread) == (form.variant, form.spread)]
-        return -float(np.log(len(self.variants) * spreads * max(len(like), 1)))
+        spreads, places = self._alike
+        return -float(np.log(len(self.variants) * spreads * places.get(_place(form), 1)))
+
+    @cached_property
+    def _alike(self) -> tuple[int, Mapping[tuple[Variant, Spread], int]]:
+        """Number of ways to differ, and of forms of each variant and way to differ."""
+        return len({one.spread for one in self.forms}), Counter(map(_place, self.forms))
+
+
+def _place(form: Form) -> tuple[Variant, Spread]:
+    return form.variant, form.spread
+
+
+@cache
+def _created(variant: Variant, cls: type | None) -> Effect:
+    """The effect of a variant, made once for each class of its name."""
+    return create(variant.effect, dict(variant.options))
 
 
 def shape_at(parameter: Parameter, sds: float) -> float:

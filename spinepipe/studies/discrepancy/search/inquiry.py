@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -159,7 +160,8 @@ def linearised_for(
 ) -> list[tuple[Index, Linearised]]:
     """The products of each effect's signatures; draws of the null are the same for all effects."""
     joints = next(iter(grounds.fit.models.values())).n_joints
-    columns = [columns_of(one, joints, grounds.tests) for one in trials]
+    indices = [_index(one, joints, tuple(grounds.tests)) for one in trials]
+    columns = [one.columns for one in indices]
     taken = taken_out(grounds.fit)
     parts: list[dict[str, Products]] = [{} for _ in trials]
     for number, (name, one) in enumerate(grounds.readings.items()):
@@ -169,10 +171,13 @@ def linearised_for(
             plain = grounds.plain[name].noise_only(moved)
             white = grounds.setting.whitenings[name].shortened(plain)
             place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
-    return [
-        (Index(of_effect), linearised(place))
-        for of_effect, place in zip(columns, parts, strict=True)
-    ]
+    return [(index, linearised(place)) for index, place in zip(indices, parts, strict=True)]
+
+
+@lru_cache(maxsize=256)
+def _index(trials: Trials, joints: int, tests: tuple[str, ...]) -> Index:
+    """Columns of one effect; looks at the same cohort, and at others like it, share them."""
+    return Index(columns_of(trials, joints, tests))
 
 
 class Inquiry:

@@ -20,7 +20,7 @@ from spinepipe.effects.contract import AcrossJoints, Array
 from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import FreeParameter
-from spinepipe.statics.many import Acting, Idle
+from spinepipe.statics.many import Acting, Idle, acts_here
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.prediction import Solved
@@ -88,14 +88,15 @@ class Linearised:
         return pinvh(self.gram_shared, rcond=1e-10)
 
     def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
-        """Products (k, k), (k, 1 + D) of k strengths less what shared unknowns take of them.
+        """Products (..., k, k), (..., k, 1 + D) of strengths less what shared unknowns take.
 
-        ``coupled`` (k, a): products of the strengths with the shared unknowns.
+        ``coupled`` (..., k, a): products of the strengths with the shared unknowns.
         """
-        if not coupled.shape[1]:
+        if not coupled.shape[-1]:
             return gram, moments
         gain = coupled @ self._inverse_shared
-        return gram - gain @ coupled.T, moments - gain @ self.moments_shared
+        left = gram - gain @ np.swapaxes(coupled, -1, -2)
+        return left, moments - gain @ self.moments_shared
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,7 @@ def _derived(
     together: dict[object, list[_Moved]] = {}
     for some in parts:
         effect = some[0].variant.create()
-        if solved.answering is not None and isinstance(effect, Acting):
+        if solved.answering is not None and acts_here(effect):
             acting.append((effect, some))
         else:
             together.setdefault(_stands_with(effect), []).extend(some)

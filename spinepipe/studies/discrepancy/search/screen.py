@@ -9,7 +9,7 @@ variants, shapes and ways to differ, each with an equal share, so that no effect
 place or by its number of variants.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,9 +41,9 @@ def log_sum(logs: Array) -> Array:
 
 @dataclass(frozen=True)
 class Group:
-    """Strengths that share a size: eigenvalues (k,) and vectors (k, k) of their F'F.
+    """Strengths that share a size: eigenvalues (..., k) and vectors (..., k, k) of their F'F.
 
-    ``signs`` (k,): the side of off that bounds allow, 0 for both.
+    ``signs`` (k,): the side of off that bounds allow, 0 for both. Axes before k are a stack's.
     """
 
     eigenvalues: Array
@@ -52,40 +52,80 @@ class Group:
 
     @classmethod
     def of(cls, gram: Array, signs: Array) -> "Group":
-        """The group with F'F (k, k)."""
+        """The group with F'F (..., k, k)."""
         values, vectors = eigh(gram)
         return cls(np.maximum(values, 0.0), vectors, signs)
 
     def log_evidence(self, moments: Array) -> Array:
-        """(D,) evidence for F'r of each draw, (k, D)."""
-        components = self.vectors.T @ moments
-        variance = 1.0 / (SIZES[:, None] ** -2.0 + self.eigenvalues)
+        """(..., D) evidence for F'r of each draw, (..., k, D)."""
+        components = np.swapaxes(self.vectors, -1, -2) @ moments
+        of_sizes = self.eigenvalues[..., None, :]
+        variance = 1.0 / (SIZES[:, None] ** -2.0 + of_sizes)
         gain = 0.5 * variance @ components**2
-        cost = 0.5 * np.sum(np.log1p(SIZES[:, None] ** 2 * self.eigenvalues), axis=1)
-        found = gain - cost[:, None] + self._one_sided(variance, components)
-        return log_sum(found) - float(np.log(len(SIZES)))
+        cost = 0.5 * np.sum(np.log1p(SIZES[:, None] ** 2 * of_sizes), axis=-1)
+        found = gain - cost[..., None] + self._one_sided(variance, components)
+        return log_sum(np.moveaxis(found, -2, 0)) - float(np.log(len(SIZES)))
 
     def _one_sided(self, variance: Array, components: Array) -> Array:
-        """(S, D) what the signs add: twice the posterior's share on the allowed side, each.
+        """(..., S, D) what the signs add: twice the posterior's share on the allowed side, each.
 
         Parameters
         ----------
-        variance : (S, k) at each size. components : (k, D).
+        variance : (..., S, k) at each size. components : (..., k, D).
         """
         there = self.signs != 0.0
         if not there.any():
-            return np.zeros((len(variance), components.shape[1]))
-        vectors = self.vectors[there]
-        mean = vectors @ (variance[:, :, None] * components)
-        sd = np.sqrt(variance @ (vectors**2).T)
-        sides = self.signs[there, None] * mean / sd[:, :, None]
-        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=1))
+            return np.zeros((*variance.shape[:-1], components.shape[-1]))
+        vectors = self.vectors[..., there, :]
+        by_size = variance[..., None] * components[..., None, :, :]
+        mean = vectors[..., None, :, :] @ by_size
+        sd = np.sqrt(variance @ np.swapaxes(vectors**2, -1, -2))
+        sides = self.signs[there, None] * mean / sd[..., None]
+        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=-2))
 
     def estimate(self, moments: Array) -> Array:
-        """(k,) strengths, in prior SDs, that explain most, shrunk a little where nothing tells."""
+        """(..., k) strengths, in prior SDs, that explain most; shrunk a little where nothing tells.
+
+        ``moments`` (..., k) F'r of the data.
+        """
         inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)
-        found: Array = self.vectors @ (inverse * (self.vectors.T @ moments))
+        components = (np.swapaxes(self.vectors, -1, -2) @ moments[..., None])[..., 0]
+        found: Array = (self.vectors @ (inverse * components)[..., None])[..., 0]
         return np.where(self.signs * found < 0.0, 0.0, found)
+
+
+Point = tuple[Form, tuple[float, ...]]
+"""A form, and the prior SDs of its shapes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Points whose columns are summed to strengths in the same way.
+
+    Attributes
+    ----------
+    numbers : (B,) which of all points. strengths : (k,) column of the effect's values of each.
+    signs : (k,) sides of off that bounds allow.
+    places : specimen, its columns (B, c), and (k, c) which of these each strength sums.
+    """
+
+    numbers: NDArray[np.int64]
+    strengths: tuple[int, ...]
+    signs: Array
+    places: tuple[tuple[str, NDArray[np.int64], Array], ...]
+
+    def summed(self, problem: Linearised) -> tuple[Array, Array]:
+        """Gram matrices (B, k, k) and moments (B, k, 1 + D) of the points' strengths."""
+        points, k = len(self.numbers), len(self.strengths)
+        shared, draws = problem.moments_shared.shape
+        gram, moments = np.zeros((points, k, k)), np.zeros((points, k, draws))
+        coupled = np.zeros((points, k, shared))
+        for specimen, columns, onto in self.places:
+            part = problem.of[specimen]
+            gram += onto @ part.gram[columns[:, :, None], columns[:, None, :]] @ onto.T
+            moments += onto @ part.moments[columns]
+            coupled += onto @ part.shared[columns]
+        return problem.without_shared(gram, moments, coupled)
 
 
 @dataclass(frozen=True)
@@ -114,6 +154,36 @@ class Index:
             places = self._at.setdefault((c.variant, c.sds), {})
             places.setdefault((c.test, c.joint, c.strength), []).append(number)
         self.columns = tuple(columns)
+        self._alike: dict[tuple[object, ...], tuple[Alike, ...]] = {}
+
+    def alike(
+        self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
+    ) -> tuple[Alike, ...]:
+        """Points in portions that are summed alike; known already where asked before."""
+        key = (tuple(points), tuple(specimens), tuple(tests))
+        if key not in self._alike:
+            self._alike[key] = tuple(self._portions(*key))
+        return self._alike[key]
+
+    def _portions(
+        self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
+    ) -> Iterator[Alike]:
+        found = [self.places(form, sds, specimens, tests) for form, sds in points]
+        members: dict[tuple[object, ...], list[int]] = {}
+        for number, (places, strengths) in enumerate(found):
+            signs = tuple(sides(points[number][0], strengths))
+            summed_by = tuple((specimen, tuple(of.tolist())) for specimen, _, of in places)
+            members.setdefault((strengths, signs, summed_by), []).append(number)
+        for some in members.values():
+            places, strengths = found[some[0]]
+            every = []
+            for place, (specimen, _, owners) in enumerate(places):
+                onto = np.zeros((len(strengths), len(owners)))
+                onto[owners, np.arange(len(owners))] = 1.0
+                columns = np.stack([found[number][0][place][1] for number in some])
+                every.append((specimen, columns, onto))
+            signs_of = sides(points[some[0]][0], strengths)
+            yield Alike(np.array(some), strengths, signs_of, tuple(every))
 
     def places(
         self, form: Form, sds: tuple[float, ...], specimens: Sequence[str], tests: Sequence[str]
@@ -213,25 +283,36 @@ def screened(
     tests: Sequence[str],
 ) -> Screened:
     """Evidence of one effect."""
-    totals, tried = [], []
+    points = [(form, sds) for form in trials.forms for sds in shape_grid(form.variant)]
+    logs = np.zeros((len(points), problem.moments_shared.shape[1]))
+    found: dict[int, Tried] = {}
+    share = {form: trials.log_share(form) for form in trials.forms}
+    for some in index.alike(points, specimens, tests):
+        gram, moments = some.summed(problem)
+        group = Group.of(gram, some.signs)
+        logs[some.numbers] = group.log_evidence(moments)
+        estimates = group.estimate(moments[..., 0])
+        explained = _explained(estimates, moments[..., 0], gram)
+        for row, number in enumerate(some.numbers.tolist()):
+            (form, sds), gain = points[number], float(explained[row])
+            log_evidence = float(logs[number, 0]) + share[form]
+            told = (form, sds, some.strengths, log_evidence)
+            found[number] = Tried(*told, estimates[row], gain)
+    totals, tried, end = [], [], 0
     for form in trials.forms:
-        grid = shape_grid(form.variant)
-        found = [summed(index, problem, form, sds, specimens, tests) for sds in grid]
-        logs = np.stack([one.group.log_evidence(one.moments) for one in found])
-        share = trials.log_share(form)
-        totals.append(log_sum(logs) - np.log(len(grid)) + share)
-        best = int(np.argmax(logs[:, 0]))
-        tried.append(_tried(found[best], float(logs[best, 0]) + share))
+        start, end = end, end + len(shape_grid(form.variant))
+        totals.append(log_sum(logs[start:end]) - np.log(end - start) + share[form])
+        tried.append(found[start + int(np.argmax(logs[start:end, 0]))])
     whole = log_sum(np.stack(totals))
     order = sorted(tried, key=lambda one: -one.log_evidence)
     return Screened(trials.effect, float(whole[0]), whole[1:], tuple(order))
 
 
-def _tried(one: Summed, log_evidence: float) -> Tried:
-    moments = one.moments[:, 0]
-    estimate = one.group.estimate(moments)
-    explained = float(2.0 * estimate @ moments - estimate @ one.gram @ estimate)
-    return Tried(one.form, one.sds, one.strengths, log_evidence, estimate, explained)
+def _explained(estimates: Array, moments: Array, gram: Array) -> Array:
+    """(B,) drop of chi2 with strengths (B, k) of moments (B, k) and Gram matrices (B, k, k)."""
+    left = 2.0 * moments - (gram @ estimates[..., None])[..., 0]
+    result: Array = np.sum(estimates * left, axis=-1)
+    return result
 
 
 def summed(
@@ -243,21 +324,9 @@ def summed(
     tests: Sequence[str],
 ) -> Summed:
     """A form's strengths at one shape."""
-    places, strengths = index.places(form, sds, specimens, tests)
-    count = len(strengths)
-    draws = problem.moments_shared.shape[1]
-    gram, moments = np.zeros((count, count)), np.zeros((count, draws))
-    coupled = np.zeros((count, len(problem.gram_shared)))
-    for specimen, columns, owners in places:
-        onto = np.zeros((count, len(columns)))
-        onto[owners, np.arange(len(columns))] = 1.0
-        part = problem.of[specimen]
-        gram += onto @ part.gram[np.ix_(columns, columns)] @ onto.T
-        moments += onto @ part.moments[columns]
-        coupled += onto @ part.shared[columns]
-    gram, moments = problem.without_shared(gram, moments, coupled)
-    group = Group.of(gram, sides(form, strengths))
-    return Summed(form, sds, strengths, gram, moments, group)
+    (alone,) = index.alike([(form, sds)], specimens, tests)
+    (gram,), (moments,) = alone.summed(problem)
+    return Summed(form, sds, alone.strengths, gram, moments, Group.of(gram, alone.signs))
 
 
 def sides(form: Form, strengths: Sequence[int]) -> Array:
