@@ -407,3 +407,21 @@ def test_a_shape_that_all_effects_together_leave_behind_takes_no_name() -> None:
 
 def test_a_shape_on_another_coordinate_takes_no_name() -> None:
     assert says(ended(stands(coordinate="right_bending"), neighbours=400.0))[0] != "UNKNOWN"
+
+
+@pytest.mark.parametrize(
+    ("margins", "tied"),
+    [
+        ((3.6,), ()),
+        ((3.5, 3.8), ("creep", "a", "b")),
+        ((3.6, 5.0), ()),
+        ((3.1, 3.9, 9.0), ("creep", "a", "b")),
+        ((2.9, 4.5), ("creep", "a")),
+    ],
+)
+def test_odds_are_against_all_rivals_together(
+    margins: Sequence[float], tied: tuple[str, ...]
+) -> None:
+    """exp(-3.5) + exp(-3.8) is more than exp(-3), exp(-3.6) + exp(-5) is not."""
+    rivals = list(zip("abc", margins, strict=False))
+    assert outcome(ended(stands(rivals=rivals)), MARGIN).tied == tied

@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
+from scipy.special import logsumexp
+
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError
@@ -318,9 +321,27 @@ def _close(
         for other in found.standing
         if other is one or here & set(other.supposed.form.variant.coordinates(read))
     }
-    near = [rival.name for rival in one.rivals if rival.margin < margin]
-    every = dict.fromkeys((*near, *not_excluded.get(one.name, ())))
-    return tuple(name for name in every if name not in beside)
+    others = [rival for rival in one.rivals if rival.name not in beside]
+    names = (*_near(others, margin), *not_excluded.get(one.name, ()))
+    return tuple(dict.fromkeys(name for name in names if name not in beside))
+
+
+def _near(rivals: Sequence[Rival], margin: float) -> list[str]:
+    """Names that are less than the margin behind, one by one or all together.
+
+    The odds of a name are against all others: several that are a little more than the margin behind
+    are together less; then those are told that are as near as the nearest.
+    """
+    behind = np.array([rival.margin for rival in rivals])
+    if not len(behind):
+        return []
+    together = -float(logsumexp(-behind))
+    reach = margin if together >= margin else max(margin, behind.min() + AS_NEAR)
+    return [rival.name for rival in rivals if rival.margin < reach]
+
+
+AS_NEAR = 1.0
+"""Log evidence within which one rival is as near as another."""
 
 
 def _listed(names: Sequence[str], word: str) -> str:
