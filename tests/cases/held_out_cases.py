@@ -115,7 +115,7 @@ def found(base: Grounds, zone: bool, spread: Spread = Spread.SHARED) -> Found:
     if zone:
         guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
-    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0, at={})
+    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", Spread.SHARED, 0.0, {}, at={})
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)
     at = gaps_at(base, base.fit), gaps_at(final, final.fit)
-    return Found(base, final, (), (), lack, 0.0, *gaps, *at, {})
+    return Found(base, final, (), (), lack, 0.0, *gaps, *at, {}, lack)
