@@ -373,7 +373,12 @@ def _confusions() -> Rows:
     names = list(EFFECTS)
     rng = np.random.default_rng(4)
     return [
-        {"effect": one, "other": other, "share": 1.0 if one == other else 0.9 * rng.random()}
+        {
+            "effect": one,
+            "other": other,
+            "share": 1.0 if one == other else 0.9 * rng.random(),
+            "gap_told_apart": None if one == other else 0.4,
+        }
         for one, other in product(names, names)
     ]
 

@@ -153,3 +153,12 @@ def test_what_is_looked_for() -> None:
         assert Spread.SHARED in effect.trial.spreads
     with pytest.raises(ValueError, match="neighbour 'beside' is not one of above, below"):
         create("soft_tissue_artefact", {"neighbour": "beside"})
+
+
+def test_nothing_that_moves_has_no_slope() -> None:
+    """A model of which nothing is free is solved as well, as a search does with fixed bases."""
+    model = replace(spine(3), effects=(*spine(3).effects, effect_of("skin from above")))
+    stack = Stack.of([model], [(0, loaded(model, steps=3))])
+    q = stack.solve().q
+    dq = poses_by(stack, q, [()])
+    assert readings_by(stack, q, dq, [()]).shape == (*q.shape, 0)

@@ -279,7 +279,7 @@ def _beside(stack: Stack, effect: Instrument, seen: Array, flat: Indices) -> Bes
 
 def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]:
     """Derivatives (K, 6, m) of the joints above and below, from those of all (L J, 6, m)."""
-    every = by_x.reshape(-1, stack.joints, *by_x.shape[1:])
+    every = by_x.reshape(len(by_x) // stack.joints, stack.joints, *by_x.shape[1:])
     above, below = np.zeros(every.shape), np.zeros(every.shape)
     above[:, :-1], below[:, 1:] = every[:, 1:], every[:, :-1]
     return above.reshape(by_x.shape)[flat], below.reshape(by_x.shape)[flat]

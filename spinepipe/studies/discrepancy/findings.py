@@ -64,7 +64,7 @@ def _nothing(verdict: Verdict) -> str:
     low, high = number(min(gaps), 2), number(max(gaps), 2)
     most = "" if low == high else f" (the easiest to see) to {high} (the hardest)"
     return (
-        "Nothing is missing above the noise. An effect would have been named from a gap of "
+        "Nothing is missing above the noise. An effect would have been found from a gap of "
         f"{low} noise SD{most}."
     )
 
@@ -180,15 +180,15 @@ def _noise(verdict: Verdict) -> str:
 
 
 def would_have_been_seen(verdict: Verdict) -> str:
-    """Of a search that named nothing: the gaps from which effects would have been named."""
+    """Of a search that named nothing: the gaps from which effects would have been found."""
     if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
         return ""
     ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
     told = [f"{general(one.name)} {number(one.gap, 2)}" for one in ordered]
     if len(told) <= _MOST_EASY + _MOST_HARD:
-        return f"Smallest gap, in noise SD, that would have been named: {', '.join(told)}."
+        return f"Smallest gap, in noise SD, that would have been found: {', '.join(told)}."
     return (
-        f"Smallest gap, in noise SD, that would have been named: {', '.join(told[:_MOST_EASY])} "
+        f"Smallest gap, in noise SD, that would have been found: {', '.join(told[:_MOST_EASY])} "
         f"are the easiest to see; {', '.join(told[-_MOST_HARD:])} the hardest. "
         "A table below has all."
     )

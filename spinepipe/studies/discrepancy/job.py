@@ -196,7 +196,8 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     """The results of an investigation, and what the tests could tell apart."""
     needed = ended.found.stages[0].screen.threshold + ended.rules.margin
     seed, trials = ended.rules.seed, ended.rules.trials
-    told = told_apart(ended.grounds, trials, needed, ready.declared, seed, run)
+    margin = ready.study.margin
+    told = told_apart(ended.grounds, trials, needed, margin, ready.declared, seed, run)
     ended = ended.as_told()
     imperfect = _imperfections(ready.cohort.joint_names, ended, run)
     stays = _beyond(ended, run)

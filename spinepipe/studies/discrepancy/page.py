@@ -101,7 +101,8 @@ _COLUMNS: Mapping[str, tuple[Column, ...]] = {
     ),
     "detectable": (
         _EFFECT,
-        Column("gap", "number", "smallest gap at which it would be named", "noise SD"),
+        Column("gap", "number", "smallest gap at which it would be found", "noise SD"),
+        Column("by_name", "text", "the same, told from every other effect", "noise SD"),
     ),
     "errors": (
         Column("where", "text", "readings in question"),
@@ -244,7 +245,11 @@ def _from_verdict(verdict: Verdict) -> dict[str, Records]:
             for one in verdict.not_testable
         ],
         "detectable": [
-            {"effect": general(one.name), "gap": one.gap}
+            {
+                "effect": general(one.name),
+                "gap": one.gap,
+                "by_name": "never" if one.by_name is None else f"{one.by_name:.2f}",
+            }
             for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
         ],
     }

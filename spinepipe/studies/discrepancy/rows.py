@@ -310,7 +310,12 @@ def design_rows(told: ToldApart) -> list[Row]:
 def confusion_rows(told: ToldApart) -> list[Row]:
     """One row per pair of effects."""
     return [
-        {"effect": one.effect, "other": one.other, "share": float(np.clip(one.share, 0.0, 1.0))}
+        {
+            "effect": one.effect,
+            "other": one.other,
+            "share": float(np.clip(one.share, 0.0, 1.0)),
+            "gap_told_apart": one.gap,
+        }
         for one in told.confusions
     ]
 

@@ -141,7 +141,7 @@ CANDIDATES = Table(
             low=0.0,
             high=1.0,
         ),
-        _of_noise("detectable_gap", "smallest gap at which it would be named", "not computed"),
+        _of_noise("detectable_gap", "smallest gap at which it would be found", "not computed"),
         Column("threshold", "number", "log evidence that it must exceed", null="not calibrated"),
         Column(
             "status",
@@ -188,6 +188,11 @@ CONFUSIONS = Table(
             "beyond base and nuisance; 1: they cannot be told apart",
             low=0.0,
             high=1.0,
+        ),
+        _of_noise(
+            "gap_told_apart",
+            "gap from which `effect` would lead by the margin, to first order",
+            "`other` explains all of it",
         ),
     ),
 )

@@ -177,10 +177,14 @@ class Gaps(Sizes):
 
 @dataclass(frozen=True)
 class SmallestDetectable:
-    """The smallest gap, noise SD, at which an effect would be found."""
+    """The smallest gap, noise SD, at which an effect would be found, in a set or by its own name.
+
+    ``by_name`` : from which no other effect is as good; None where one always is.
+    """
 
     name: str
     gap: float
+    by_name: float | None = None
 
 
 @dataclass(frozen=True)

@@ -140,7 +140,7 @@ def test_what_cannot_be_tested_stands_beside_what_can(tmp_path: Path) -> None:
 
 HEADLINES = {
     "NAMED": "The model lacks a neutral zone at L4L5, in flexion–extension.",
-    "NULL": "Nothing is missing above the noise. An effect would have been named from a gap of "
+    "NULL": "Nothing is missing above the noise. An effect would have been found from a gap of "
     "0.19 noise SD (the easiest to see) to 0.35 (the hardest).",
     "SET": "One of these is missing, and these tests cannot tell which: a neutral zone or "
     "nonlinear stiffening.",

@@ -73,12 +73,22 @@ def test_an_offset_explains_what_a_constant_does_of_an_absolute_value():
     tried = (ASYMMETRY, only("load_offset"))
     of = {"a": seen_in(grounds, "a", tried)}
     found = judgements(tried, of, 1, grounds.tests, NEEDED, 0)
-    pairs = confusions(Design(candidates(tried, 1, grounds.tests), of), found)
+    pairs = confusions(Design(candidates(tried, 1, grounds.tests), of), found, 3.0)
     share = {(one.effect, one.other): one.share for one in pairs}
     assert share["flexion_extension_asymmetry", "load_offset"] == pytest.approx(expected, abs=2e-3)
     about_z = (1.0 / STIFFNESS[3]) ** 2 / np.sum(1.0 / STIFFNESS[3:] ** 2)
     back = share["load_offset", "flexion_extension_asymmetry"]
     assert back == pytest.approx(expected * about_z, abs=0.02)
+    assert all(lead_of(one, freedom=3 * 6 - 1) == pytest.approx(3.0, abs=0.3) for one in pairs)
+
+
+def lead_of(one: Confusion, freedom: int) -> float:
+    """Log evidence by which an effect leads over the other in all but a tenth of draws."""
+    z = np.random.default_rng(5).standard_normal((100_000, 2))
+    assert one.gap is not None
+    d = z + np.array([one.gap * np.sqrt(freedom), 0.0])
+    other = np.array([np.sqrt(one.share), np.sqrt(1.0 - one.share)])
+    return float(np.quantile(0.5 * (d[:, 0] ** 2 - (d @ other) ** 2), 0.1))
 
 
 def test_families_explain_each_other_both_ways():
@@ -144,7 +154,7 @@ def test_unloading_tells_hysteresis_from_a_neutral_zone():
 
     def share(moments: tuple[float, ...]) -> float:
         grounds = grounds_of(2, moments, ("flexion",))
-        told = told_apart(grounds, tried_in(grounds, pair), NEEDED, None, 0, at_once)
+        told = told_apart(grounds, tried_in(grounds, pair), NEEDED, 3.0, None, 0, at_once)
         return next(c.share for c in told.confusions if (c.effect, c.other) == pair)
 
     assert share(up) > 0.85
@@ -162,11 +172,13 @@ def test_creep_takes_times():
 def test_what_is_told_apart_holds_every_effect_once():
     grounds = grounds_of(joints=2, tests=("flexion",))
     effects = ["facet_contact", "joint_centre_offset", "neutral_zone"]
-    told = told_apart(grounds, tried_in(grounds, effects), NEEDED, None, 0, at_once)
+    told = told_apart(grounds, tried_in(grounds, effects), NEEDED, 3.0, None, 0, at_once)
     hidden = {one.name for one in told.not_testable}
     assert hidden == {"joint_centre_offset"}
     assert {one.name for one in told.smallest_detectable} == set(effects) - hidden
-    assert all(one.gap > 0.0 for one in told.smallest_detectable)
+    for one in told.smallest_detectable:
+        assert one.by_name is not None
+        assert one.by_name >= one.gap > 0.0
     assert {(one.effect, one.other) for one in told.confusions} == {
         ("facet_contact", "neutral_zone"),
         ("neutral_zone", "facet_contact"),

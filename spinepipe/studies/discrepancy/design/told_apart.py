@@ -3,6 +3,9 @@
 Of what base and nuisances leave of a typical effect A, the share that another effect B explains:
 ``1 - min_x (|a - F x|^2 + |x|^2 / t^2) / |a|^2``, F the signatures of B, x its strengths with prior
 SD t. B has one variant and shape at a time, the best; its strengths may differ between joints.
+
+An effect that makes G of chi2 leads over B by G (1 - share) / 2 of log evidence or so, give or take
+the root of G (1 - share). From it follows the gap at which A has its own name.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,12 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
+from scipy.stats import norm
 
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
-from spinepipe.studies.discrepancy.design.testable import Judgement, Typical, judgements, summing
+from spinepipe.studies.discrepancy.design.testable import (
+    NO_TRACE,
+    OFTEN,
+    Detectable,
+    Judgement,
+    Typical,
+    judgements,
+    summing,
+)
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.screen import SIZES, Places
@@ -31,20 +43,34 @@ FREE = (Spread.SHARED, Spread.BY_JOINT)
 
 @dataclass(frozen=True)
 class Confusion:
-    """Share (0..1) of what ``effect`` would do that ``other`` can explain."""
+    """Share (0..1) of what ``effect`` would do that ``other`` can explain.
+
+    ``gap`` : noise SD from which the effect would lead by the margin in nine data sets of ten, to
+    first order and with B's shapes on a grid; None where the other explains all of it.
+    """
 
     effect: str
     other: str
     share: float
+    gap: float | None = None
 
 
 @dataclass(frozen=True)
 class _Target:
-    """A typical effect: what it makes in each specimen (M, d), and its squared size."""
+    """A typical effect: what it makes in each specimen (M, d), its squared size, and its gap."""
 
     effect: str
     made: Mapping[str, Array]
     size: float
+    gap: float
+
+    def told_from(self, share: float, margin: float) -> float | None:
+        """Gap from which it leads over an effect that explains a share of it."""
+        left = self.size * (1.0 - share)
+        if left <= NO_TRACE:
+            return None
+        often = float(norm.ppf(OFTEN))
+        return self.gap * (often + float(np.sqrt(often**2 + 2.0 * margin))) / float(np.sqrt(left))
 
 
 @dataclass(frozen=True)
@@ -63,18 +89,25 @@ class ToldApart:
 
     @property
     def smallest_detectable(self) -> tuple[SmallestDetectable, ...]:
-        """Of all effects that the tests can show."""
+        """Of all effects that the tests can show: found at all, and by their own name."""
         return tuple(
-            SmallestDetectable(one.effect, one.detectable.gap)
+            SmallestDetectable(one.effect, one.detectable.gap, self._by_name(one.detectable, one))
             for one in self.judgements
             if one.testable and one.detectable is not None
         )
+
+    def _by_name(self, found: Detectable, of: Judgement) -> float | None:
+        """Gap from which no other effect is as good; None where one always is."""
+        gaps = [pair.gap for pair in self.confusions if pair.effect == of.effect]
+        told = [gap for gap in gaps if gap is not None]
+        return max([found.gap, *told]) if len(told) == len(gaps) else None
 
 
 def told_apart(
     grounds: Grounds,
     trials: Sequence[Trials],
     needed: float,
+    margin: float,
     declared: Array | None,
     seed: int,
     run: Run,
@@ -84,30 +117,31 @@ def told_apart(
     Parameters
     ----------
     needed : log evidence that an effect must have: the screen's threshold and margin.
+    margin : log evidence over a rival.
     declared : (6,) m and rad, SD of a single reading, for coordinates that were not read; or None.
     """
     joints = next(iter(grounds.fit.models.values())).n_joints
     of = {name: run(seen_in, grounds, name, trials) for name in grounds.readings}
     design = Design(candidates(trials, joints, grounds.tests), of)
     found = judgements(trials, of, joints, grounds.tests, needed, seed)
-    pairs = confusions(design, found)
+    pairs = confusions(design, found, margin)
     missing = run(not_testable, bench(grounds, declared), trials, found, needed, seed)
     return ToldApart(found, pairs, families(pairs), missing)
 
 
-def confusions(design: Design, judged: Sequence[Judgement]) -> tuple[Confusion, ...]:
+def confusions(design: Design, judged: Sequence[Judgement], margin: float) -> tuple[Confusion, ...]:
     """All ordered pairs of different effects that the tests can show.
 
     Parameters
     ----------
-    judged : of all effects of the design, in their order.
+    judged : of all effects of the design, in their order. margin : log evidence over a rival.
     """
     shown = [number for number, one in enumerate(judged) if one.testable]
     if len(shown) < 2:
         return ()
     targets = {number: _target(design, number, judged[number].best) for number in shown}
     return tuple(
-        Confusion(target.effect, judged[other].effect, share)
+        Confusion(target.effect, judged[other].effect, share, target.told_from(share, margin))
         for other in shown
         for target, share in zip(
             (targets[number] for number in shown if number != other),
@@ -123,7 +157,8 @@ def _target(design: Design, number: int, one: Typical) -> _Target:
     for specimen, columns, owners in one.places:
         onto = summing(owners, len(one.mean))
         made[specimen] = design.of[specimen].left[:, start + columns] @ onto.T @ directions
-    return _Target(design.those.trials[number].effect, made, one.squared(one.left))
+    gap = float(np.sqrt(one.squared(one.refitted) / design.freedom))
+    return _Target(design.those.trials[number].effect, made, one.squared(one.left), gap)
 
 
 def _shares(design: Design, other: int, targets: Sequence[_Target]) -> list[float]:
