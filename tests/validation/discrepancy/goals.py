@@ -22,7 +22,9 @@ def goals(rows: Sequence[Judged]) -> Rows:
     return [
         *_false_alarms(rows),
         *_large(large),
+        *_own_name([row for row in large if row.has_own_name], "gap >= 0.5"),
         *_small(small),
+        *_own_name([row for row in small if row.has_own_name], "gap 0.2-0.5"),
         share("below the limit: wrong name", _wrong(below), Goal(high=0.02)),
         share("below the limit: truth named", (r.top1 for r in below)),
         *_pairs([row for row in rows if row.kind == "two" and row.above]),
@@ -81,6 +83,15 @@ def _named_alone(rows: Sequence[Judged]) -> Iterable[bool]:
 
 def _parts_of(rows: Sequence[Judged]) -> list[Judged]:
     return [row for row in rows if row.verdict == "PART"]
+
+
+def _own_name(rows: Sequence[Judged], gap: str) -> Rows:
+    """Where the tests, to first order, tell the effect from every other one."""
+    told = f"one effect, {gap}, told from all others by the tests"
+    return [
+        share(f"{told}: top-1, NAMED or PART", (r.top1 for r in rows)),
+        share(f"{told}: wrong name", _wrong(rows)),
+    ]
 
 
 def _small(small: Sequence[Judged]) -> Rows:

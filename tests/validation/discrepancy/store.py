@@ -79,7 +79,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def kept(targets: list[Target], place: Path) -> list[Row]:
-    """Rows of those targets that have one, in their order."""
+def kept(targets: list[Target], place: Path) -> list[tuple[Path, Row]]:
+    """Files and rows of those targets that have one, in their order."""
     files = [path_of(target, place) for target in targets]
-    return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.exists()]
+    return [(file, json.loads(file.read_text(encoding="utf-8"))) for file in files if file.exists()]

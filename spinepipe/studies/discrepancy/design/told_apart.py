@@ -2,7 +2,8 @@
 
 Of what base and nuisances leave of a typical effect A, the share that another effect B explains:
 ``1 - min_x (|a - F x|^2 + |x|^2 / t^2) / |a|^2``, F the signatures of B, x its strengths with prior
-SD t. B has one variant and shape at a time, the best; its strengths may differ between joints.
+SD t. B has one variant and shape at a time, the best; its strengths may differ between joints, or
+it is where A is alone.
 
 An effect that makes G of chi2 leads over B by G (1 - share) / 2 of log evidence or so, give or take
 the root of G (1 - share). From it follows the gap at which A has its own name.
@@ -59,10 +60,20 @@ class Confusion:
 class _Target:
     """A typical effect: what it makes in each specimen (M, d), its squared size, and its gap."""
 
-    effect: str
+    form: Form
     made: Mapping[str, Array]
     size: float
     gap: float
+
+    @property
+    def effect(self) -> str:
+        """Its name."""
+        return self.form.name
+
+    @property
+    def where(self) -> tuple[Spread, int | None, str | None]:
+        """How its values differ, and the one place where it is."""
+        return self.form.spread, self.form.joint, self.form.specimen
 
     def told_from(self, share: float, margin: float) -> float | None:
         """Gap from which it leads over an effect that explains a share of it."""
@@ -158,17 +169,20 @@ def _target(design: Design, number: int, one: Typical) -> _Target:
         onto = summing(owners, len(one.mean))
         made[specimen] = design.of[specimen].left[:, start + columns] @ onto.T @ directions
     gap = float(np.sqrt(one.squared(one.refitted) / design.freedom))
-    return _Target(design.those.trials[number].effect, made, one.squared(one.left), gap)
+    return _Target(one.form, made, one.squared(one.left), gap)
 
 
 def _shares(design: Design, other: int, targets: Sequence[_Target]) -> list[float]:
     """Share of each target that effect ``other`` explains at its best."""
     forms = design.those.trials[other].forms
-    free = [form for form in forms if form.spread in FREE]
     best = np.zeros(len(targets))
-    for form in free or forms:
-        for sds in shape_grid(form.variant):
-            best = np.maximum(best, _explained(design, other, form, sds, targets))
+    for form in forms:
+        place = form.spread, form.joint, form.specimen
+        usual = form.spread in FREE or not any(one.spread in FREE for one in forms)
+        at = [number for number, one in enumerate(targets) if usual or place == one.where]
+        for sds in shape_grid(form.variant) if at else ():
+            told = _explained(design, other, form, sds, [targets[number] for number in at])
+            best[at] = np.maximum(best[at], told)
     return [float(share) for share in np.clip(best, 0.0, 1.0)]
 
 
