@@ -425,3 +425,16 @@ def test_odds_are_against_all_rivals_together(
     """exp(-3.5) + exp(-3.8) is more than exp(-3), exp(-3.6) + exp(-5) is not."""
     rivals = list(zip("abc", margins, strict=False))
     assert outcome(ended(stands(rivals=rivals)), MARGIN).tied == tied
+
+
+def test_a_shape_that_a_load_over_the_own_motion_has_as_well_takes_no_name() -> None:
+    """Coordinates that move together are shapes of each other."""
+    found = ended(stands(), neighbours=400.0)
+    of_own = replace(
+        found.base_lack,
+        at={
+            name: replace(one, by_family=one.by_family | {"own": 398.0})
+            for name, one in found.base_lack.at.items()
+        },
+    )
+    assert says(replace(found, base_lack=of_own))[0] == "NAMED"

@@ -1,6 +1,5 @@
 """Rates, goals and tables of the scored search, from rows made by hand."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tests.validation.discrepancy import report, run, seeds, store, tables, tune
 from tests.validation.discrepancy.designs import DESIGNS, design_of
 from tests.validation.discrepancy.goals import goals
 from tests.validation.discrepancy.judged import formula_of, judged
+from tests.validation.discrepancy.own_name import gap_of_own_name
 from tests.validation.discrepancy.rates import Goal, median, percentile, share
 from tests.validation.discrepancy.row import scored
 from tests.validation.discrepancy.targets import COUNTS, DRAWN, NUMBER, Target, of_seeds, targets
@@ -313,8 +313,10 @@ def test_one_cohort_from_recipe_to_row(tmp_path: Path) -> None:
     recipe = Recipe(seed=3, n_specimens=2, hidden=(hidden,))
     target = Target("one", "flexion_extension_asymmetry", recipe)
     run.keep_one((target, store.path_of(target, tmp_path)))
-    kept = store.kept([target], tmp_path)
-    assert [one["status"] for one in kept] == ["scored"]
-    assert judged(kept[0]).top1
-    assert json.loads(store.path_of(target, tmp_path).read_text()) == kept[0]
+    ((path, row),) = store.kept([target], tmp_path)
+    assert path == store.path_of(target, tmp_path)
+    assert row["status"] == "scored"
+    assert judged(row).top1
+    told = gap_of_own_name(row)
+    assert 0.0 < told["gap"] < row["truth"]["gap"]
     run.run([target], tmp_path, 1)  # would start a worker if it were not kept

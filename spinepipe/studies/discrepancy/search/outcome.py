@@ -237,15 +237,18 @@ def _other_shape(found: Found, one: Standing, margin: float) -> _NoName | None:
     """Whether what the base lacks follows what no known effect follows.
 
     Beside the base alone, and to first order for all alike: where a load over what the neighbouring
-    joints or the other coordinates do, a drift or a shift, has more evidence than any effect of
-    that coordinate, and nearly as much as all that stand there together, these imitate it. An
-    effect of no coordinate must have more by itself.
+    joints or the other coordinates do, a drift or a shift, has more evidence than one over the
+    joint's own motion and than any effect of that coordinate, and nearly as much as all that stand
+    there together, these imitate it. An effect of no coordinate must have more by itself.
     """
     variant = one.supposed.form.variant
     for coordinate in variant.coordinates(tuple(found.base_at)):
-        shapes = {f: e for f, e in found.base_lack.at[coordinate].by_family.items() if f != OWN}
+        shapes = found.base_lack.at[coordinate].by_family
         family = max(shapes, key=lambda name: shapes[name])
-        rival = max(_best_of(found, coordinate), 0.0 if variant.acts_on else one.log_evidence)
+        if family == OWN:
+            continue
+        own, best = shapes.get(OWN, 0.0), _best_of(found, coordinate)
+        rival = max(own, best, 0.0 if variant.acts_on else one.log_evidence)
         if shapes[family] > max(rival + margin, NEARLY_ALL * _together(found, coordinate)):
             shape = FAMILIES[family].format(coordinate=coordinate.replace("_", " "))
             why = f"{one.name} would imitate what no known effect is: {shape}"
