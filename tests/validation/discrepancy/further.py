@@ -15,6 +15,7 @@ from spinepipe.studies.discrepancy.proof.folds import SPECIMEN, TEST
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.beyond import beyond
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
+from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
 from spinepipe.studies.discrepancy.search.investigation import Investigation
 from spinepipe.studies.discrepancy.store import at_once
@@ -86,7 +87,7 @@ def testable_told(found: Found, rules: Rules, names: Sequence[str]) -> Told:
     joints = next(iter(grounds.fit.models.values())).n_joints
     needed = found.stages[0].screen.threshold + rules.margin
     judged = judgements(mine, of, joints, grounds.tests, needed, rules.seed)
-    repeats = _repeats(found)
+    repeats = repeats_of(grounds)
     return {
         one.effect: {
             "testable": one.testable,
@@ -97,10 +98,9 @@ def testable_told(found: Found, rules: Rules, names: Sequence[str]) -> Told:
     }
 
 
-def _repeats(found: Found) -> float:
-    counts = [
-        test.count[test.count > 0] for one in found.base.readings.values() for test in one.tests
-    ]
+def repeats_of(grounds: Grounds) -> float:
+    """Cycles that a mean reading is of: its SD is smaller by the root of that."""
+    counts = [test.count[test.count > 0] for one in grounds.readings.values() for test in one.tests]
     return float(np.mean(np.concatenate(counts)))
 
 

@@ -15,11 +15,11 @@ from spinepipe import cohort as cohorts
 from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.design.told_apart import confusions
-from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.investigation import base_fitted, prepared
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import make, recipe_from
+from tests.validation.discrepancy.further import repeats_of
 from tests.validation.discrepancy.judged import judged
 from tests.validation.discrepancy.row import STUDY, Row
 from tests.validation.discrepancy.store import keep
@@ -67,9 +67,4 @@ def gap_of_own_name(row: Row) -> dict[str, Any]:
     if not pairs or len(gaps) < len(pairs):
         return {"gap": None, "nearest": [one.other for one in pairs if one.gap is None]}
     nearest = max(pairs, key=lambda one: one.gap or 0.0)
-    return {"gap": max(gaps) / np.sqrt(_repeats(grounds)), "nearest": [nearest.other]}
-
-
-def _repeats(grounds: Grounds) -> float:
-    counts = [test.count[test.count > 0] for one in grounds.readings.values() for test in one.tests]
-    return float(np.mean(np.concatenate(counts)))
+    return {"gap": max(gaps) / np.sqrt(repeats_of(grounds)), "nearest": [nearest.other]}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -226,7 +226,14 @@ class Inquiry:
         return self.run(look, grounds, rules.trials, *draws, threshold)
 
     def lack(self, grounds: Grounds) -> LackOfFit:
-        """The generic basis beside the grounds' fit."""
+        """The generic basis beside the grounds' fit; that of the base is asked for again."""
+        return self._base_lack if grounds is self.base else self._lack(grounds)
+
+    @cached_property
+    def _base_lack(self) -> LackOfFit:
+        return self._lack(self.base)
+
+    def _lack(self, grounds: Grounds) -> LackOfFit:
         rules = self.rules
         return self.run(lack_of_fit, grounds, rules.coordinates, rules.draws, rules.seed)
 

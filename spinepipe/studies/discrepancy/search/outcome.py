@@ -209,12 +209,8 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
     A prop, for which by itself nothing speaks, is never sure. What it props is not either, unless
     it explains nearly all by itself.
     """
-    read = tuple(found.base_at)
-
-    def at(other: Standing) -> set[str]:
-        return set(other.supposed.form.variant.coordinates(read))
-
-    beside = [other for other in found.standing if at(other) & at(one)]
+    here = _loaded(found, one)
+    beside = [other for other in found.standing if _loaded(found, other) & here]
     props = [other for other in beside if other.alone < ALONE * other.log_evidence]
     if not props or len(beside) < 2:  # two forms of one effect prop each other as well
         return None
@@ -265,9 +261,13 @@ def _best_of(found: Found, coordinate: str) -> float:
 
 def _together(found: Found, coordinate: str) -> float:
     """Log evidence of all effects that stand on a coordinate."""
-    read = tuple(found.base_at)
-    on_it = (o for o in found.standing if coordinate in o.supposed.form.variant.coordinates(read))
+    on_it = (one for one in found.standing if coordinate in _loaded(found, one))
     return sum(one.log_evidence for one in on_it)
+
+
+def _loaded(found: Found, one: Standing) -> set[str]:
+    """Coordinates that an effect loads, of those that were read."""
+    return set(one.supposed.form.variant.coordinates(tuple(found.base_at)))
 
 
 def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:
@@ -318,12 +318,9 @@ def _close(
 
     What stands beside it on the same coordinates is no rival; what stands on others alone is one.
     """
-    read = tuple(found.base_at)
-    here = set(one.supposed.form.variant.coordinates(read))
+    here = _loaded(found, one)
     beside = {
-        other.name
-        for other in found.standing
-        if other is one or here & set(other.supposed.form.variant.coordinates(read))
+        other.name for other in found.standing if other is one or here & _loaded(found, other)
     }
     others = [rival for rival in one.rivals if rival.name not in beside]
     names = (*_near(others, margin), *not_excluded.get(one.name, ()))
