@@ -115,7 +115,8 @@ def assert_sensitivities(system: System) -> None:
         expected = _slope_within(system, free, unknown, along)
         # poses are solved to 1e-13 rad; what is left is the difference's own error
         scale = np.abs(expected).max()
-        assert scale > 0.0
+        idle = declared(system.model, unknown).off is None and not found[..., column].any()
+        assert scale > 0.0 or idle  # a shape says nothing while the strengths are off
         np.testing.assert_allclose(found @ along, expected, rtol=0, atol=1e-6 * scale)
 
 

@@ -147,6 +147,12 @@ def through_centres(chain: Chain) -> Array:
     return np.vstack([2.0 * chain.origins[0] - chain.centres[0], chain.centres])
 
 
+def ahead(chain: Chain, by: float) -> Array:
+    """(1 + J, 3) m along the anterior axis of each body's joint, of ground the lowest's."""
+    axes = chain.rotations[:, :, 0]
+    return by * np.vstack([axes[:1], axes])
+
+
 CABLES = {"joints": through_joints, "centres": through_centres}
 
 
@@ -176,14 +182,15 @@ def with_cable(peer, chain: Chain, tension: float, guides: Array):
 
 @SEEDS
 @pytest.mark.parametrize("tension", [60.0, 300.0])
-@pytest.mark.parametrize("guides", CABLES)
+@pytest.mark.parametrize(("guides", "anterior"), [*((g, 0.0) for g in CABLES), ("joints", -0.01)])
 def test_a_follower_load_is_a_path_actuator(
-    opensim_peer, seed: int, tension: float, guides: str
+    opensim_peer, seed: int, tension: float, guides: str, anterior: float
 ) -> None:
     chain = random_chain(seed)
-    cable = with_cable(opensim_peer, chain, tension, CABLES[guides](chain))
+    points = CABLES[guides](chain) + ahead(chain, anterior)
+    cable = with_cable(opensim_peer, chain, tension, points)
     expected = opensim_peer.equilibrium_of(cable).reshape(-1, 6)
-    found = pose(chain, "follower_load", np.array([tension]), {"guides": guides})
+    found = pose(chain, "follower_load", np.array([tension, anterior]), {"guides": guides})
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
     shortened = found[:, 1] - bridge.pose(chain)[:, 1]
     assert np.all(shortened < 0.0)

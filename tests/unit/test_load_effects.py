@@ -29,8 +29,9 @@ TOP = 2
 EFFECTS = {
     "weight of each": ("segment_weight", {"where": "each"}, (1.3,)),
     "weight on top": ("segment_weight", {"where": "top"}, (2.0,)),
-    "follower load": ("follower_load", {}, (80.0,)),
-    "follower load beside": ("follower_load", {"guides": "centres"}, (80.0,)),
+    "follower load": ("follower_load", {}, (80.0, 0.0)),
+    "follower load beside": ("follower_load", {"guides": "centres"}, (80.0, 0.0)),
+    "follower load behind": ("follower_load", {"guides": "centres"}, (80.0, -0.008)),
     "misalignment": ("load_misalignment", {}, (0.06, -0.04)),
     "frame askew": ("load_misalignment", {"turns": "wrench"}, (0.06, -0.04, 0.05)),
     "forces askew": ("load_misalignment", {"turns": "forces"}, (0.06, -0.04, 0.05)),
@@ -97,7 +98,7 @@ def test_all_load_effects_at_once() -> None:
 @pytest.mark.parametrize("name", EFFECTS)
 def test_off_leaves_the_motion_alone(name: str) -> None:
     effect = effect_of(name).effect
-    assert {p.off for p in effect.parameters} == {0.0}
+    assert {p.off for p in effect.parameters} <= {0.0, None}
     plain, found = (reported(system_with(*e)) for e in ((), (effect_of(name, on=False),)))
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-13)
 
@@ -153,14 +154,18 @@ def cable_lengths(model: SpineModel, q: Array, name: str) -> Array:
     motion = motion_of(model, q)
     origins, top = [frame.origin for frame in model.frames], model.frames[TOP]
     ground, *carried = [*origins, origins[2] + 0.03 * top.rotation[:, 1]]
-    if name == "follower load beside":
+    if name != "follower load":
         carried = [body.com for body in model.bodies]
         ground = origins[0] - (carried[0] - origins[0])
+    if name == "follower load behind":
+        back = [-0.008 * frame.rotation[:, 0] for frame in model.frames]
+        ground = ground + back[0]
+        carried = [point + beside for point, beside in zip(carried, back, strict=True)]
     guides = [ground, *(motion.displacement(b).apply(point) for b, point in enumerate(carried))]
     return np.linalg.norm(np.diff(guides, axis=0), axis=1)
 
 
-@pytest.mark.parametrize("name", ["follower load", "follower load beside"])
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name.startswith("follower")])
 @pytest.mark.parametrize("joints", [(0, 1, 2), (0,), (1, 2)])
 def test_follower_load_does_the_work_of_a_cable(joints: tuple[int, ...], name: str) -> None:
     """80 N times what each coordinate shortens the cable by."""

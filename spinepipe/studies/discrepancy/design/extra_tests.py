@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.effects import create
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, RefusedModel, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, RefusedModel
 from spinepipe.studies.discrepancy.design.plans import (
     HELD_S,
     STEP_S,
@@ -30,6 +29,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     summed_loads,
     thinned,
     times,
+    with_preloads,
 )
 from spinepipe.studies.discrepancy.design.seen import Seen, candidates, seen
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
@@ -49,8 +49,6 @@ PRELOAD_N = 400.0
 
 TRANSLATION_SD = 1e-4
 """m, of translations in tests where none were read and none is declared."""
-
-PRELOAD = "follower_load"
 
 NONE_SHOWS_IT = "no single addition that was tried shows it"
 """Said instead of advice: what an effect takes in general these tests may have already."""
@@ -148,7 +146,7 @@ def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequen
     NoEquilibrium
         When a load step has no stable pose.
     """
-    model = _with_preload(place.grounds.fit.models[place.specimen], plan)
+    model = with_preloads(place.grounds.fit.models[place.specimen], plan.tests)
     repeats = plan.repeats()
     read = np.any([one.count.any(axis=0) for one in plan.tests], axis=0)
     names = [name for name, there in zip(COORDINATES, read, strict=True) if there]
@@ -157,17 +155,6 @@ def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequen
     white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, names))
     free = base_parameters(model, plan.grouping, names)
     return seen(solved, free, plain, white, candidates(trials, model.n_joints, tests))
-
-
-def _with_preload(model: SpineModel, plan: Plan) -> SpineModel:
-    """The model with the plan's follower loads, which are known and not fitted."""
-    joints = tuple(range(model.n_joints))
-    added = [
-        ScopedEffect(create(PRELOAD), joints, np.array([[one.preload]]), (one.case.test,))
-        for one in plan.tests
-        if one.preload > 0.0
-    ]
-    return model.with_effects((*model.effects, *added))
 
 
 def _noise(place: Bench, plan: Plan, read: Array) -> Noise:

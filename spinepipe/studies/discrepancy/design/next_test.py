@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.effects import create
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadCase, RefusedModel, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.studies.discrepancy.design.expected import Key, Rows, Sums, key_of, noncentrality
-from spinepipe.studies.discrepancy.design.extra_tests import PRELOAD, Bench
+from spinepipe.studies.discrepancy.design.extra_tests import Bench
 from spinepipe.studies.discrepancy.design.patterns import Fitted, Pattern
-from spinepipe.studies.discrepancy.design.plans import Plan, Planned, as_made, thinned
+from spinepipe.studies.discrepancy.design.plans import Plan, as_made, thinned, with_preloads
 from spinepipe.studies.discrepancy.design.runs import Run, runs
 from spinepipe.studies.discrepancy.search.base import (
     PER_SPECIMEN,
@@ -179,9 +178,10 @@ def _solved(pattern: Pattern, place: Bench, name: str, group: Sequence[Run]) -> 
     """Readings of runs with one preload that read the same coordinates."""
     fit, free = pattern.fit, pattern.fit.hypothesis.members[name].free
     cases, first = [run.test.case for run in group], group[0].test
-    model = with_preload(fit.models[name], first)
+    tests = [run.test for run in group]
+    model = with_preloads(fit.models[name], tests)
     by_x = Simulated(model, cases, False, free).at(np.zeros(len(free))).by_x
-    apart = pattern.under(name, lambda one: with_preload(one, first), cases)
+    apart = pattern.under(name, lambda one: with_preloads(one, tests), cases)
     seen_at = np.asarray(first.count.any(axis=0)).tolist()
     read = [n for n, there in zip(COORDINATES, seen_at, strict=True) if there]
     keys, moved = _nuisances(pattern, name, model, cases, read)
@@ -300,12 +300,3 @@ def _menu(place: Bench, name: str) -> list[Run]:
     g = place.grounds
     plan = as_made(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
     return runs(thinned(plan, MOST_STEPS).tests, g.noise.zeroed)
-
-
-def with_preload(model: SpineModel, test: Planned) -> SpineModel:
-    """The model under a run's follower load, which is known and not fitted."""
-    if not test.preload:
-        return model
-    joints = tuple(range(model.n_joints))
-    load = ScopedEffect(create(PRELOAD), joints, np.array([[test.preload]]))
-    return model.with_effects((*model.effects, load))
