@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics import FreeParameter
@@ -32,7 +34,7 @@ class Grounds:
 
     Attributes
     ----------
-    plain : whitening without nuisances. setting : with them, linearised at the first base fit.
+    plain : whitening without nuisances. setting : with them, linearised at the base fit before.
     fit : the base, and effects named so far, in that setting.
     """
 
@@ -63,6 +65,12 @@ class Grounds:
         return replace(self, fit=fit, start=replace(self.start, models=models))
 
 
+ARRIVED = 0.1
+"""Of the logarithm of stiffness: nuisances taken so near to the base need not be taken again."""
+
+MOST_NUISANCES = 5
+"""Times that they are taken."""
+
 MOST_BASE_FITS = 5
 """Fits in a row, each from where the last one ended, until the base has arrived."""
 
@@ -78,7 +86,10 @@ def laid(
     start: Start,
     run: Run,
 ) -> Grounds:
-    """Fit the base, first with noise alone, then with nuisances where they then stand.
+    """Fit the base, first with noise alone, then with nuisances where the last fit stands.
+
+    Nuisances move a spine as soft as the base says it is, and the base says so with nuisances
+    allowed for: fits go on until one has the base where its nuisances were taken.
 
     Where cycles of a test differ in their loads, the noise is what their residuals differ by.
 
@@ -95,15 +106,22 @@ def laid(
     if noise.source != REPEATS:
         by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
         plain = _plain(by_name, noise)
-    whitenings = {
-        name: with_nuisances(plain[name], _nuisances(first.models[name], one, noise.zeroed, priors))
-        for name, one in by_name.items()
-    }
-    setting = Setting(by_name, whitenings, noise.zeroed)
-    again = hypothesis(first.models, start.base, (), tests, start.bound)
-    second = _base_fit(again, setting, run)
-    start = replace(start, models=second.models)
-    return Grounds(by_name, noise, priors, start, tests, plain, setting, second)
+    fit = first
+    for _ in range(MOST_NUISANCES):
+        before = fit
+        whitenings = {
+            name: with_nuisances(
+                plain[name], _nuisances(before.models[name], one, noise.zeroed, priors)
+            )
+            for name, one in by_name.items()
+        }
+        setting = Setting(by_name, whitenings, noise.zeroed)
+        again = hypothesis(before.models, start.base, (), tests, start.bound)
+        fit = _base_fit(again, setting, run)
+        if np.abs(fit.x).max(initial=0.0) < ARRIVED:
+            break
+    start = replace(start, models=fit.models)
+    return Grounds(by_name, noise, priors, start, tests, plain, setting, fit)
 
 
 def _nuisances(
