@@ -1,6 +1,6 @@
 """The verdict, from what a search found: names, sets, what stays, and where."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ def verdict_found(
         why=ended.why,
         effects=tuple(_missing(found, one, cohort, numbers) for one in ended.named),
         candidates_in_set=ended.tied,
-        candidates=tuple(_candidates(found, ended)),
+        candidates=near_alone(_in_set(found, ended), ready.study.margin),
         not_testable=told.not_testable,
         noise=noise_told(found.base.noise),
         rms_residual=Sizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
@@ -86,24 +86,31 @@ def verdict_found(
     )
 
 
-def _candidates(found: Found, ended: Outcome) -> Iterator[Candidate]:
-    """Names of the set: what stands there, then its rivals, by how far they are behind."""
-    told: set[tuple[str, tuple[str, ...]]] = set()
+def near_alone(candidates: Iterable[Candidate], margin: float) -> tuple[Candidate, ...]:
+    """Each name once per place, where it is near: within the margin, else where it is nearest."""
+    every = tuple(dict.fromkeys(candidates))
+    nearest: dict[str, float] = {}
+    for one in every:
+        if one.behind is not None:
+            nearest[one.name] = min(one.behind, nearest.get(one.name, one.behind))
+    return tuple(
+        one for one in every if one.behind is None or one.behind <= max(margin, nearest[one.name])
+    )
+
+
+def _in_set(found: Found, ended: Outcome) -> Iterator[Candidate]:
+    """Names of the set: what stands there, then its rivals, wherever they are."""
     for one in found.standing:
         if one.name not in ended.tied or any(one is named for named in ended.named):
             continue
         own = one.supposed.form.variant.acts_on or EVERY
         near = {rival.name: rival for rival in one.rivals}
-        every = [Candidate(one.name, own, 0.0)]
+        yield Candidate(one.name, own, 0.0)
         for name in ended.tied:
             if name in near:
-                every.append(Candidate(name, near[name].on or EVERY, near[name].margin))
+                yield Candidate(name, near[name].on or EVERY, near[name].margin)
             elif name != one.name:
-                every.append(Candidate(name, own, None))
-        for candidate in every:
-            if (place := (candidate.name, candidate.coordinates)) not in told:
-                told.add(place)
-                yield candidate
+                yield Candidate(name, own, None)
 
 
 def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]) -> Missing:

@@ -16,7 +16,8 @@ from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Vari
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Stage, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
-from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Answer, Candidate, SuspectedError
+from spinepipe.studies.discrepancy.verdict_found import near_alone
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 MARGIN = 3.0
@@ -438,3 +439,14 @@ def test_a_shape_that_a_load_over_the_own_motion_has_as_well_takes_no_name() -> 
         },
     )
     assert says(replace(found, base_lack=of_own))[0] == "NAMED"
+
+
+def test_a_set_is_told_where_its_names_are_near() -> None:
+    """Contact stands; stiffening is near in flexion and far in shear, creep is far wherever."""
+    stands = Candidate("facet_contact", ("extension",), 0.0)
+    near = Candidate("nonlinear_stiffening", ("extension",), 1.0)
+    far = Candidate("nonlinear_stiffening", ("anterior",), 7.9)
+    least, most = Candidate("creep", ("extension",), 4.0), Candidate("creep", ("anterior",), 9.0)
+    untold = Candidate("hysteresis", ("extension",), None)
+    told = near_alone([stands, near, far, near, most, least, untold], margin=3.0)
+    assert told == (stands, near, least, untold)
