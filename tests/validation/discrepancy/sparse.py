@@ -2,16 +2,16 @@
 
 Cohorts of springs, of the generator that shares no mechanics with the library. All see the same
 problem, readings whitened, base and nuisances taken out; columns are the terms of joint laws at
-each joint and at all. Others are of scikit-learn, and of pysindy where it is installed.
+each joint and at all. Others are of scikit-learn and pysindy.
 """
 
 from collections.abc import Callable, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
+from pysindy.optimizers import STLSQ
 from scipy.stats import binomtest
 from sklearn.linear_model import LassoCV, LassoLarsIC, OrthogonalMatchingPursuitCV
 
@@ -55,21 +55,16 @@ def _matching_pursuit(columns: Array, y: Array) -> Array:
 
 def _sindy(columns: Array, y: Array) -> Array:
     """Sequentially thresholded least squares of pysindy; columns have length 1, so SDs are 1."""
-    from pysindy.optimizers import STLSQ
-
     model = STLSQ(threshold=STLSQ_SDS, alpha=1.0, unbias=False)
     return np.asarray(model.fit(columns, y[:, None]).coef_).ravel()
 
 
-def _others() -> dict[str, Callable[[Array, Array], Array]]:
-    found = {
-        "lasso, cross-validated (scikit-learn)": _lasso,
-        "lasso, BIC (scikit-learn)": _lasso_bic,
-        "matching pursuit, cross-validated (scikit-learn)": _matching_pursuit,
-    }
-    if find_spec("pysindy"):
-        found["STLSQ (pysindy)"] = _sindy
-    return found
+OTHERS: dict[str, Callable[[Array, Array], Array]] = {
+    "lasso, cross-validated (scikit-learn)": _lasso,
+    "lasso, BIC (scikit-learn)": _lasso_bic,
+    "matching pursuit, cross-validated (scikit-learn)": _matching_pursuit,
+    "STLSQ (pysindy)": _sindy,
+}
 
 
 def grounds_of(seed: int, hidden: str) -> Grounds:
@@ -95,7 +90,7 @@ def counted(grounds: Grounds) -> Mapping[str, tuple[int, str]]:
     columns = columns - problem.shared @ (problem.shared.T @ columns)
     sizes = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(sizes > 1e-6 * sizes.max())
-    for name, regression in _others().items():
+    for name, regression in OTHERS.items():
         taken = regression(columns[:, there] / sizes[there], problem.errors[:, 0])
         law = problem.terms[every[there[int(np.argmax(np.abs(taken)))]].term]
         words = f"{law.coordinate}: {law.words}" if taken.any() else ""
