@@ -10,11 +10,25 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 VertebraName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9]*$")]
+
+
+def _all_or_some(value: object) -> object:
+    if isinstance(value, bool) or (
+        isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
+    ):
+        return value
+    raise ValueError("true, false, or a list of tests")
+
+
+Zeroed = Annotated[
+    bool | Annotated[tuple[str, ...], Field(strict=False)], BeforeValidator(_all_or_some)
+]
+"""Of all tests or of none, or the names of those of which it is true."""
 
 
 class MeasurementSd(BaseModel):
@@ -53,8 +67,10 @@ class CohortHeader(BaseModel):
         description="names from caudal to cranial, the first is fixed to ground",
     )
     gravity: bool = Field(description="true: 9.81 m/s2 along -y acts; false: no weight")
-    zeroed_at_step_0: bool = Field(
-        default=False, description="true: the step-0 coordinates were subtracted in every cycle"
+    zeroed_at_step_0: Zeroed = Field(
+        default=False,
+        description="true: the step-0 coordinates were subtracted in every cycle; a list: in those "
+        "of the tests that it names",
     )
     measurement_sd: MeasurementSd | None = Field(
         default=None, description="standard deviations of one reading, may be left out"
@@ -79,7 +95,8 @@ class Cohort:
     folder : where it was read.
     vertebrae : caudal to cranial; the first is fixed to ground.
     gravity : whether 9.81 m/s2 acts along -y.
-    zeroed_at_step_0 : whether step-0 coordinates were subtracted in every cycle.
+    zeroed_at_step_0 : whether step-0 coordinates were subtracted in every cycle; where the files
+        say so of some tests alone, of the others as they were read.
     measurement_sd : SD of one reading, if known.
     specimens : one row each; undeclared columns follow as text, as written.
     landmarks, joints, bodies : geometry and masses in ground, neutral pose.

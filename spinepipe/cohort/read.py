@@ -22,6 +22,7 @@ from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
 from spinepipe.cohort.draft import Draft, applied_loads
 from spinepipe.cohort.text import Document, read_yaml, validate
+from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.problems import InputError, Problem
 
 __all__ = ["read"]
@@ -58,6 +59,7 @@ def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
     )
     problems += _checks(draft)
     problems += check_supports(draft, document)
+    problems += check_zeroing(draft, document)
     if problems or header is None:
         raise InputError(problems)
     return _cohort(folder, header, tables, forms)
@@ -115,6 +117,7 @@ def _cohort(
     forms: Mapping[str, TableForm],
 ) -> Cohort:
     final = {stem: _final(table) for stem, table in tables.items() if stem in TABLES}
+    motion, zeroed = zeroed_alike(_numbered(final.get("motion")), header.zeroed_at_step_0)
     return Cohort(
         name=header.cohort,
         title=header.title,
@@ -122,14 +125,14 @@ def _cohort(
         folder=folder,
         vertebrae=header.vertebrae,
         gravity=header.gravity,
-        zeroed_at_step_0=header.zeroed_at_step_0,
+        zeroed_at_step_0=zeroed,
         measurement_sd=header.measurement_sd,
         specimens=final["specimens"],
         landmarks=final.get("landmarks"),
         joints=final.get("joints"),
         bodies=final.get("bodies"),
         loads=final.get("loads"),
-        motion=_numbered(final.get("motion")),
+        motion=motion,
         supports=final.get("supports"),
         preload=final.get("preload"),
         digest=_digest(folder, forms),

@@ -1,0 +1,70 @@
+"""Zeroing by test: some rigs start each test at zero, others count from one pose all along.
+
+All that is done with a cohort asks one question of it: were readings zeroed at step 0? Where tests
+differ, those that keep their step-0 reading are zeroed as they are read. Motion from step 0 on is
+told alike then; how far the spine had moved before step 0 is no longer asked of any test.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.text import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.units import COORDINATE_COLUMNS
+
+KEY = "zeroed_at_step_0"
+_PLACE = ["specimen", "test", "cycle", "joint"]
+
+
+def check_zeroing(draft: Draft, document: Document | None) -> Iterator[Problem]:
+    """Tests that are named but unknown, and those that cannot be zeroed beside the named ones."""
+    named = document.data.get(KEY) if document else None
+    motion = draft.tables.get("motion")
+    if document is None or not isinstance(named, list) or motion is None:
+        return
+    known = sorted(motion["test"].dropna().unique())
+    for name in named:
+        if isinstance(name, str) and name not in known:
+            place = (document.file, document.line_of(KEY), KEY)
+            remedy = did_you_mean(name, known, "correct it")
+            yield Problem(*place, f"'{name}'", f"a test of motion.csv: {one_of(known)}", remedy)
+    if not {*named} & {*known}:
+        return
+    for line, column in _without_start(motion, named):
+        found = "a reading, but none at step 0 of its cycle"
+        allowed = f"one at step 0 in each test that {KEY} does not name, as it names some"
+        remedy = f"add it, or name the test in {KEY} if its readings count from step 0"
+        yield Problem(draft.file("motion"), line, column, found, allowed, remedy)
+
+
+def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """First line and column of what has readings but none at step 0, per cycle and joint."""
+    kept = motion[~motion["test"].isin(named)]
+    for _, rows in kept.groupby(_PLACE, dropna=False, sort=False):
+        for column in COORDINATE_COLUMNS:
+            read = rows[rows[column].notna()]
+            if len(read) and not (read["step"] == 0).any():
+                yield int(read.index[0]), column
+                break
+
+
+def zeroed_alike(
+    motion: pd.DataFrame | None, zeroed: bool | Sequence[str]
+) -> tuple[pd.DataFrame | None, bool]:
+    """Motion whose tests are all zeroed or none, and which.
+
+    Parameters
+    ----------
+    motion : rows of the format, cycles numbered. zeroed : all tests or none, or the names of some.
+    """
+    if motion is None or isinstance(zeroed, bool):
+        return motion, zeroed is True or (not isinstance(zeroed, bool) and bool(zeroed))
+    kept = ~motion["test"].isin(zeroed)
+    if kept.all():
+        return motion, False
+    values = motion[list(COORDINATE_COLUMNS)]
+    at_start = values.where(motion["step"] == 0)
+    start = at_start.groupby([motion[name] for name in _PLACE]).transform("first")
+    return motion.assign(**(values - start.where(kept, 0.0))), True
