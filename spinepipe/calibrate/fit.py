@@ -15,6 +15,7 @@ from scipy.stats import qmc
 from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.profile import Profile, profile
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
@@ -88,6 +89,7 @@ class Fit:
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
     cases : the measured cases with the load steps that were needed. poses : (T, n) of each,
         nothing where there is no usable pose.
+    profile : region of each unknown, if asked for and if there is an optimum.
     """
 
     x: Array
@@ -103,6 +105,7 @@ class Fit:
     stiffened: int
     cases: tuple[MeasuredCase, ...]
     poses: tuple[Array, ...]
+    profile: Profile | None = None
 
 
 def fit(
@@ -111,6 +114,7 @@ def fit(
     seed: int = 0,
     identifiable_below: float = 1.0,
     noise: Array | None = None,
+    profiled: bool = False,
 ) -> Fit:
     """Fit a problem from the model's own values and ``starts - 1`` further points.
 
@@ -119,6 +123,7 @@ def fit(
     identifiable_below : largest standard error of an unknown at which it still counts as
         identified: of its logarithm where it is logarithmic, else in prior SDs.
     noise : (6,) m and rad, SD of one reading (before zeroing); None takes it from the residuals.
+    profiled : whether each unknown's region is looked for, a few more fits per unknown.
 
     Raises
     ------
@@ -134,6 +139,9 @@ def fit(
     optima = _on_record(evaluator, in_lockstep(descents, evaluator.together))
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
+    region = None
+    if profiled and best.status.usable:
+        region = profile(evaluator, best.x, best.evaluation, best.at_bound, noise)
     return Fit(
         x=best.x,
         values=values(problem, best.x),
@@ -148,6 +156,7 @@ def fit(
         stiffened=best.stiffened,
         cases=evaluator.problem.cases,
         poses=best.evaluation.poses if best.status.usable else (),
+        profile=region,
     )
 
 

@@ -13,7 +13,7 @@ from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
+from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, region_columns
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
 
@@ -41,7 +41,7 @@ def _rows(
         problem = calibration_problem(root, settings, specimen, frames)
         seed = specimen_seed(settings.seed, f"{specimen}/{pose}")
         options = settings.calibration
-        found = fit(problem, options.starts, seed, options.identifiable_below)
+        found = fit(problem, options.starts, seed, options.identifiable_below, profiled=True)
     except RefusedModel as error:
         return [_refused(specimen, pose, str(error))]
     return _fitted(settings, specimen, pose, problem, found)
@@ -90,19 +90,35 @@ def _message(found: Fit) -> str:
 def _stiffness(
     problem: Problem, found: Fit, model: SpineModel, joint: int, solved: bool
 ) -> dict[str, Any]:
-    """Stiffness, standard error and identifiability of one joint."""
+    """Stiffness, its error and its region, of one joint."""
     row: dict[str, Any] = {}
     values = model.effects[0].values[joint]
     for column, (name, stiffness) in enumerate(zip(COORDINATES, STIFFNESS_COLUMNS, strict=True)):
-        suffix = stiffness.removeprefix(f"{name}_")
         row[stiffness] = values[column] if solved else None
-        row[f"{name}_se_{suffix}"], row[f"{name}_identifiable"] = None, None
+        row |= dict.fromkeys(region_columns(name))
         for index, unknown in enumerate(problem.free):
-            if unknown.column == column and joint in unknown.rows:
-                error = values[column] * found.uncertainty.standard_error[index]
-                row[f"{name}_se_{suffix}"] = error if np.isfinite(error) and solved else None
-                row[f"{name}_identifiable"] = bool(found.uncertainty.identifiable[index]) and solved
+            if unknown.column == column and joint in unknown.rows and solved:
+                row |= _region(name, values[column], found, index)
     return row
+
+
+def _region(name: str, value: float, found: Fit, index: int) -> dict[str, Any]:
+    """What is known of one free stiffness: its standard error and how far it may be from there."""
+    region = found.profile
+    assert region is not None  # of every fit that has a stiffness
+    error = value * found.uncertainty.standard_error[index]
+    low, high = value * np.exp([region.low[index], region.high[index]] - found.x[index])
+    below, above = bool(region.open_below[index]), bool(region.open_above[index])
+    steep = bool(found.uncertainty.identifiable[index])
+    cells = (
+        error if np.isfinite(error) else None,
+        None if below else low,
+        None if above else high,
+        below,
+        above,
+        steep and not below and not above,
+    )
+    return dict(zip(region_columns(name), cells, strict=True))
 
 
 def _errors(found: Fit) -> dict[str, Any]:

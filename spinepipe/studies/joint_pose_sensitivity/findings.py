@@ -7,15 +7,14 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.report.page.document import Results, judged
-from spinepipe.report.panels import EVERY_JOINT
-from spinepipe.report.words import AXIS, count, fixed, number, percent, tick
-from spinepipe.status import USABLE
+from spinepipe.report.words import count, fixed, number, percent, tick
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
 from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
     WHOSE,
     required_words,
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
+from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 FEWEST_FOR_SPREAD = 3
@@ -33,7 +32,7 @@ def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
     """The sentences, without those that the study has no table for."""
     told = (
         _fits(study, results),
-        _stiffness(study, results),
+        stiffness(study, results),
         settling(study),
         _dominant(results),
         _precision(study, results),
@@ -71,99 +70,6 @@ def _fits(study: JointPoseSensitivity, results: Results) -> str:
     share = percent(sums["reduced"], sums["fits"])
     kept = f"{count(sums['reduced'], 'fit')} of {sums['fits']} ({share})"
     return f"{kept} are in the reduced dataset: {sums['solved']} ended with a stiffness, {lost}."
-
-
-def _stiffness(study: JointPoseSensitivity, results: Results) -> str:
-    """Median stiffness, with a warning where the data do not hold it."""
-    rows = results.table("summary")
-    if rows.empty:
-        return ""
-    chosen = rows[
-        (rows["part"] == "poses")
-        & (rows["dataset"] == "reduced")
-        & (rows["quantity"] == "stiffness")
-        & rows["coordinate"].isin(study.calibration.free)
-    ].dropna(subset=["median"])
-    solved = _reduced(results)
-    parts = [
-        _medians(part) + _doubt(solved, str(name))
-        for name, part in chosen.groupby("coordinate", sort=False)
-    ]
-    if not parts:
-        return ""
-    told = f"Median stiffness over the reduced poses: {'; '.join(parts)}."
-    return " ".join(words for words in (told, _exact(solved)) if words)
-
-
-def _reduced(results: Results) -> pd.DataFrame:
-    """Solved fits of the reduced poses."""
-    fitted, success = results.table("calibrations"), results.table("success")
-    if fitted.empty:
-        return fitted
-    solved = fitted[fitted["status"].isin(USABLE)]
-    if success.empty:
-        return solved
-    kept = success.loc[success["reduced"], ["specimen", "pose"]]
-    return solved.merge(kept, on=["specimen", "pose"])
-
-
-def _medians(part: pd.DataFrame) -> str:
-    """Median and IQR, or the lowest and highest median of several specimens or joints."""
-    first = part.iloc[0]
-    title = AXIS[first["coordinate"]].lower()
-    if len(part) == 1:
-        iqr = f"{number(first['low_quartile'])} to {number(first['high_quartile'])}"
-        return f"{title} {number(first['median'])} {first['unit']} (IQR {iqr})"
-    ordered = part.sort_values("median", kind="stable")
-    low, high = ordered.iloc[0], ordered.iloc[-1]
-    if number(low["median"]) == number(high["median"]):
-        return f"{title} {number(low['median'])} {first['unit']} in all {_all(part)}"
-    names = [_place(row, part) for row in (low, high)]
-    return (
-        f"{title} {number(low['median'])} ({names[0]}) to {number(high['median'])} {first['unit']} "
-        f"({names[1]}), medians of {_all(part)}"
-    )
-
-
-def _all(part: pd.DataFrame) -> str:
-    """``2 specimens``, ``3 joints`` or ``6 joints of 2 specimens``."""
-    specimens = count(part["specimen"].nunique(), "specimen")
-    if (part["joint"] == EVERY_JOINT).all():
-        return specimens
-    joints = count(len(part), "joint")
-    return joints if part["specimen"].nunique() == 1 else f"{joints} of {specimens}"
-
-
-def _place(row: pd.Series, part: pd.DataFrame) -> str:
-    words = [row["specimen"]] if part["specimen"].nunique() > 1 else []
-    words += [row["joint"]] if row["joint"] != EVERY_JOINT else []
-    return " ".join(words)
-
-
-def _doubt(solved: pd.DataFrame, name: str) -> str:
-    """The share of fitted values that the data do not hold, where there are any."""
-    if solved.empty:
-        return ""
-    flags = solved[f"{name}_identifiable"].dropna()
-    lost = int((~flags.astype(bool)).sum())
-    if not lost:
-        return ""
-    share = percent(lost, len(flags))
-    return f", but not identifiable in {lost} of {len(flags)} fitted ({share})"
-
-
-def _exact(solved: pd.DataFrame) -> str:
-    """What too few readings mean, where there are too few."""
-    if solved.empty:
-        return ""
-    each = solved.drop_duplicates(["specimen", "pose"])["degrees_of_freedom"]
-    few = int((each <= 0).sum())
-    if not few:
-        return ""
-    if (each == 0).all():
-        return "All fits are exact: as many readings as unknowns, so no misfit can show."
-    which = f"All {len(each)} fits" if few == len(each) else f"{few} of {len(each)} fits"
-    return f"{which} have no more readings than unknowns: such fits are exact or undetermined."
 
 
 def _dominant(results: Results) -> str:

@@ -13,7 +13,8 @@ from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import SUMMARY
+from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOWER_ENDS, SUMMARY
 from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     measured_size,
@@ -63,7 +64,9 @@ class _Part:
         """One row; ``size`` holds the measured motion that errors are compared with."""
         key = {name: getattr(self, name) for name in ("specimen", "part", "loading", "dataset")}
         what = {"quantity": quantity, "joint": joint, "coordinate": coordinate, "unit": unit}
-        return {**key, **what, **spread(values), "percent_of_measured": percent(values, size)}
+        regions = dict.fromkeys(("open_share", *LOWER_ENDS))
+        told = {"percent_of_measured": percent(values, size), **regions}
+        return {**key, **what, **spread(values), **told}
 
 
 def spread(values: Any) -> dict[str, Any]:
@@ -130,7 +133,22 @@ def _stiffness_rows(
         for name in settings.calibration.free:
             column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
             values = rows[column].to_numpy(float)
-            yield part.row("stiffness", str(joint), name, STIFFNESS_UNITS[name], values)
+            row = part.row("stiffness", str(joint), name, STIFFNESS_UNITS[name], values)
+            yield row | _regions(rows, name)
+
+
+def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
+    """Share of fits whose region is open, and the spread of lower ends; of fits with regions."""
+    _, low, _, below, above, _ = region_columns(name)
+    if below not in fits:
+        return {}
+    known = fits[fits[below].notna()]
+    if known.empty:
+        return {}
+    is_open = known[below].astype(bool) | known[above].astype(bool)
+    ends = known[low].dropna().to_numpy(float)
+    quartiles = np.percentile(ends, [25, 50, 75]).tolist() if len(ends) else [None] * 3
+    return {"open_share": float(is_open.mean()), **dict(zip(LOWER_ENDS, quartiles, strict=True))}
 
 
 def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Iterator[dict[str, Any]]:

@@ -46,11 +46,19 @@ LANDMARKS = Table(
 POSES = Table("poses", f"{FRAMES_IN_GROUND}.", FRAME_KEY, FRAME_COLUMNS)
 
 
+def region_columns(name: str) -> tuple[str, ...]:
+    """Columns of what is known of a stiffness beside its value, in the order of the table."""
+    suffix, _ = stiffness_unit(name)
+    numbers = tuple(f"{name}_{what}_{suffix}" for what in ("se", "low", "high"))
+    return (*numbers, *(f"{name}_{flag}" for flag in ("open_below", "open_above", "identifiable")))
+
+
 def _calibration_columns() -> tuple[Column, ...]:
     columns = []
     for name in COORDINATES:
         suffix, unit = stiffness_unit(name)
         words = name.replace("_", " ")
+        error, low, high, below, above, known = region_columns(name)
         columns += [
             Column(
                 f"{name}_{suffix}",
@@ -61,18 +69,39 @@ def _calibration_columns() -> tuple[Column, ...]:
                 low=0.0,
             ),
             Column(
-                f"{name}_se_{suffix}",
+                error,
                 "number",
                 f"standard error of the stiffness against {words}, to first order",
                 unit,
                 null="held fixed, at a bound, or not constrained by the data",
                 low=0.0,
             ),
+            *(
+                Column(
+                    end,
+                    "number",
+                    f"{which} end of the stiffness' 95 % region, all others fitted anew",
+                    unit,
+                    null="held fixed, or open: the data allow the bound and what is beyond",
+                    low=0.0,
+                )
+                for end, which in ((low, "lower"), (high, "upper"))
+            ),
+            *(
+                Column(
+                    flag,
+                    "flag",
+                    f"whether the region reaches the {which} bound of the fit",
+                    null="held fixed, or no stiffness was found",
+                )
+                for flag, which in ((below, "lower"), (above, "upper"))
+            ),
             Column(
-                f"{name}_identifiable",
+                known,
                 "flag",
-                "whether the data constrain this stiffness; where false do not believe it",
-                null="held fixed",
+                "whether the data hold this stiffness: both ends of its region lie inside the "
+                "bounds and its standard error is small; where false do not believe it",
+                null="held fixed, or no stiffness was found",
             ),
         ]
     return tuple(columns)

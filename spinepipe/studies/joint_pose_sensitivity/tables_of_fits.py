@@ -140,6 +140,9 @@ def _value(name: str, meaning: str) -> Column:
     return Column(name, "number", meaning, "see unit", null=NO_VALUE)
 
 
+LOWER_ENDS = ("lower_end_low_quartile", "lower_end_median", "lower_end_high_quartile")
+_NO_REGION = "not a stiffness, or fits of a bootstrap, whose regions are not looked for"
+
 SUMMARY = Table(
     "summary",
     "Medians and spreads as papers print them: one row per part of the study, loading, dataset, "
@@ -186,6 +189,21 @@ SUMMARY = Table(
             "%",
             null="not an error, or nothing was measured",
             low=0.0,
+        ),
+        Column(
+            "open_share",
+            "number",
+            "share of the fits whose region is open at a bound: their value is no more than a "
+            "value that the data do not exclude",
+            null=_NO_REGION,
+            low=0.0,
+            high=1.0,
+        ),
+        *(
+            Column(name, "number", f"{which} of the lower ends of regions", "see unit", _NO_REGION)
+            for name, which in zip(
+                LOWER_ENDS, ("25th percentile", "median", "75th percentile"), strict=True
+            )
         ),
     ),
 )

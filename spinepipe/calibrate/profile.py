@@ -1,0 +1,258 @@
+"""Profile likelihood: how far an unknown may go while the others make up for it.
+
+A standard error says how steep the cost is where it is least. A spring that nearly holds a joint
+rigid has a cost that no longer rises beyond: its local error may be small and its region open. So
+each unknown is moved, all others are fitted anew, and its region ends where the cost has risen by
+what the noise allows (Raue 2009, doi:10.1093/bioinformatics/btp358).
+
+The rise allowed is that at which a cost as curved as at the optimum would end, t^2 times the
+variance of the unknown over its entry of (J'J)^-1: with one scatter for all readings that is the
+t limit with the fit's own degrees of freedom, and residuals that share an error count as they do in
+the standard error.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm, t
+
+from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.lockstep import in_lockstep
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.decomposition import lstsq
+from spinepipe.effects.contract import Array, Indices
+
+LEVEL = 0.95
+
+ENOUGH = Settled(cost=1e-6, step=1e-5, slope=1e-14, evaluations=30)
+"""When the others have been fitted well enough for the rise to be known to a hundredth or so."""
+
+MOST_FITS = 8
+"""Of the others, per end."""
+
+NEAR = 0.05
+"""Share of the rise allowed within which an end is found: a fortieth of the way to it."""
+
+FURTHEST = 3.0
+"""Factor by which one look goes further from the optimum than the one before, at most."""
+
+
+INSIDE = 1e-9
+"""A descent begins so far inside its bounds."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Region of each unknown at a level.
+
+    Attributes
+    ----------
+    low, high : (m,) ends as moves from the model's values, the bound where an end is open.
+    open_below, open_above : (m,) bool; the data allow the bound and what may lie beyond.
+    lower_cost : whether a fit on the way had a lower cost than the optimum: there is a better one.
+    """
+
+    low: Array
+    high: Array
+    open_below: NDArray[np.bool_]
+    open_above: NDArray[np.bool_]
+    lower_cost: bool
+
+    @property
+    def closed(self) -> NDArray[np.bool_]:
+        """(m,) which unknowns have both ends inside their bounds."""
+        return ~(self.open_below | self.open_above)
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where one side of a region ends, and the least rise seen on the way."""
+
+    at: float
+    is_open: bool
+    least: float
+
+
+At = Callable[[Array], Evaluation]
+
+
+@dataclass(frozen=True)
+class _Optimum:
+    """Where all unknowns are fitted: x (m,), residuals (N,), Jacobian (N, m)."""
+
+    evaluator: Evaluator
+    x: Array
+    residual: Array
+    jacobian: Array
+
+    def others(self, unknown: int) -> Indices:
+        """All but one."""
+        return np.flatnonzero(np.arange(len(self.x)) != unknown)
+
+    def follow(self, unknown: int) -> Array:
+        """(m,) where the others go, to first order, as the unknown goes by 1."""
+        others = self.others(unknown)
+        direction = np.ones(len(self.x))
+        direction[others] = -_not_made(self.jacobian, unknown, others)[1]
+        return direction
+
+
+@dataclass(frozen=True)
+class _Rise:
+    """Of the cost, that is allowed; ``way`` to it if the cost were as curved as at the optimum."""
+
+    allowed: float
+    way: float
+
+
+def profile(
+    evaluator: Evaluator,
+    x: Array,
+    evaluation: Evaluation,
+    at_bound: Array,
+    noise: Array | None = None,
+    level: float = LEVEL,
+) -> Profile:
+    """Region of every unknown of a fit.
+
+    Parameters
+    ----------
+    x, evaluation, at_bound : the optimum. noise : as in `uncertainty`.
+    """
+    low, high = evaluator.problem.lower.copy(), evaluator.problem.upper.copy()
+    is_open = np.ones((2, len(x)), dtype=bool)
+    if evaluation.residual is None or evaluation.jacobian is None:
+        return Profile(low, high, is_open[0], is_open[1], False)
+    optimum = _Optimum(evaluator, x, evaluation.residual, evaluation.jacobian)
+    rises = [_rise(evaluator.problem, evaluation, at_bound, k, noise, level) for k in range(len(x))]
+    sides = [(k, r, side) for k, r in enumerate(rises) if r is not None for side in (-1, 1)]
+    searches = [partial(_end, optimum, k, rise, side) for k, rise, side in sides]
+    ends = in_lockstep(searches, evaluator.together) if searches else []
+    for (unknown, _, side), end in zip(sides, ends, strict=True):
+        (low if side < 0 else high)[unknown] = end.at
+        is_open[int(side > 0), unknown] = end.is_open
+    lower = any(end.least < -NEAR for end in ends)
+    return Profile(low, high, is_open[0], is_open[1], lower)
+
+
+def _rise(
+    problem: Problem,
+    evaluation: Evaluation,
+    at_bound: Array,
+    unknown: int,
+    noise: Array | None,
+    level: float,
+) -> _Rise | None:
+    """None where the data hold nothing against any value."""
+    assert evaluation.jacobian is not None
+    free = np.where(np.arange(len(at_bound)) == unknown, 0, at_bound)
+    found = uncertainty(problem, evaluation, free, np.inf, noise)
+    error = float(found.standard_error[unknown])
+    if not np.isfinite(error) or error == 0.0:
+        return None
+    tail = 0.5 + level / 2.0
+    limit = norm.ppf(tail) if noise is not None else t.ppf(tail, found.degrees_of_freedom)
+    inside = np.flatnonzero(free == 0)
+    left, _ = _not_made(evaluation.jacobian, unknown, inside[inside != unknown])
+    way = float(limit) * error
+    return _Rise(way**2 * float(left @ left), way)
+
+
+def _not_made(jacobian: Array, unknown: int, others: Indices) -> tuple[Array, Array]:
+    """What of the unknown's column the others cannot make (N,), and by what they make the rest."""
+    column = jacobian[:, unknown]
+    if not len(others):
+        return column, np.zeros(0)
+    by, _ = lstsq(jacobian[:, others], column)
+    return column - jacobian[:, others] @ by, by
+
+
+def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _End:
+    """Go from the optimum to one side until the cost has risen by what is allowed."""
+    problem, origin = optimum.evaluator.problem, float(optimum.x[unknown])
+    bound = float((problem.lower if side < 0 else problem.upper)[unknown])
+    cost = float(optimum.residual @ optimum.residual)
+    inner, outer, least = (origin, 0.0), None, 0.0
+    value = _no_further(origin + side * rise.way, bound, side)
+    direction, there = optimum.follow(unknown), optimum.x
+    for _ in range(MOST_FITS):
+        if side * (value - origin) <= 0.0:
+            return _End(bound, True, least)  # at the bound from the start
+        start = optimum.x + (value - origin) * direction
+        found, fitted = _refitted(optimum, unknown, value, (start, there), at)
+        share = (found - cost) / rise.allowed
+        least = min(least, share)
+        if abs(share - 1.0) <= NEAR:
+            return _End(value, False, least)
+        if share > 1.0:
+            outer = (value, share)
+        elif value == bound:
+            return _End(bound, True, least)
+        else:
+            inner, there = (value, share), fitted
+            direction = (fitted - optimum.x) / (value - origin)
+        value = _next(origin, inner, outer, bound, side)
+    return _End(bound, True, least) if outer is None else _End(value, False, least)
+
+
+def _next(
+    origin: float,
+    inner: tuple[float, float],
+    outer: tuple[float, float] | None,
+    bound: float,
+    side: int,
+) -> float:
+    """Where to look next: the root of the rise is nearly straight."""
+    value, share = inner
+    root = np.sqrt(max(share, 0.0))
+    if outer is None:
+        factor = float(np.clip(1.02 / max(root, 1e-6), 1.1, FURTHEST))
+        return _no_further(origin + (value - origin) * factor, bound, side)
+    if not np.isfinite(outer[1]):
+        return 0.5 * (value + outer[0])
+    part = (1.0 - root) / (np.sqrt(outer[1]) - root)
+    return value + (outer[0] - value) * float(np.clip(part, 0.05, 0.95))
+
+
+def _no_further(value: float, bound: float, side: int) -> float:
+    return max(value, bound) if side < 0 else min(value, bound)
+
+
+def _refitted(
+    optimum: _Optimum, unknown: int, value: float, starts: Sequence[Array], at: At
+) -> tuple[float, Array]:
+    """Cost with the unknown held at a value and the others fitted; infinite where nothing stands.
+
+    Parameters
+    ----------
+    starts : (m,) each, where the others may begin; the first that stands is taken.
+    """
+    problem, others = optimum.evaluator.problem, optimum.others(unknown)
+    bounds = problem.lower[others], problem.upper[others]
+
+    def whole(y: Array) -> Array:
+        x = np.full(len(optimum.x), value)
+        x[others] = y
+        return x
+
+    def point(y: Array) -> tuple[Array, Array] | None:
+        found = at(whole(y))
+        if found.residual is None or found.jacobian is None:
+            return None
+        return found.residual, found.jacobian[:, others]
+
+    for start in starts:
+        begin = np.clip(start[others], bounds[0] + INSIDE, bounds[1] - INSIDE)
+        found = point(begin)
+        if found is None:
+            continue
+        if not len(others):
+            return float(found[0] @ found[0]), whole(begin)
+        size, scale = len(optimum.residual), problem.scale[others]
+        ended = descend(once(point), begin, bounds, scale, size, ENOUGH)
+        return 2.0 * ended.half_cost, whole(ended.x)
+    return np.inf, optimum.x

@@ -1,0 +1,191 @@
+"""Regions of fitted unknowns against closed forms and plain scans of the cost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from example_effects import NOWHERE, loaded, spine
+from scipy import stats
+from scipy.optimize import minimize_scalar
+
+from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
+from spinepipe.calibrate.profile import NEAR, Profile
+from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.effects import Wrench
+from spinepipe.effects.contract import Array
+from spinepipe.frames import Pose
+from spinepipe.model import LoadCase, LoadStep, SpineModel
+from spinepipe.statics import System, follow, free_parameters, observe
+from spinepipe.world import Chain
+
+pytestmark = pytest.mark.numeric
+
+EXTENSION, ANTERIOR = 3, 0
+MOMENTS_NM = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+SLACK = NEAR / 2.0
+"""An end is found to this share of the way to it: the rise is nearly a square."""
+
+
+def moments(model: SpineModel, zeroed: bool = False) -> LoadCase:
+    """Moments about the right axis on the top vertebra, in some cases after an unloaded step."""
+    sizes = [0.0, *MOMENTS_NM] if zeroed else MOMENTS_NM
+    top = model.n_joints - 1
+    steps = (
+        LoadStep(number, (Wrench(top, NOWHERE, NOWHERE, np.array([0.0, 0.0, size])),))
+        for number, size in enumerate(sizes)
+    )
+    return LoadCase("moments", 1, tuple(steps))
+
+
+def one_spring(readings: Array, reach: float, zeroed: bool = False) -> Problem:
+    """A joint under moments, its extension (T,) read in rad: theta = M / k."""
+    upright = (Pose(np.eye(3), np.zeros(3)),)
+    model = replace(spine(1, gravity=False), frames=upright)
+    case = moments(model, zeroed)
+    measured = np.full((len(case.steps), 1, 6), np.nan)
+    measured[:, 0, EXTENSION] = readings
+    free = free_parameters(model, 0, ("extension_nm_per_rad",), "per_joint")
+    bounds = np.full(1, reach)
+    cases = (MeasuredCase(case, measured, zeroed),)
+    return Problem(model, cases, free, np.ones(6), -bounds, bounds)
+
+
+def region(found: Fit) -> Profile:
+    assert found.profile is not None
+    return found.profile
+
+
+def compliances(problem: Problem, moves: Array) -> Array:
+    """1 / k of a single spring whose logarithm is moved."""
+    start = problem.model.effects[0].values[0, EXTENSION]
+    return np.exp(-moves) / start
+
+
+def noisy(seed: int, stiffness: float, sd: float = 2e-3) -> Array:
+    rng = np.random.default_rng(seed)
+    return MOMENTS_NM / stiffness + sd * rng.normal(size=len(MOMENTS_NM))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("noise", [None, 2e-3])
+def test_a_spring_under_moments_has_the_region_of_a_straight_line(
+    seed: int, noise: float | None
+) -> None:
+    """theta = M u is linear in u = 1 / k: u lies within t s / |M| of M theta / M^2."""
+    theta = noisy(seed, 60.0)
+    problem = one_spring(theta, 8.0)
+    sds = None if noise is None else np.full(6, noise)
+    found = fit(problem, noise=sds, profiled=True)
+    size = float(MOMENTS_NM @ MOMENTS_NM)
+    u = float(MOMENTS_NM @ theta) / size
+    freedom = len(theta) - 1
+    scatter = np.sqrt(np.sum((theta - MOMENTS_NM * u) ** 2) / freedom) if noise is None else noise
+    limit = stats.t.ppf(0.975, freedom) if noise is None else stats.norm.ppf(0.975)
+    way = limit * scatter / np.sqrt(size)
+    seen = region(found)
+    ends = compliances(problem, np.concatenate([seen.high, seen.low]))
+    np.testing.assert_allclose(ends, [u - way, u + way], rtol=0, atol=SLACK * way)
+    assert seen.closed.all()
+    assert not seen.lower_cost
+
+
+def test_readings_zeroed_alike_have_the_region_of_their_standard_error() -> None:
+    """They share the error of step 0; the line's slope has the sandwich's SD, whatever the end."""
+    theta = np.concatenate([[0.0], noisy(5, 60.0)])
+    problem = one_spring(theta, 8.0, zeroed=True)
+    found = fit(problem, profiled=True)
+    sd = float(found.uncertainty.standard_error[0])
+    u = compliances(problem, found.x)[0]
+    way = stats.t.ppf(0.975, found.uncertainty.degrees_of_freedom) * sd * u
+    ends = compliances(problem, np.concatenate([region(found).high, region(found).low]))
+    np.testing.assert_allclose(ends, [u - way, u + way], rtol=0, atol=SLACK * way)
+
+
+def test_a_joint_too_stiff_for_its_readings_is_open_above() -> None:
+    """Its compliance may be zero: the region has no upper end, though the fit has an error."""
+    theta = noisy(1, 2000.0)
+    problem = one_spring(theta, 8.0)
+    found = fit(problem, profiled=True)
+    seen = region(found)
+    assert (seen.open_below[0], seen.open_above[0]) == (False, True)
+    assert seen.high[0] == problem.upper[0]
+    assert np.isfinite(seen.low[0])
+    assert seen.low[0] < found.x[0]
+
+
+def test_an_unknown_without_trace_is_open_on_both_sides() -> None:
+    problem = one_spring(noisy(0, 60.0), 3.0)
+    more = free_parameters(
+        problem.model, 0, ("extension_nm_per_rad", "right_bending_nm_per_rad"), "per_joint"
+    )
+    bounds = np.full(2, 3.0)
+    found = fit(replace(problem, free=more, lower=-bounds, upper=bounds), profiled=True)
+    seen = region(found)
+    assert seen.closed.tolist() == [True, False]
+    assert (seen.open_below[1], seen.open_above[1]) == (True, True)
+    assert (seen.low[1], seen.high[1]) == (-3.0, 3.0)
+
+
+def bent(seed: int) -> Problem:
+    """A spine of two joints under its loads and weight, noisy readings of two coordinates."""
+    model = spine(2)
+    case = loaded(model)
+    steps = follow(System(Chain(model), model, case))
+    seen = np.stack([observe(System(Chain(model), model, case), s.equilibrium.q) for s in steps])
+    rng = np.random.default_rng(seed)
+    seen = seen + rng.normal(size=seen.shape) * np.array([2e-4] * 3 + [2e-3] * 3)
+    keep = np.isin(np.arange(6), [ANTERIOR, EXTENSION])
+    free = free_parameters(model, 0, ("anterior_n_per_m", "extension_nm_per_rad"), "per_specimen")
+    bounds = np.full(2, 5.0)
+    cases = (MeasuredCase(case, np.where(keep, seen, np.nan)),)
+    return Problem(model, cases, free, np.ones(6), -bounds, bounds)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("unknown", [0, 1])
+def test_ends_lie_where_a_scan_of_the_cost_has_them(seed: int, unknown: int) -> None:
+    problem = bent(seed)
+    found = fit(problem, profiled=True)
+    evaluator = Evaluator(problem)
+    seen, m = region(found), 2
+    best = evaluator.at(found.x)
+    assert best.residual is not None
+    cost = float(best.residual @ best.residual)
+    freedom = len(best.residual) - m
+    allowed = stats.t.ppf(0.975, freedom) ** 2 * cost / freedom
+    for end, is_open in (
+        (seen.low[unknown], seen.open_below[unknown]),
+        (seen.high[unknown], seen.open_above[unknown]),
+    ):
+        rise = scanned(evaluator, unknown, float(end), found.x) - cost
+        if is_open:
+            assert rise < allowed
+        else:
+            assert rise == pytest.approx(allowed, rel=1.5 * NEAR)
+
+
+def scanned(evaluator: Evaluator, unknown: int, value: float, near: Array) -> float:
+    """Least cost with an unknown of two held, the other looked for by golden section."""
+
+    def cost(other: float) -> float:
+        x = np.full(2, value)
+        x[1 - unknown] = other
+        residual = evaluator.at(x).residual
+        return np.inf if residual is None else float(residual @ residual)
+
+    around = float(near[1 - unknown])
+    found = minimize_scalar(cost, bounds=(around - 2.0, around + 2.0), method="bounded")
+    return float(found.fun)
+
+
+def test_a_fit_that_was_not_asked_for_regions_has_none() -> None:
+    assert fit(one_spring(noisy(0, 60.0), 8.0)).profile is None
+
+
+def test_a_local_error_is_no_region() -> None:
+    """Where the spring is nearly rigid there is a standard error, but no upper end."""
+    problem = one_spring(noisy(3, 800.0), 8.0)
+    found = fit(problem, profiled=True)
+    local = uncertainty(problem, Evaluator(problem).at(found.x), found.at_bound, 1.0, None)
+    assert np.isfinite(local.standard_error[0])
+    assert region(found).open_above[0]
