@@ -109,6 +109,7 @@ def _summary(size: Size, rng: np.random.Generator) -> Iterator[Row]:
             "unit": "N/m" if name in TRANSLATIONS else "N m/rad",
             "n": size.poses if size.solved else 0,
             **(numbers if size.solved else {}),
+            "open_share": 0.0,
         }
 
 
@@ -247,7 +248,8 @@ def _variance_shares(size: Size, rng: np.random.Generator) -> Iterator[Row]:
     for cell, (factor, share) in product(_cells(size), shares.items()):
         row = {**cell, "factor": factor, "n_poses": 12, "n_stiffness": 2, **_ended(size)}
         ends = {"share": share, "share_low": share - 0.05, "share_high": share + 0.05}
-        yield row | ({**ends, "total": share} if size.solved else {})
+        signed = {f"signed_{name}": value for name, value in ends.items()}
+        yield row | ({**ends, **signed, "total": share} if size.solved else {})
 
 
 def _importance(size: Size, rng: np.random.Generator) -> Iterator[Row]:

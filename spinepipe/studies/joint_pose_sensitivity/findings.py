@@ -73,11 +73,15 @@ def _fits(study: JointPoseSensitivity, results: Results) -> str:
 
 
 def _dominant(results: Results) -> str:
-    """In how many errors pose or stiffness takes more, their 95 % intervals apart."""
+    """In how many errors pose or stiffness takes more, their 95 % intervals apart.
+
+    Of errors with their sign: where sizes are taken an error is folded at zero, and folding makes
+    an interaction of pose and stiffness that is none.
+    """
     rows = results.table("variance_shares")
     if rows.empty:
         return ""
-    done = rows[rows["status"] == "done"]
+    done = rows[(rows["status"] == "done") & rows["signed_share"].notna()]
     keys = ["specimen", "joint", "coordinate"]
     pose, stiffness = (
         done[done["factor"] == factor].set_index(keys) for factor in ("pose", "stiffness")
@@ -85,20 +89,34 @@ def _dominant(results: Results) -> str:
     if pose.empty:
         return ""
     stiffness = stiffness.reindex(pose.index)
-    by_pose = int((pose["share_low"] > stiffness["share_high"]).sum())
-    by_stiffness = int((stiffness["share_low"] > pose["share_high"]).sum())
+    by_pose = int((pose["signed_share_low"] > stiffness["signed_share_high"]).sum())
+    by_stiffness = int((stiffness["signed_share_low"] > pose["signed_share_high"]).sum())
     unknown = len(pose) - by_pose - by_stiffness
     overlap = "cannot be told apart: the 95 % intervals of their shares of the variance overlap."
     errors = f"{count(len(pose), 'error')} (one per joint and direction)"
+    together = _together(done)
     if unknown == len(pose):
         return (
             f"In none of {errors} is it clear which counts more: joint pose and stiffness {overlap}"
+            f" {together}"
         )
     told = (
         f"Of {errors}, joint pose takes more of the variance than stiffness in {by_pose} and "
         f"stiffness more in {by_stiffness}."
     )
-    return f"{told} In the other {unknown} they {overlap}" if unknown else told
+    others = f"In the other {unknown} they {overlap}" if unknown else ""
+    return " ".join(words for words in (told, others, together) if words)
+
+
+def _together(done: pd.DataFrame) -> str:
+    """What pose and stiffness do only together, of errors and of their sizes."""
+    rows = done[done["factor"] == "interaction"]
+    signed, size = (100.0 * float(rows[c].median()) for c in ("signed_share", "share"))
+    folded = ": taking sizes folds errors at zero" if size > signed else ""
+    return (
+        f"What they do only together takes {fixed(signed, 0)} % of the variance of an error "
+        f"(median), and {fixed(size, 0)} % of that of its size{folded}."
+    )
 
 
 def _precision(study: JointPoseSensitivity, results: Results) -> str:

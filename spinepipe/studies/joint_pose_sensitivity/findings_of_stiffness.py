@@ -26,7 +26,7 @@ def stiffness(study: JointPoseSensitivity, results: Results) -> str:
     solved = _reduced(results)
     is_open = chosen["open_share"].astype(float) > MOSTLY
     held = [
-        _medians(part) + _doubt(solved, str(name))
+        _medians(part, chosen) + _doubt(solved, str(name))
         for name, part in chosen[~is_open].groupby("coordinate", sort=False)
     ]
     not_held = [
@@ -70,13 +70,15 @@ def _reduced(results: Results) -> pd.DataFrame:
     return solved.merge(kept, on=["specimen", "pose"])
 
 
-def _medians(part: pd.DataFrame) -> str:
+def _medians(part: pd.DataFrame, chosen: pd.DataFrame) -> str:
     """Median and IQR, or the lowest and highest median of several specimens or joints."""
     first = part.iloc[0]
     title = AXIS[first["coordinate"]].lower()
     if len(part) == 1:
+        every = chosen[chosen["coordinate"] == first["coordinate"]]
+        whose = f"{place}, " if (place := _place(first, every)) and len(every) > 1 else ""
         iqr = f"{number(first['low_quartile'])} to {number(first['high_quartile'])}"
-        return f"{title} {number(first['median'])} {first['unit']} (IQR {iqr})"
+        return f"{title} {number(first['median'])} {first['unit']} ({whose}IQR {iqr})"
     ordered = part.sort_values("median", kind="stable")
     low, high = ordered.iloc[0], ordered.iloc[-1]
     if number(low["median"]) == number(high["median"]):

@@ -246,8 +246,8 @@ def _share(name: str, meaning: str) -> Column:
 
 VARIANCE_SHARES = Table(
     "variance_shares",
-    "Joint pose against stiffness: shares of the variance of each error over the grid of all "
-    "reduced poses and best stiffness sets, with 95 % intervals.",
+    "Joint pose against stiffness: shares of the variance of each error, of its size and with its "
+    "sign, over the grid of all reduced poses and best stiffness sets, with 95 % intervals.",
     ("specimen", "joint", "coordinate", "factor"),
     (
         SPECIMEN,
@@ -263,6 +263,9 @@ VARIANCE_SHARES = Table(
         _share("share_low", "lower end of its 95 % interval"),
         _share("share_high", "upper end of its 95 % interval"),
         _share("total", "share with the interaction added: what fixing all else would leave"),
+        _share("signed_share", "share of the variance of the error with its sign"),
+        _share("signed_share_low", "lower end of its 95 % interval"),
+        _share("signed_share_high", "upper end of its 95 % interval"),
         Column("n_poses", "integer", "joint poses in the grid", low=0),
         Column("n_stiffness", "integer", "stiffness sets in the grid", low=0),
         ENDED,

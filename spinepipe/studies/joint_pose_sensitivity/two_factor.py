@@ -22,6 +22,7 @@ from spinepipe.studies.joint_pose_sensitivity.variables import (
     measured_coordinates,
     pose_parameters,
     readings,
+    signed_error,
 )
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES
@@ -33,20 +34,24 @@ def run(
     """Write ``variance_shares.parquet`` and ``importance.parquet``."""
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
-    errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
+    simulations = readings(frames["simulations"], cohort.zeroed_at_step_0)
     kept = frames["success"].loc[frames["success"]["reduced"], ["specimen", "pose"]]
-    errors = errors.merge(kept, on=["specimen", "pose"])
+    errors, signed = (
+        found.merge(kept, on=["specimen", "pose"])
+        for found in (absolute_error(simulations), signed_error(simulations))
+    )
     ranked_sets = ranking(best)
     divided: list[dict[str, Any]] = []
     grown: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
-        own = errors[errors["specimen"] == specimen]
+        own, own_signed = (every[every["specimen"] == specimen] for every in (errors, signed))
         poses = frames["poses"]
         parameters = pose_parameters(poses[poses["specimen"] == specimen])
         for joint, coordinate in measured_coordinates(own):
             grid = complete_grid(own, joint, coordinate)
             key = {"specimen": specimen, "joint": joint, "coordinate": coordinate}
-            divided += [{**key, **row} for row in _shares(grid)]
+            both = grid, complete_grid(own_signed, joint, coordinate)
+            divided += [{**key, **row} for row in _shares(*both)]
             seed = specimen_seed(settings.seed, f"tree/{specimen}/{joint}/{coordinate}")
             sets = {one["name"]: np.array(one["stiffness"]) for one in ranked_sets[specimen]}
             tree = Grown(settings, cohort.joint_names, parameters, sets, seed)
@@ -56,24 +61,32 @@ def run(
     write(from_rows(IMPORTANCE, grown), importance, origin)
 
 
-def _shares(grid: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Three rows: pose, stiffness and what only both together explain."""
-    found: Shares = variance_shares(grid.to_numpy(float))
-    parts = {
-        "pose": (found.row, found.total_row),
-        "stiffness": (found.column, found.total_column),
-        "interaction": (found.interaction, found.interaction),
-    }
+def _shares(grid: pd.DataFrame, signed: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Three rows: pose, stiffness and what only both together explain, of |error| and error."""
+    found = variance_shares(grid.to_numpy(float))
+    parts = _by_factor(found)
+    of_signed = _by_factor(variance_shares(signed.to_numpy(float)))
     for factor, (first, total) in parts.items():
+        told = _interval(of_signed[factor][0])
         yield {
             "factor": factor,
             **_interval(first),
+            **{f"signed_{name}": value for name, value in told.items()},
             "total": None if total is None else total.estimate,
             "n_poses": found.n_rows,
             "n_stiffness": found.n_columns,
             "status": found.status.value,
             "message": found.message.replace("row", "pose").replace("column", "stiffness"),
         }
+
+
+def _by_factor(found: Shares) -> dict[str, tuple[Share | None, Share | None]]:
+    """First order and total of each factor."""
+    return {
+        "pose": (found.row, found.total_row),
+        "stiffness": (found.column, found.total_column),
+        "interaction": (found.interaction, found.interaction),
+    }
 
 
 def _interval(share: Share | None) -> dict[str, float | None]:

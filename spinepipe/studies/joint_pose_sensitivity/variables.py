@@ -1,6 +1,6 @@
 """What statistics are made of: errors of runs, their two-factor grid, and poses as factors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -25,9 +25,20 @@ def absolute_error(simulations: pd.DataFrame) -> pd.DataFrame:
     One column per coordinate, mm or deg; NaN where not measured or without a pose. A run of which
     one step has no pose has no error at all: a mean over fewer steps would not compare.
     """
+    return _mean_error(simulations, pd.DataFrame.abs)
+
+
+def signed_error(simulations: pd.DataFrame) -> pd.DataFrame:
+    """Mean error over readings, predicted less measured; rows and columns as `absolute_error`."""
+    return _mean_error(simulations, pd.DataFrame.copy)
+
+
+def _mean_error(
+    simulations: pd.DataFrame, sized: Callable[[pd.DataFrame], pd.DataFrame]
+) -> pd.DataFrame:
     keys = ["specimen", "pose", "stiffness", "joint"]
     columns = [f"error_{name}" for name in COORDINATE_COLUMNS]
-    errors = simulations[columns].abs().set_axis(list(COORDINATES), axis=1)
+    errors = sized(simulations[columns]).set_axis(list(COORDINATES), axis=1)
     measured = simulations[[f"measured_{name}" for name in COORDINATE_COLUMNS]].notna().to_numpy()
     lost = pd.DataFrame(measured & errors.isna().to_numpy(), columns=list(COORDINATES))
     by = [simulations[key].reset_index(drop=True) for key in keys]

@@ -14,6 +14,7 @@ from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import left_out, shown_tables
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOWER_ENDS
 from spinepipe.tables import Tables
 
 NAN = float("nan")
@@ -36,7 +37,8 @@ def summary(n: int, iqr: float, part: str, loading: str, **more: Any) -> dict[st
     row = {"specimen": "a", "part": part, "loading": loading, "quantity": "stiffness", "joint": "*"}
     row |= {"dataset": "reduced" if part == "poses" else "all", "coordinate": "extension"}
     numbers = {"median": 10.0, "low_quartile": 9.0, "high_quartile": 11.0, "iqr": iqr, "n": n}
-    return {**row, **numbers, "unit": "N m/rad", **more}
+    held = {"open_share": 0.0, **dict(zip(LOWER_ENDS, (6.0, 7.0, 8.0), strict=True))}
+    return {**row, **numbers, **held, "unit": "N m/rad", **more}
 
 
 def counts(part: str, loading: str, fits: int, solved: int) -> dict[str, Any]:
@@ -101,6 +103,30 @@ def test_stiffness_that_data_do_not_hold_has_a_warning(study: JointPoseSensitivi
     sound = {"summary": rows, "calibrations": calibrations([True] * 2, [2, 1])}
     assert "identifiable" not in told(study, sound)
     assert "readings" not in told(study, sound)
+
+
+def test_a_median_that_most_fits_do_not_hold_is_not_told(study: JointPoseSensitivity) -> None:
+    """Nine of ten regions are open: what is known is above what the stiffness lies."""
+    most = {"open_share": 0.9}
+    words = told(study, {"summary": [summary(10, 2.0, "poses", "equilibrium", **most)]})
+    assert (
+        "Not held by the data: flexion–extension, whose region is open in 90 % of fits; lower ends "
+        "6.00 to 8.00 N m/rad (IQR)."
+    ) in words
+    assert "Median stiffness" not in words
+    nowhere = most | dict.fromkeys(LOWER_ENDS)
+    words = told(study, {"summary": [summary(10, 2.0, "poses", "equilibrium", **nowhere)]})
+    assert "Not held by the data: flexion–extension, whose region is open in 90 % of fits." in words
+
+
+def test_specimens_whose_medians_are_not_held_are_counted(study: JointPoseSensitivity) -> None:
+    rows = [
+        summary(10, 2.0, "poses", "equilibrium", specimen=name, open_share=share)
+        for name, share in (("a", 0.2), ("b", 0.6), ("c", 1.0))
+    ]
+    words = told(study, {"summary": rows})
+    assert "over the reduced poses: flexion–extension 10.0 N m/rad (a, IQR 9.00 to 11.0)." in words
+    assert "Not held by the data: flexion–extension in 2 of 3 specimens." in words
 
 
 @pytest.mark.parametrize(
@@ -179,10 +205,20 @@ def test_specimens_are_not_an_interval(study: JointPoseSensitivity) -> None:
 
 
 def shares(joint: str, *ends: float) -> list[dict[str, Any]]:
-    """Interval of the pose, then of the stiffness."""
+    """Intervals of the pose, then of the stiffness, of errors with their sign; the rest is 4 %.
+
+    Of sizes the interval of the pose is narrow, and the rest is 55 %.
+    """
     cell = {"specimen": "a", "joint": joint, "coordinate": "extension", "status": "done"}
-    both = (("pose", ends[:2]), ("stiffness", ends[2:]))
-    return [{**cell, "factor": f, "share_low": low, "share_high": high} for f, (low, high) in both]
+    parts = (("pose", *ends[:2]), ("stiffness", *ends[2:]), ("interaction", 0.02, 0.06))
+    rows = []
+    for factor, low, high in parts:
+        signed = {"signed_share": 0.5 * (low + high)}
+        signed |= {"signed_share_low": low, "signed_share_high": high}
+        size = 0.55 if factor == "interaction" else 0.2
+        ends_of_size = {"share_low": size, "share_high": size}
+        rows.append({**cell, "factor": factor, **signed, "share": size, **ends_of_size})
+    return rows
 
 
 def test_shares_with_common_ground_are_not_ranked(study: JointPoseSensitivity) -> None:
@@ -194,8 +230,17 @@ def test_shares_with_common_ground_are_not_ranked(study: JointPoseSensitivity) -
     words = told(study, {"variance_shares": rows})
     assert words.startswith("Of 3 errors (one per joint and direction), joint pose takes more")
     assert "than stiffness in 1 and stiffness more in 1. In the other 1 they cannot be" in words
-    assert "In none of 1 error" in told(study, {"variance_shares": rows[4:]})
-    assert "told apart" not in told(study, {"variance_shares": rows[:4]})
+    assert "In none of 1 error" in told(study, {"variance_shares": rows[6:]})
+    assert "told apart" not in told(study, {"variance_shares": rows[:6]})
+
+
+def test_folding_is_told_where_sizes_have_more_interaction(study: JointPoseSensitivity) -> None:
+    rows = shares("J1", 0.5, 0.9, 0.1, 0.4)
+    words = told(study, {"variance_shares": rows})
+    assert "takes 4 % of the variance of an error (median), and 55 % of that of its size: " in words
+    assert "folds errors at zero" in words
+    alike = [row | {"share": row["signed_share"]} for row in rows]
+    assert "folds" not in told(study, {"variance_shares": alike})
 
 
 def test_parts_that_were_left_out_are_named(study: JointPoseSensitivity) -> None:

@@ -132,7 +132,7 @@ def test_letters_run_on_and_titles_stay_in_the_figure(tmp_path: Path) -> None:
         figure = pose_against_stiffness_figure(study, cohort, tables)
         figure.canvas.draw()
     titles = [axis.get_title(loc="left") for axis in panels(figure)]
-    assert [title[0] for title in titles] == list("abcdefgh")
+    assert [title[0] for title in titles] == list("abcdefghijkl")
     for axis in panels(figure):
         (text,) = [t for t in (axis._left_title,) if t.get_text()]  # type: ignore[attr-defined]
         assert text.get_window_extent().x1 <= figure.bbox.x1
@@ -149,10 +149,12 @@ def test_trees_of_too_few_rows_keep_their_panels(tmp_path: Path) -> None:
     with style():
         figure = pose_against_stiffness_figure(study, cohort, tables)
     assert [a.get_title(loc="left").split(": ")[1] for a in panels(figure)] == [
-        "variance",
-        "variance",
-        "tree",
-        "tree",
+        "error",
+        "error",
+        "|error|",
+        "|error|",
+        "tree of |error|",
+        "tree of |error|",
     ]
     assert words(figure).count(why) == 5, "in two rows of two panels, and below them"
     assert f"no tree for 4 of 4 errors: {why}" in words(figure)
@@ -162,7 +164,8 @@ def test_trees_are_drawn_whatever_else_is_missing(tmp_path: Path) -> None:
     study, cohort, tables = made(tmp_path, Size(("a",), 2, 4))
     with style():
         figure = pose_against_stiffness_figure(study, cohort, tables)
-    assert [len(axis.patches) for axis in panels(figure)] == [0, 0, 4, 4], "two factors, two joints"
+    bars = [len(axis.patches) for axis in panels(figure)]
+    assert bars == [0, 0, 0, 0, 4, 4], "two factors, two joints"
 
 
 def test_zeros_of_step_0_are_no_readings(tmp_path: Path) -> None:

@@ -22,7 +22,8 @@ _ROW_MM, _NARROW_MM, _AROUND_MM, _KEY_MM = 13.0, 4.6, 14.0, 16.0
 _ENDS = (-2.0, 118.0)
 """Ends of the axis, %: beyond 100 stand the numbers."""
 
-_RESULT = {"variance": "share", "tree": "importance"}
+_RESULT = {"signed": "signed_share", "absolute": "share", "tree": "importance"}
+_TITLES = {"signed": "error", "absolute": "|error|", "tree": "tree of |error|"}
 _LINE_LENGTH = 46
 TREE = ["specimen", "joint", "coordinate"]
 """What one tree is known by."""
@@ -31,7 +32,7 @@ TREE = ["specimen", "joint", "coordinate"]
 def pose_against_stiffness_figure(
     study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
-    """Per coordinate a panel of variance shares and, below it, one of the tree's importance."""
+    """Per coordinate shares in the variance of error and |error|, and the tree's importance."""
     shares, grown = tables["variance_shares"], tables["importance"]
     if _done(shares).empty and _done(grown).empty:
         return saying("Pose and stiffness cannot be compared: no error varies over the grid.")
@@ -40,11 +41,12 @@ def pose_against_stiffness_figure(
     upper, lower = (
         rows_of(frame, cohort.specimen_names, cohort.joint_names) for frame in (shares, trees)
     )
-    parts = [(rows, what) for rows, what in ((upper, "variance"), (lower, "tree")) if len(rows)]
+    every = ((upper, "signed"), (upper, "absolute"), (lower, "tree"))
+    parts = [(rows, what) for rows, what in every if len(rows)]
     panels, figure = sections([(len(names), _height(rows)) for rows, _ in parts], _KEY_MM)
     for part, ((rows, what), axes) in enumerate(zip(parts, panels, strict=True)):
         for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
-            head(axis, part * len(names) + index, f"{AXIS[name]}: {what}")
+            head(axis, part * len(names) + index, f"{AXIS[name]}: {_TITLES[what]}")
             _draw(axis, rows, name, what)
     bars = {COLORS["pose"]: "joint pose", COLORS["stiffness"]: "stiffness set"}
     explain(figure, bars | {COLORS["interaction"]: "interaction"}, _words(tables, upper))
@@ -81,10 +83,10 @@ def _draw(axis: Axes, rows: Rows, name: str, what: str) -> None:
     for y, frame in enumerate(rows.frames):
         here = frame[frame["coordinate"] == name]
         found = here[here[_RESULT[what]].notna()]
-        if what == "variance":
-            _draw_shares(axis, y, found, rows)
-        else:
+        if what == "tree":
             _draw_tree(axis, y, found, rows)
+        else:
+            _draw_shares(axis, y, found, rows, _RESULT[what])
         if found.empty and len(here) and rows.with_numbers:
             why = textwrap.fill(str(here["message"].iloc[0]), _LINE_LENGTH)
             note(axis, 0.02, y, why, GREY)
@@ -92,18 +94,18 @@ def _draw(axis: Axes, rows: Rows, name: str, what: str) -> None:
     axis.set_xlim(*_ENDS)
     axis.set_xticks(range(0, 101, 20))
     axis.spines["bottom"].set_bounds(0.0, 100.0)
-    label = "share of the variance (%)" if what == "variance" else "share of importance (%)"
+    label = "share of importance (%)" if what == "tree" else "share of the variance (%)"
     axis.set_xlabel(label)
 
 
-def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: Rows) -> None:
+def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: Rows, column: str) -> None:
     crowded = here["factor"].duplicated().any()
     for _, row in here.iterrows():
         color, at = COLORS[row["factor"]], y + _OFFSETS[row["factor"]]
-        ends = (100.0 * row["share_low"], 100.0 * row["share_high"])
-        draw_interval(axis, 100.0 * row["share"], ends, at, color, crowded=bool(crowded))
+        ends = (100.0 * row[f"{column}_low"], 100.0 * row[f"{column}_high"])
+        draw_interval(axis, 100.0 * row[column], ends, at, color, crowded=bool(crowded))
         if rows.with_numbers and not crowded:
-            words = f"{fixed(100.0 * row['share'], 0)} %"
+            words = f"{fixed(100.0 * row[column], 0)} %"
             note(axis, 1.0, at, words, color, ha="right")
 
 
