@@ -12,6 +12,12 @@ from spinepipe.tables.shared import joined
 Row = dict[str, Any]
 
 
+UNDECIDED, NOT_ASKED, CIRCULAR = "undecided", "not_asked", "circular"
+DECIDED = ("yes", "no")
+HOLDS = (*DECIDED, UNDECIDED, NOT_ASKED, CIRCULAR)
+"""What may be said of a claim."""
+
+
 @dataclass(frozen=True)
 class Claim:
     """What is claimed; see the columns of table ``findings``."""
@@ -28,17 +34,22 @@ class Claim:
         value: float | None = None,
         interval: tuple[float, float] | None = None,
         p: float | None = None,
+        specimens: int | None = None,
     ) -> Row:
-        """The row of a claim that was looked at."""
+        """The row of a claim that was looked at; ``specimens`` : that decide, None for all."""
         low, high = interval or (None, None)
         named = {"finding": self.finding, "statement": self.statement}
         named |= {"quantity": self.quantity, "unit": self.unit}
-        found = {"value": value, "low": low, "high": high, "p": p}
+        found = {"value": value, "low": low, "high": high, "p": p, "specimens": specimens}
         return {**named, **found, "holds": holds, "message": message}
 
     def unknown(self, message: str) -> Row:
         """The row of a claim about which there are no numbers."""
-        return self.row("undecided", message)
+        return self.row(UNDECIDED, message)
+
+    def not_asked(self, message: str) -> Row:
+        """The row of a claim that the study leaves out."""
+        return self.row(NOT_ASKED, message)
 
 
 def above_zero(claim: Claim, values: pd.Series, significance: float, note: str = "") -> Row:
@@ -47,10 +58,10 @@ def above_zero(claim: Claim, values: pd.Series, significance: float, note: str =
     Yes and no where the t test tells the mean from zero, by its sign; else undecided.
     """
     mean = mean_of(values.to_numpy(float))
-    holds = "undecided"
+    holds = UNDECIDED
     if mean.p is not None and mean.value is not None and mean.p < significance:
         holds = "yes" if mean.value > 0.0 else "no"
-    return claim.row(holds, joined(told(mean), note), mean.value, mean.interval, mean.p)
+    return claim.row(holds, joined(told(mean), note), mean.value, mean.interval, mean.p, mean.n)
 
 
 def told(mean: Mean) -> str:
@@ -73,6 +84,8 @@ def listed(names: Sequence[str]) -> str:
     """Names in a row, for a message."""
     return ", ".join(names) or "none"
 
+
+NO_SUCH_FITS = "no such fits in this study"
 
 FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
 """What differs, and what it is seen in again and again."""

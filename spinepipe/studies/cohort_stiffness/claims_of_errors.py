@@ -10,7 +10,16 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.statistics import wilcoxon_signed_rank
-from spinepipe.studies.cohort_stiffness.claims import FACTORS, Claim, Row, above_zero, listed, words
+from spinepipe.studies.cohort_stiffness.claims import (
+    CIRCULAR,
+    FACTORS,
+    NO_SUCH_FITS,
+    Claim,
+    Row,
+    above_zero,
+    listed,
+    words,
+)
 from spinepipe.studies.cohort_stiffness.representations import EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
@@ -209,12 +218,14 @@ def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) 
     results = _results(larger, smaller, errors)
     pair = pd.DataFrame(results).dropna()
     if pair.empty:
-        return claim.unknown(_missing(larger, smaller))
+        return _nothing(claim, larger, smaller)
     asked = _asked(comparison, errors)
     sides = (comparison.larger.words, comparison.smaller.words)
     lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
     note = joined(_note(pair, unit), OWN_READINGS if comparison.own_readings else "", lost)
-    return _against(claim, results, asked, significance, note)
+    row = _against(claim, results, asked, significance, note)
+    by_construction = comparison.own_readings and row["holds"] == "yes"
+    return row | {"holds": CIRCULAR} if by_construction else row
 
 
 def every_level(
@@ -230,7 +241,7 @@ def every_level(
         of[row["holds"]].append(str(joint))
         values.append(row["value"])
     if not any(value is not None for value in values):
-        return EVERY_LEVEL.unknown(_missing(ratio, uniform))
+        return _nothing(EVERY_LEVEL, ratio, uniform)
     told = f"better at: {listed(of['no'])}; undecided at: {listed(of['undecided'])}"
     sides = {RATIO.words: specimen_rms(ratio, errors)}
     sides |= {UNIFORM.words: specimen_rms(uniform, errors)}
@@ -295,13 +306,14 @@ def _against(
     return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
 
 
-def _missing(larger: pd.DataFrame, smaller: pd.DataFrame) -> str:
+def _nothing(claim: Claim, larger: pd.DataFrame, smaller: pd.DataFrame) -> Row:
+    """The row where there is nothing to compare: was it asked for at all?"""
     if larger.empty and smaller.empty:
-        return "neither was computed in this study"
+        return claim.not_asked("neither was computed in this study")
     if larger.empty or smaller.empty:
         missing = "first" if larger.empty else "second"
-        return f"the {missing} was not computed in this study"
-    return "no specimen has all results of both"
+        return claim.not_asked(f"the {missing} was not computed in this study")
+    return claim.unknown("no specimen has all results of both")
 
 
 def _note(pair: pd.DataFrame, unit: str) -> str:
@@ -358,8 +370,10 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
 def _errors_differ(claim: Claim, tests: pd.DataFrame, significance: float) -> Row:
     """Yes where a test is significant, else undecided: a small cohort cannot tell no difference."""
     known = tests.dropna(subset="p_holm")
+    if tests.empty:
+        return claim.not_asked(NO_SUCH_FITS)
     if known.empty:
-        return claim.unknown(joined(*tests["message"].unique()) or "no such fits in this study")
+        return claim.unknown(joined(*tests["message"].unique()))
     p = float(known["p_holm"].min())
     below = known.loc[known["p_holm"] < significance, "stratum"]
     message = f"significant under: {listed(list(below))}; {len(known)} load cases; no interval"

@@ -10,7 +10,7 @@ from statsmodels.stats.anova import AnovaRM
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.claims import FACTORS, Claim, Row, told, words
+from spinepipe.studies.cohort_stiffness.claims import FACTORS, NO_SUCH_FITS, Claim, Row, told, words
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
@@ -74,8 +74,10 @@ def load_case_findings(
 def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
     """Yes where the F tests together are significant; no where none is and they explain little."""
     known = tests.dropna(subset="p")
+    if tests.empty:
+        return claim.not_asked(NO_SUCH_FITS)
     if known.empty:
-        return claim.unknown(joined(*tests["message"].unique()) or "no such fits in this study")
+        return claim.unknown(joined(*tests["message"].unique()))
     n = len(known)
     below = int((known["p_holm"] < significance).sum())
     tiny = float(np.finfo(float).tiny)  # Fisher takes the logarithm
@@ -90,7 +92,7 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
     )
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
     interval = float(ends.low), float(ends.high)
-    return claim.row(holds, joined(found, lost, note), below / n, interval, p)
+    return claim.row(holds, joined(found, lost, note), below / n, interval, p, n)
 
 
 def adjusted_share(tests: pd.DataFrame) -> float:
@@ -145,7 +147,8 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     elif ends is not None and 1.0 + ends[0] > 1.0 / MARGIN and 1.0 + ends[1] < MARGIN:
         holds = "no"
     interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
-    return STIFFER.row(holds, joined(told(mean), many), 1.0 + mean.value, interval, mean.p)
+    value = 1.0 + mean.value
+    return STIFFER.row(holds, joined(told(mean), many), value, interval, mean.p, mean.n)
 
 
 def mean_excess(ratios: pd.DataFrame) -> pd.Series:
@@ -222,7 +225,7 @@ def share_between(
     high = _share(f * float(stats.f.isf(0.025, within, between)), times)
     holds = "yes" if p < significance else "no" if high < LITTLE else "undecided"
     message = joined(f"F({between:.0f}, {within:.0f}) {f:.3g}", note)
-    return claim.row(holds, message, _share(f, times), (low, high), p)
+    return claim.row(holds, message, _share(f, times), (low, high), p, len(values))
 
 
 def log_grid(rows: pd.DataFrame) -> pd.DataFrame:

@@ -12,6 +12,7 @@ from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     load_case_findings,
     stiffness_spreads,
 )
+from spinepipe.studies.cohort_stiffness.claims_together import together
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS
 from spinepipe.tables import from_rows, read_frames, write
@@ -34,7 +35,10 @@ def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Ite
     significance : p below which a test decides.
     """
     stiffness, errors, statistics = (frames[n] for n in ("stiffness", "errors", "statistics"))
-    yield from error_findings(errors, significance)
-    yield from load_case_findings(stiffness, errors, statistics, significance)
-    yield from stiffness_spreads(stiffness, frames.get("pooling"), significance)
-    yield from error_spreads(statistics, significance)
+    by_themselves = (
+        *error_findings(errors, significance),
+        *load_case_findings(stiffness, errors, statistics, significance),
+        *stiffness_spreads(stiffness, frames.get("pooling"), significance),
+        *error_spreads(statistics, significance),
+    )
+    yield from together(by_themselves, stiffness["specimen"].nunique(), significance)

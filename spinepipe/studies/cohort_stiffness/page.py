@@ -40,7 +40,10 @@ SHOWN = {
 READ = SHOWN
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
-_CLAIM_ORDER = ("statement", "holds", "value", "unit", "low", "high", "p", "quantity", "message")
+_CLAIM_ORDER = (
+    *("statement", "holds", "value", "unit", "low", "high"),
+    *("p", "p_holm", "quantity", "message"),
+)
 
 _COLUMNS = {
     FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),

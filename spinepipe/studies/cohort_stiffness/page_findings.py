@@ -19,6 +19,8 @@ _VERDICTS = {
     "yes": ("hold", "Holds here"),
     "no": ("do not hold", "Does not hold here"),
     "undecided": ("cannot be decided", "Cannot be decided with this cohort"),
+    "circular": ("true by construction", "True by construction, and no test"),
+    "not_asked": ("not asked", "Not asked in this study"),
 }
 
 _MOST_CLAIMS = 6
@@ -210,7 +212,9 @@ def _claim(row: dict[Any, Any]) -> str:
     if not (pd.isna(row["low"]) or pd.isna(row["high"])):
         numbers.append(f"95 % interval {number(row['low'])} to {number(row['high'])}")
     if not pd.isna(row["p"]):
-        numbers.append(f"p {number(row['p'], 2)}")
+        beside = row["p_holm"]
+        told = "" if pd.isna(beside) else f", {number(beside, 2)} beside the other claims"
+        numbers.append(f"p {number(row['p'], 2)}{told}")
     return f"{words} ({', '.join(numbers)})"
 
 

@@ -1,5 +1,6 @@
 """Tables of studies of kind cohort_stiffness: fits, their errors, and what follows from them."""
 
+from spinepipe.studies.cohort_stiffness.claims import HOLDS
 from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.tables.shared import STATISTICS, against_paper
@@ -373,7 +374,7 @@ RANKING = Table(
 FINDINGS = Table(
     "findings",
     "What the study says to the findings of Gould et al. 2024b, and to those hoped for here, each "
-    "with its number. Decided test by test: p values are not corrected for their number.",
+    "with its number. Decided beside each other: p is corrected for their number.",
     ("finding",),
     (
         Column("finding", "text", "short name"),
@@ -386,17 +387,34 @@ FINDINGS = Table(
         Column(
             "p",
             "number",
-            "p value of the test that decides",
+            "p value of its own test",
             null="there is none",
             low=0.0,
             high=1.0,
         ),
         Column(
+            "p_holm",
+            "number",
+            "p corrected for all findings of the study that have one (Holm); it decides",
+            null="there is none",
+            low=0.0,
+            high=1.0,
+        ),
+        Column(
+            "specimens",
+            "integer",
+            "specimens that the value is of",
+            null="all of the study, joint by joint or in tests of their own",
+            low=0,
+        ),
+        Column(
             "holds",
             "text",
-            "yes: p below the study's significance, on the claimed side; no: as sure, on the "
-            "other side, or surely too little to matter; undecided: this cohort cannot tell",
-            allowed=("yes", "no", "undecided"),
+            "yes: p_holm below the study's significance, on the claimed side; no: as sure, on the "
+            "other side, or surely too little to matter; undecided: this cohort cannot tell, as "
+            "with fewer than 3 specimens; circular: true by construction, fitted to the readings "
+            "it is judged by; not_asked: the study leaves it out",
+            allowed=HOLDS,
         ),
         MESSAGE,
     ),

@@ -167,7 +167,7 @@ def claim(name: str, holds: str, **numbers: object) -> dict[str, object]:
 
 def test_claims_are_counted_and_told_with_their_numbers() -> None:
     rows = [
-        claim("a", "yes", value=0.5, low=0.25, high=0.75, p=0.011),
+        claim("a", "yes", value=0.5, low=0.25, high=0.75, p=0.011, p_holm=0.022),
         claim("b", "no"),
         *(claim(f"c{n}", "undecided", value=0.1) for n in range(8)),
     ]
@@ -176,7 +176,10 @@ def test_claims_are_counted_and_told_with_their_numbers() -> None:
         s.startswith("Of 10 claims about this cohort: hold 1, do not hold 1, cannot be decided 8;")
         for s in found
     )
-    assert "Holds here: claim a (0.500 deg, 95 % interval 0.250 to 0.750, p 0.011)." in found
+    assert (
+        "Holds here: claim a (0.500 deg, 95 % interval 0.250 to 0.750, p 0.011, "
+        "0.022 beside the other claims)."
+    ) in found
     assert "Does not hold here: claim b (no fit)." in found
     assert any(s.endswith("claim c5 (0.100 deg); and 2 more.") for s in found)
 
