@@ -64,11 +64,26 @@ def signs(study: CohortStiffness, results: Results) -> Iterator[str]:
             f"{_some(places)}. Stiffness of these joints, and whatever is compared with it, cannot "
             "be believed before this is settled."
         )
+    yield from _sizes(rows[rows["verdict"] == "implausible"])
     undecided = int((rows["verdict"] == "undecided").sum())
     if undecided or not len(flipped):
-        moved = int((rows["verdict"] == "as_expected").sum())
+        moved = int(rows["verdict"].isin(["as_expected", "implausible"]).sum())
         rest = f"; {undecided} cannot be told" if undecided else ""
         yield f"{moved} of {count(len(rows), 'measured joint motion')} go with the load{rest}."
+
+
+def _sizes(implausible: pd.DataFrame) -> Iterator[str]:
+    """Where a joint moves much more or less than any joint that was measured before."""
+    if implausible.empty:
+        return
+    slopes = implausible["measured_over_expected"].astype(float)
+    where = "1 place" if len(implausible) == 1 else f"{len(implausible)} places"
+    first = implausible.iloc[int((slopes - slopes.median()).abs().argmin())]
+    yield (
+        f"Look at units first: in {where} the measured motion is {number(slopes.min())} to "
+        f"{number(slopes.max())} times the expected one. {first['specimen']} {first['joint']} in "
+        f"{case(first['test']).lower()}: {first['message']}."
+    )
 
 
 def failed(study: CohortStiffness, results: Results) -> Iterator[str]:

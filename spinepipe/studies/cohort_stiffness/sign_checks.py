@@ -1,4 +1,4 @@
-"""Does each joint move the way the load pushes it? A flipped sign in the measurement shows."""
+"""Does each joint move the way, and as far as, the load pushes it? Signs and units show."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -11,6 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
+from spinepipe.studies.cohort_stiffness.motion_size import implausible
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven
 from spinepipe.units import COORDINATES
@@ -93,10 +94,10 @@ def _of_joints(joints: Sequence[str], read: Sequence[Reading], place: int) -> It
                     (number, measured[known, joint, place], expected[known, joint, place])
                 )
         if cycles:
-            yield {"joint": name, **_judged(cycles)}
+            yield {"joint": name, **_judged(cycles, COORDINATES[place])}
 
 
-def _judged(cycles: Sequence[Reading]) -> Row:
+def _judged(cycles: Sequence[Reading], coordinate: str) -> Row:
     """Slope of measured on expected motion of a joint, and what it tells.
 
     Each cycle is judged too: in all together, one that is flipped cancels another.
@@ -111,6 +112,8 @@ def _judged(cycles: Sequence[Reading]) -> Row:
     elif certain == 0:
         verdict, told = "undecided", UNDECIDED if len(measured) > 1 else ONE_READING
         told = told if np.isfinite(expected).all() else NO_POSE
+    elif size := implausible(slope, coordinate):
+        verdict, told = "implausible", size
     return {
         "readings": len(measured),
         "measured_over_expected": slope,

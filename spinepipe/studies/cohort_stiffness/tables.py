@@ -232,8 +232,8 @@ POOLING = Table(
 
 SIGN_CHECKS = Table(
     "sign_checks",
-    "Does each joint move with the load? One row per specimen, test and joint, in the loaded "
-    "coordinate; a sign flipped in the measurement shows here.",
+    "Does each joint move with the load, and as far as a joint can? One row per specimen, test and "
+    "joint, in the loaded coordinate; a flipped sign and a wrong unit show here.",
     ("specimen", "test", "joint"),
     (
         SPECIMEN,
@@ -259,8 +259,9 @@ SIGN_CHECKS = Table(
             "verdict",
             "text",
             "what it looks like; flipped: in all readings together, or in a "
-            "cycle that message names",
-            allowed=("as_expected", "flipped", "undecided"),
+            "cycle that message names; implausible: more than five times, or less than a fifth, of "
+            "what published stiffness gives",
+            allowed=("as_expected", "flipped", "implausible", "undecided"),
         ),
         MESSAGE,
     ),

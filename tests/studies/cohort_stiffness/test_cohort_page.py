@@ -152,6 +152,15 @@ def test_errors_and_spreads_have_their_numbers() -> None:
     assert any("flexion–extension 51.0 N m/rad (of joints beyond that 1.16)" in s for s in one)
 
 
+def test_motion_of_a_wrong_unit_is_told_before_all_else() -> None:
+    signs = tables_of(Size())["sign_checks"]
+    signs["verdict"], signs["message"] = "implausible", "0.0175 times the motion, as radians give"
+    signs["measured_over_expected"] = 0.0175
+    sentence = told(Size(), sign_checks=signs)[0]
+    assert sentence.startswith(f"Look at units first: in {len(signs)} places")
+    assert sentence.endswith(": 0.0175 times the motion, as radians give.")
+
+
 def claim(name: str, holds: str, **numbers: object) -> dict[str, object]:
     """A row of the table of findings."""
     return {

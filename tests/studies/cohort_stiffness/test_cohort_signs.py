@@ -1,5 +1,6 @@
 """Does each joint move with the load? Flipped signs are found, and nowhere else."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -152,3 +153,19 @@ def test_a_whole_test_that_is_flipped_may_be_its_moment(tmp_path: Path) -> None:
     alone = one.write(tmp_path / "one").literature("a")["sign_checks"]
     assert (alone["verdict"] == "flipped").sum() == 1
     assert not alone["message"].str.contains("loads.csv").any()
+
+
+def test_motion_in_radians_is_told_by_its_size(phantom_project: Path, tmp_path: Path) -> None:
+    """The files are sound but for the unit; every loaded joint is told, and the unit named."""
+    root = tmp_path / "project"
+    shutil.copytree(phantom_project, root)
+    file = root / "config" / "cohorts" / "flipped" / "motion.csv"
+    motion = pd.read_csv(file)
+    angles = [column for column in motion.columns if column.endswith("_deg")]
+    motion[angles] = np.deg2rad(motion[angles])
+    motion.to_csv(file, index=False)
+    files = {name: str(tmp_path / name) for name in ("stiffness", "errors", "sign_checks")}
+    literature.run(str(root), STUDY, "s02", **files)
+    found = read_frame(files["sign_checks"])
+    assert set(found["verdict"]) == {"implausible"}
+    assert found["message"].str.contains("angles in radians and not degrees").all()
