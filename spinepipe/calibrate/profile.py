@@ -11,7 +11,7 @@ t limit with the fit's own degrees of freedom, and residuals that share an error
 the standard error.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -40,6 +40,9 @@ NEAR = 0.05
 FURTHEST = 3.0
 """Factor by which one look goes further from the optimum than the one before, at most."""
 
+
+STRAIGHT = 0.1
+"""Share of the rise allowed: where one linear step of the others gains less, its cost is taken."""
 
 INSIDE = 1e-9
 """A descent begins so far inside its bounds."""
@@ -128,7 +131,7 @@ def profile(
     if evaluation.residual is None or evaluation.jacobian is None:
         return Profile(low, high, is_open[0], is_open[1], False)
     optimum = _Optimum(evaluator, x, evaluation.residual, evaluation.jacobian)
-    rises = [_rise(evaluator.problem, evaluation, at_bound, k, noise, level) for k in range(len(x))]
+    rises = _rises(evaluator.problem, evaluation, at_bound, noise, level)
     sides = [(k, r, side) for k, r in enumerate(rises) if r is not None for side in (-1, 1)]
     searches = [partial(_end, optimum, k, rise, side) for k, rise, side in sides]
     ends = in_lockstep(searches, evaluator.together) if searches else []
@@ -139,27 +142,30 @@ def profile(
     return Profile(low, high, is_open[0], is_open[1], lower)
 
 
-def _rise(
-    problem: Problem,
-    evaluation: Evaluation,
-    at_bound: Array,
-    unknown: int,
-    noise: Array | None,
-    level: float,
-) -> _Rise | None:
-    """None where the data hold nothing against any value."""
+def _rises(
+    problem: Problem, evaluation: Evaluation, at_bound: Array, noise: Array | None, level: float
+) -> Iterator[_Rise | None]:
+    """Of each unknown; None where the data hold nothing against any value.
+
+    What is at a bound is held there, but for an unknown's own rise.
+    """
     assert evaluation.jacobian is not None
-    free = np.where(np.arange(len(at_bound)) == unknown, 0, at_bound)
-    found = uncertainty(problem, evaluation, free, np.inf, noise)
-    error = float(found.standard_error[unknown])
-    if not np.isfinite(error) or error == 0.0:
-        return None
-    tail = 0.5 + level / 2.0
-    limit = norm.ppf(tail) if noise is not None else t.ppf(tail, found.degrees_of_freedom)
-    inside = np.flatnonzero(free == 0)
-    left, _ = _not_made(evaluation.jacobian, unknown, inside[inside != unknown])
-    way = float(limit) * error
-    return _Rise(way**2 * float(left @ left), way)
+    alike = uncertainty(problem, evaluation, at_bound, np.inf, noise)
+    for unknown in range(len(at_bound)):
+        free, found = at_bound, alike
+        if at_bound[unknown] != 0:
+            free = np.where(np.arange(len(at_bound)) == unknown, 0, at_bound)
+            found = uncertainty(problem, evaluation, free, np.inf, noise)
+        error = float(found.standard_error[unknown])
+        if not np.isfinite(error) or error == 0.0:
+            yield None
+            continue
+        tail = 0.5 + level / 2.0
+        limit = norm.ppf(tail) if noise is not None else t.ppf(tail, found.degrees_of_freedom)
+        inside = np.flatnonzero(free == 0)
+        left, _ = _not_made(evaluation.jacobian, unknown, inside[inside != unknown])
+        way = float(limit) * error
+        yield _Rise(way**2 * float(left @ left), way)
 
 
 def _not_made(jacobian: Array, unknown: int, others: Indices) -> tuple[Array, Array]:
@@ -183,7 +189,7 @@ def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _En
         if side * (value - origin) <= 0.0:
             return _End(bound, True, least)  # at the bound from the start
         start = optimum.x + (value - origin) * direction
-        found, fitted = _refitted(optimum, unknown, value, (start, there), at)
+        found, fitted = _refitted(optimum, unknown, value, (start, there), rise, at)
         share = (found - cost) / rise.allowed
         least = min(least, share)
         if abs(share - 1.0) <= NEAR:
@@ -223,7 +229,7 @@ def _no_further(value: float, bound: float, side: int) -> float:
 
 
 def _refitted(
-    optimum: _Optimum, unknown: int, value: float, starts: Sequence[Array], at: At
+    optimum: _Optimum, unknown: int, value: float, starts: Sequence[Array], rise: _Rise, at: At
 ) -> tuple[float, Array]:
     """Cost with the unknown held at a value and the others fitted; infinite where nothing stands.
 
@@ -250,9 +256,21 @@ def _refitted(
         found = point(begin)
         if found is None:
             continue
-        if not len(others):
-            return float(found[0] @ found[0]), whole(begin)
+        cost, moved = _one_step(*found, begin)
+        if float(found[0] @ found[0]) - cost <= STRAIGHT * rise.allowed and np.all(
+            (moved >= bounds[0]) & (moved <= bounds[1])
+        ):
+            return cost, whole(moved)
         size, scale = len(optimum.residual), problem.scale[others]
         ended = descend(once(point), begin, bounds, scale, size, ENOUGH)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, optimum.x
+
+
+def _one_step(residual: Array, jacobian: Array, start: Array) -> tuple[float, Array]:
+    """Cost and place that a linear step reaches."""
+    if not len(start):
+        return float(residual @ residual), start
+    step, _ = lstsq(jacobian, -residual)
+    left = residual + jacobian @ step
+    return float(left @ left), start + step

@@ -12,6 +12,7 @@ from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
+    Region,
     criteria,
     independent,
     no_fit,
@@ -25,7 +26,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     origin,
     specimen_tests,
 )
-from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
@@ -85,7 +86,9 @@ def _fit(
             settings, cohort, specimen, representation, tests.frames, chosen, others
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
-        return problem, fit(problem, settings.starts, seed, settings.identifiable_below), ""
+        looked_at = not fitted_to.startswith(ALL_BUT)  # the others only predict what is left out
+        below = settings.identifiable_below
+        return problem, fit(problem, settings.starts, seed, below, profiled=looked_at), ""
     except RefusedModel as error:
         return None, None, str(error)
 
@@ -99,14 +102,19 @@ def _stiffness(
     k = model.effects[0].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
+    region = None if found.profile is None else Region.nowhere(k.shape)
     for index, unknown in enumerate(problem.free):
         at = (list(unknown.rows), unknown.column)
         error[at] = found.uncertainty.standard_error[index]
         known[at] = found.uncertainty.identifiable[index] and usable
         bound[at] = found.at_bound[index]
+        if region is not None and found.profile is not None:
+            region.take(at, found.profile, index, k[at] * np.exp(-found.x[index]))
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
-    rows = stiffness_rows(cohort.joint_names, settings.free, values, error, freedom, known, bound)
+    rows = stiffness_rows(
+        cohort.joint_names, settings.free, values, error, freedom, known, bound, region
+    )
     ended = {"source": "own", "status": found.status.value, "message": found.message}
     return (k if usable else None), [{**row, **ended} for row in rows]
 

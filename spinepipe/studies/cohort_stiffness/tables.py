@@ -51,6 +51,8 @@ def _stiffness(name: str, meaning: str, null: str | None) -> Column:
     return Column(name, "number", meaning, "N/m or N m/rad, see unit", null, low=0.0)
 
 
+_OPEN = "the region is open there, or there is no standard error"
+
 STIFFNESS = Table(
     "stiffness",
     "Stiffness: one row per specimen, representation, load cases fitted to, source, joint and "
@@ -73,15 +75,26 @@ STIFFNESS = Table(
         ),
         _stiffness(
             "low",
-            "lower end of the 95 % interval, of the logarithm: Student's t for fits "
-            "of one specimen and for new specimens, normal for specimens of a pooled fit",
-            "no standard error",
+            "lower end of the 95 % region: all other stiffnesses fitted anew (profile likelihood); "
+            "of fits to all load cases but one, pooled fits and new specimens an interval of the "
+            "logarithm",
+            _OPEN,
         ),
-        _stiffness("high", "upper end of the 95 % interval", "no standard error"),
+        _stiffness("high", "upper end of the 95 % region", _OPEN),
+        *(
+            Column(
+                f"open_{side}",
+                "flag",
+                f"whether the region reaches the {which} bound of the fit",
+                null="no region was looked for",
+            )
+            for side, which in (("below", "lower"), ("above", "upper"))
+        ),
         Column(
             "identifiable",
             "flag",
-            "whether the data constrain this stiffness; where false do not believe it. Of a "
+            "whether the data hold this stiffness: its standard error is small and its region "
+            "open at neither bound; where false do not believe it. Of a "
             "pooled fit: whether its own readings do, more than the cohort",
             null=LITERATURE,
         ),
