@@ -30,9 +30,9 @@ def _moment(axis: str) -> Parameter:
     )
 
 
-def _force(direction: str) -> Parameter:
+def _force(direction: str, name: str = "force") -> Parameter:
     return Parameter(
-        name="force",
+        name=name,
         unit="N",
         low=-LARGEST_N,
         high=LARGEST_N,
@@ -45,6 +45,9 @@ def _force(direction: str) -> Parameter:
 
 
 _MOMENTS = tuple(map(_moment, "xyz"))
+_FORCES = tuple(_force(direction, f"force_{direction}") for direction in TRANSLATIONS)
+
+MOMENT, FORCE = "moment", "force"
 
 
 @register("load_offset")
@@ -52,18 +55,20 @@ _MOMENTS = tuple(map(_moment, "xyz"))
 class LoadOffset(DeadLoad):
     """A load fixed in ground on the most cranial vertebra in scope, in every step; off at 0.
 
-    Without a coordinate a moment; with one (a translation) a force at the vertebra's centre along
-    the ground axis that points that way: anterior x, superior y, right z. It acts in unloaded
-    steps too: all motion is from the pose without it.
+    A moment, or a force at the vertebra's centre: with a coordinate (a translation) along the
+    ground axis that points that way, anterior x, superior y, right z, else in any direction, as a
+    cable pulls that was not listed. It acts in unloaded steps too: all motion is from the pose
+    without it.
     """
 
     coordinate: str | None = None
+    applies: str = MOMENT
 
     name: ClassVar[str] = "load_offset"
     kind: ClassVar[Kind] = Kind.LOAD
     per_joint: ClassVar[bool] = False
     trial: ClassVar[Trial] = Trial(
-        variants=({}, *({"coordinate": c} for c in TRANSLATIONS)),
+        variants=({}, {"applies": FORCE}, *({"coordinate": c} for c in TRANSLATIONS)),
         spreads=(Spread.SHARED, Spread.BY_SPECIMEN, Spread.BY_TEST),
         told_by="readings not zeroed at the unloaded step; if zeroed, a joint that is not linear, "
         "or loads large enough to turn the vertebrae in the moment",
@@ -72,11 +77,14 @@ class LoadOffset(DeadLoad):
     def __post_init__(self) -> None:
         if self.coordinate is not None:
             require(self.name, "coordinate", self.coordinate, TRANSLATIONS)
+        require(self.name, "applies", self.applies, (MOMENT, FORCE))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Three components of the moment, or the force."""
-        return _MOMENTS if self.coordinate is None else (_force(self.coordinate),)
+        """Three components of the moment or the force, or the force in one direction."""
+        if self.coordinate is not None:
+            return (_force(self.coordinate),)
+        return _MOMENTS if self.applies == MOMENT else _FORCES
 
     def wrenches(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
@@ -85,10 +93,10 @@ class LoadOffset(DeadLoad):
         top = int(joints.max())
         zeros = np.zeros((*parameters.shape[:-1], 1, 3))
         bodies = np.full(zeros.shape[:-1], top)
-        if self.coordinate is None:
+        if self._is_moment:
             return Wrenches(bodies, zeros, zeros, parameters[..., None, :])
         points = np.broadcast_to(centres(neutral)[..., [top], :], zeros.shape)
-        return Wrenches(bodies, points, parameters[..., None] * self._axis, zeros)
+        return Wrenches(bodies, points, (parameters @ self._axes.T)[..., None, :], zeros)
 
     def slopes(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
@@ -96,11 +104,17 @@ class LoadOffset(DeadLoad):
         """The load itself is what the parameters are."""
         shape = (*parameters.shape[:-1], 1, 3, parameters.shape[-1])
         zeros = np.zeros(shape)
-        if self.coordinate is None:
+        if self._is_moment:
             return WrenchSlopes(zeros, np.broadcast_to(np.eye(3), shape))
-        return WrenchSlopes(np.broadcast_to(self._axis[:, None], shape), zeros)
+        return WrenchSlopes(np.broadcast_to(self._axes, shape), zeros)
 
     @property
-    def _axis(self) -> Array:
-        """(3,) of ground; of a force alone."""
-        return np.eye(3)[TRANSLATIONS.index(str(self.coordinate))]
+    def _is_moment(self) -> bool:
+        return self.coordinate is None and self.applies == MOMENT
+
+    @property
+    def _axes(self) -> Array:
+        """(3, P) directions in ground of the components of a force."""
+        if self.coordinate is None:
+            return np.eye(3)
+        return np.eye(3)[:, [TRANSLATIONS.index(self.coordinate)]]

@@ -38,6 +38,7 @@ EFFECTS = {
     "gain": ("load_gain", {}, (0.05,)),
     "offset": ("load_offset", {}, (0.3, -0.2, 0.4)),
     "force offset": ("load_offset", {"coordinate": "right"}, (8.0,)),
+    "cable": ("load_offset", {"applies": "force"}, (8.0, -3.0, 5.0)),
 }
 
 
@@ -309,6 +310,11 @@ def test_a_force_offset_is_one_more_force_at_the_centre_of_the_top() -> None:
     point, force = model.bodies[TOP].com, np.array([0.0, 0.0, 8.0])
     case = with_wrenches(loaded(model), lambda w: (*w, Wrench(TOP, point, force, NOWHERE)))
     assert_same_motion("force offset", instead=system_with(case=case))
+    cable = np.array([8.0, -3.0, 5.0])
+    case = with_wrenches(loaded(model), lambda w: (*w, Wrench(TOP, point, cable, NOWHERE)))
+    assert_same_motion("cable", instead=system_with(case=case))
+    with pytest.raises(ValueError, match="applies 'pull' is not one of moment, force"):
+        create("load_offset", {"applies": "pull"})
     with pytest.raises(ValueError, match="coordinate 'extension' is not one of anterior"):
         create("load_offset", {"coordinate": "extension"})
 

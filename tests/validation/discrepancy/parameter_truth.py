@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from spinepipe.units import TRANSLATIONS
+
 Hidden = Mapping[str, Any]
 Options = Mapping[str, Any]
 Values = dict[str, float]
-
-TRANSLATIONS = ("anterior", "superior", "right")
 
 FACET_REFERENCE = {"rad": float(np.deg2rad(2.0)), "m": 5e-4}
 """How far beyond the gap spinepipe states the stiffness of a stop."""
@@ -133,14 +133,26 @@ def _weight(hidden: Hidden, options: Options) -> Values | None:
 
 
 def _follower(hidden: Hidden, options: Options) -> Values | None:
-    same = options["guides"] == "centres" and formula(hidden, "centres") == "centres"
-    return {"force": hidden["strength"]} if same else None
+    """Of the cable behind the joints too: it is our own family."""
+    if options["guides"] != "centres":
+        return None
+    behind = formula(hidden, "centres") == "behind"
+    return {"force": hidden["strength"], "anterior": -BEHIND_M if behind else 0.0}
+
+
+BEHIND_M = 0.008
+"""How far behind the centres the hidden cable runs."""
 
 
 def _offset(hidden: Hidden, options: Options) -> Values | None:
-    if formula(hidden, "moment") != "moment":
+    """A moment, or the force of a cable: sideways, as large as makes the moment at 0.1 m."""
+    cable = formula(hidden, "moment") == "cable"
+    if cable != (options.get("applies") == "force"):
         return None
     moment = hidden["strength"] * np.array(hidden["shape"]["axis"])
+    if cable:
+        force = np.array([-moment[2], 0.0, moment[0]]) / 0.1
+        return {f"force_{name}": float(f) for name, f in zip(TRANSLATIONS, force, strict=True)}
     return {f"moment_{axis}": float(one) for axis, one in zip("xyz", moment, strict=True)}
 
 
