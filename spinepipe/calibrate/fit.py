@@ -32,6 +32,8 @@ TIPPED = "no stable equilibrium up to the upper bounds: the loads tip the segmen
 
 AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
 
+BETTER = "beside the optimum there is a lower cost: more starts are needed"
+
 AT_BOUND = 1e-6
 
 ROUNDING = 1e-12
@@ -139,9 +141,11 @@ def fit(
     optima = _on_record(evaluator, in_lockstep(descents, evaluator.together))
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
-    region = None
+    evaluations, region, message = evaluator.evaluations, None, best.message
     if profiled and best.status.usable:
         region = profile(evaluator, best.x, best.evaluation, best.at_bound, noise)
+        if region.lower_cost:
+            message = "; ".join(one for one in (message, BETTER) if one)
     return Fit(
         x=best.x,
         values=values(problem, best.x),
@@ -149,9 +153,9 @@ def fit(
         uncertainty=found,
         cost=best.cost,
         status=best.status,
-        message=best.message,
+        message=message,
         iterations=best.iterations,
-        evaluations=evaluator.evaluations,
+        evaluations=evaluations,
         n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
         cases=evaluator.problem.cases,

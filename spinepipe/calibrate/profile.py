@@ -34,8 +34,11 @@ ENOUGH = Settled(cost=1e-6, step=1e-5, slope=1e-14, evaluations=30)
 MOST_FITS = 8
 """Of the others, per end."""
 
+AFAR = 3
+"""Looks that have not found an end; then the bound itself is looked at, as costs may level off."""
+
 NEAR = 0.05
-"""Share of the rise allowed within which an end is found: a fortieth of the way to it."""
+"""Share of the rise allowed within which an end is found."""
 
 FURTHEST = 3.0
 """Factor by which one look goes further from the optimum than the one before, at most."""
@@ -56,7 +59,8 @@ class Profile:
     ----------
     low, high : (m,) ends as moves from the model's values, the bound where an end is open.
     open_below, open_above : (m,) bool; the data allow the bound and what may lie beyond.
-    lower_cost : whether a fit on the way had a lower cost than the optimum: there is a better one.
+    lower_cost : whether a fit on the way had a lower cost than the optimum: there is a better one,
+        and no region around this one tells.
     """
 
     low: Array
@@ -67,8 +71,8 @@ class Profile:
 
     @property
     def closed(self) -> NDArray[np.bool_]:
-        """(m,) which unknowns have both ends inside their bounds."""
-        return ~(self.open_below | self.open_above)
+        """(m,) which unknowns have both ends inside their bounds, about an optimum that is one."""
+        return ~(self.open_below | self.open_above | self.lower_cost)
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,7 @@ def profile(
     ----------
     x, evaluation, at_bound : the optimum. noise : as in `uncertainty`.
     """
+    evaluator.forget()  # or regions would hang on where other starts have been
     low, high = evaluator.problem.lower.copy(), evaluator.problem.upper.copy()
     is_open = np.ones((2, len(x)), dtype=bool)
     if evaluation.residual is None or evaluation.jacobian is None:
@@ -157,7 +162,7 @@ def _rises(
             free = np.where(np.arange(len(at_bound)) == unknown, 0, at_bound)
             found = uncertainty(problem, evaluation, free, np.inf, noise)
         error = float(found.standard_error[unknown])
-        if not np.isfinite(error) or error == 0.0:
+        if not np.isfinite(error):
             yield None
             continue
         tail = 0.5 + level / 2.0
@@ -182,26 +187,29 @@ def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _En
     problem, origin = optimum.evaluator.problem, float(optimum.x[unknown])
     bound = float((problem.lower if side < 0 else problem.upper)[unknown])
     cost = float(optimum.residual @ optimum.residual)
+    if side * (bound - origin) <= 0.0:
+        return _End(bound, True, 0.0)
+    if rise.allowed == 0.0:
+        return _End(origin, False, 0.0)  # exact readings allow nothing
     inner, outer, least = (origin, 0.0), None, 0.0
     value = _no_further(origin + side * rise.way, bound, side)
     direction, there = optimum.follow(unknown), optimum.x
-    for _ in range(MOST_FITS):
-        if side * (value - origin) <= 0.0:
-            return _End(bound, True, least)  # at the bound from the start
+    for number in range(1, MOST_FITS + 1):
         start = optimum.x + (value - origin) * direction
         found, fitted = _refitted(optimum, unknown, value, (start, there), rise, at)
         share = (found - cost) / rise.allowed
         least = min(least, share)
-        if abs(share - 1.0) <= NEAR:
+        if share < 1.0 and value == bound:
+            return _End(bound, True, least)
+        if abs(share - 1.0) <= NEAR and (share >= 1.0 or outer is not None):
             return _End(value, False, least)
         if share > 1.0:
             outer = (value, share)
-        elif value == bound:
-            return _End(bound, True, least)
         else:
             inner, there = (value, share), fitted
             direction = (fitted - optimum.x) / (value - origin)
-        value = _next(origin, inner, outer, bound, side)
+        far = outer is None and number >= AFAR
+        value = bound if far else _next(origin, inner, outer, bound, side)
     return _End(bound, True, least) if outer is None else _End(value, False, least)
 
 

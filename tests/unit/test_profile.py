@@ -113,6 +113,26 @@ def test_a_joint_too_stiff_for_its_readings_is_open_above() -> None:
     assert seen.low[0] < found.x[0]
 
 
+def test_exact_readings_leave_no_room() -> None:
+    """No scatter, no region: both ends are the fitted value."""
+    seen = region(fit(one_spring(MOMENTS_NM / 60.0, 8.0), profiled=True))
+    assert seen.closed.all()
+    np.testing.assert_allclose(seen.high - seen.low, 0.0, atol=1e-6)
+
+
+def test_a_cost_that_rises_slowly_is_followed_to_its_end() -> None:
+    """The upper end lies 20 times as far as the error says: 1 / k comes close to zero there."""
+    theta = noisy(2, 240.0)
+    size = float(MOMENTS_NM @ MOMENTS_NM)
+    u = float(MOMENTS_NM @ theta) / size
+    scatter = np.sqrt(np.sum((theta - MOMENTS_NM * u) ** 2) / (len(theta) - 1))
+    way = stats.t.ppf(0.975, len(theta) - 1) * scatter / np.sqrt(size)
+    problem = one_spring(MOMENTS_NM * (1.02 * way) + theta - MOMENTS_NM * u, 12.0)
+    seen = region(fit(problem, profiled=True))
+    assert not seen.open_above[0]
+    assert compliances(problem, seen.high)[0] == pytest.approx(0.02 * way, abs=SLACK * way)
+
+
 def test_an_unknown_without_trace_is_open_on_both_sides() -> None:
     problem = one_spring(noisy(0, 60.0), 3.0)
     more = free_parameters(

@@ -5,10 +5,12 @@
 
 import sys
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
+from spinepipe.studies.cohort_stiffness.claims import HOLDS
 from spinepipe.studies.tracking.tables import LIMIT
 from tests.validation import (
     coverage,
@@ -149,9 +151,7 @@ def _findings() -> None:
     found = findings.tables()
     rows = found["findings"]
     told = rows.groupby(["finding", "law"], sort=False).agg(
-        yes=("holds", lambda held: int((held == "yes").sum())),
-        no=("holds", lambda held: int((held == "no").sum())),
-        undecided=("holds", lambda held: int((held == "undecided").sum())),
+        **{word: ("holds", partial(_count, word)) for word in HOLDS},
         median_value=("value", "median"),
         lowest=("value", "min"),
         highest=("value", "max"),
@@ -164,6 +164,10 @@ def _findings() -> None:
         f"stiffening truth. No sign was flipped in the data; sign checks say: {signs}."
     )
     _write("findings", head, told.reset_index())
+
+
+def _count(word: str, held: pd.Series) -> int:
+    return int((held == word).sum())
 
 
 def _write(name: str, head: str, rows: pd.DataFrame) -> None:

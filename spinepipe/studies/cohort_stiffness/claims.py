@@ -18,6 +18,10 @@ HOLDS = (*DECIDED, UNDECIDED, NOT_ASKED, CIRCULAR)
 """What may be said of a claim."""
 
 
+BY_CONSTRUCTION = "by_construction"
+"""Marks a row whose claim is no test: fitted to the readings it is judged by."""
+
+
 @dataclass(frozen=True)
 class Claim:
     """What is claimed; see the columns of table ``findings``."""

@@ -3,7 +3,7 @@
 The errors that are compared stand first, then the claims, then how they are decided.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import pandas as pd
 
 from spinepipe.statistics import wilcoxon_signed_rank
 from spinepipe.studies.cohort_stiffness.claims import (
+    BY_CONSTRUCTION,
     CIRCULAR,
     FACTORS,
     NO_SUCH_FITS,
@@ -224,8 +225,10 @@ def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) 
     lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
     note = joined(_note(pair, unit), OWN_READINGS if comparison.own_readings else "", lost)
     row = _against(claim, results, asked, significance, note)
-    by_construction = comparison.own_readings and row["holds"] == "yes"
-    return row | {"holds": CIRCULAR} if by_construction else row
+    if not comparison.own_readings:
+        return row
+    holds = CIRCULAR if row["holds"] == "yes" else row["holds"]
+    return row | {"holds": holds, BY_CONSTRUCTION: True}
 
 
 def every_level(
@@ -233,22 +236,31 @@ def every_level(
 ) -> Row:
     """Decided where it is at every joint: yes where the ratio of levels is worse at all."""
     of: dict[str, list[str]] = {"yes": [], "no": [], "undecided": []}
-    values = []
+    rows = []
     for joint in errors["joint"].unique():
         here = [table[table["joint"] == joint] for table in (ratio, uniform, errors)]
         results = _results(*here)
         row = _against(EVERY_LEVEL, results, measured_specimens(here[2]), significance)
         of[row["holds"]].append(str(joint))
-        values.append(row["value"])
-    if not any(value is not None for value in values):
+        rows.append(row)
+    if all(row["value"] is None for row in rows):
         return _nothing(EVERY_LEVEL, ratio, uniform)
     told = f"better at: {listed(of['no'])}; undecided at: {listed(of['undecided'])}"
     sides = {RATIO.words: specimen_rms(ratio, errors)}
     sides |= {UNIFORM.words: specimen_rms(uniform, errors)}
     lost = _lost(sides, measured_specimens(errors))
-    message = joined(f"of {len(values)} joints; {told}", lost)
+    message = joined(f"of {len(rows)} joints; {told}", lost)
     holds = "undecided" if of["undecided"] else "no" if of["no"] else "yes"
-    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])))
+    p, specimens = _of_all_levels(rows, holds)
+    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])), p=p, specimens=specimens)
+
+
+def _of_all_levels(rows: Sequence[Row], holds: str) -> tuple[float | None, int]:
+    """p that all joints are worse, or that one is better (Bonferroni); the fewest specimens."""
+    decided = [row for row in rows if row["p"] is not None and row["holds"] == holds]
+    ps = [row["p"] for row in decided]
+    p = None if not ps else max(ps) if holds == "yes" else min(1.0, len(rows) * min(ps))
+    return (p if holds != "undecided" else None), min(row["specimens"] for row in decided or rows)
 
 
 def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:
@@ -376,6 +388,6 @@ def _errors_differ(claim: Claim, tests: pd.DataFrame, significance: float) -> Ro
         return claim.unknown(joined(*tests["message"].unique()))
     p = float(known["p_holm"].min())
     below = known.loc[known["p_holm"] < significance, "stratum"]
-    message = f"significant under: {listed(list(below))}; {len(known)} load cases; no interval"
+    message = f"by itself under: {listed(list(below))}; {len(known)} load cases; no interval"
     value = float(known["effect"].max())
     return claim.row("yes" if p < significance else "undecided", message, value, None, p)

@@ -87,7 +87,7 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
     absent = below == 0 and explained < LITTLE_DEG
     holds = "yes" if p < significance else "no" if absent else "undecided"
     found = (
-        f"{below} of {n} specimens; p combined over specimens decides; separate fits explain "
+        f"{below} of {n} specimens; p is combined over specimens; separate fits explain "
         f"{100 * explained:.2g} % of the squares, adjusted for their unknowns"
     )
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""

@@ -7,7 +7,7 @@ would be decided by chance alone, so p is corrected for their number (Holm 1979)
 from collections.abc import Iterator, Sequence
 
 from spinepipe.statistics import corrected
-from spinepipe.studies.cohort_stiffness.claims import CIRCULAR, DECIDED, UNDECIDED, Row
+from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, DECIDED, UNDECIDED, Row
 from spinepipe.tables.shared import joined
 
 FEWEST = 3
@@ -21,7 +21,7 @@ def together(rows: Sequence[Row], specimens: int, significance: float) -> Iterat
     ----------
     specimens : in the study. significance : p below which a test decides.
     """
-    tests = [None if row["holds"] == CIRCULAR else row["p"] for row in rows]
+    tests = [None if row.get(BY_CONSTRUCTION) else row["p"] for row in rows]
     for row, p_holm in zip(rows, corrected(tests, "holm"), strict=True):
         row = row | {"p_holm": p_holm}
         why = _why_not(row, specimens, significance)

@@ -26,7 +26,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     origin,
     specimen_tests,
 )
-from spinepipe.studies.cohort_stiffness.settings import ALL_BUT, CohortStiffness
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
@@ -86,9 +86,8 @@ def _fit(
             settings, cohort, specimen, representation, tests.frames, chosen, others
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
-        looked_at = not fitted_to.startswith(ALL_BUT)  # the others only predict what is left out
         below = settings.identifiable_below
-        return problem, fit(problem, settings.starts, seed, below, profiled=looked_at), ""
+        return problem, fit(problem, settings.starts, seed, below, profiled=True), ""
     except RefusedModel as error:
         return None, None, str(error)
 
@@ -106,7 +105,7 @@ def _stiffness(
     for index, unknown in enumerate(problem.free):
         at = (list(unknown.rows), unknown.column)
         error[at] = found.uncertainty.standard_error[index]
-        known[at] = found.uncertainty.identifiable[index] and usable
+        known[at] = found.uncertainty.identifiable[index] and _closed(found, index)
         bound[at] = found.at_bound[index]
         if region is not None and found.profile is not None:
             region.take(at, found.profile, index, k[at] * np.exp(-found.x[index]))
@@ -117,6 +116,10 @@ def _stiffness(
     )
     ended = {"source": "own", "status": found.status.value, "message": found.message}
     return (k if usable else None), [{**row, **ended} for row in rows]
+
+
+def _closed(found: Fit, index: int) -> bool:
+    return found.profile is not None and bool(found.profile.closed[index])
 
 
 def _record(problem: Problem, found: Fit) -> Row:

@@ -71,8 +71,7 @@ def stiffness_rows(
     values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
         where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
     degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
-    region : by profile likelihood, in the place of the intervals; what it leaves open is not
-        identifiable.
+    region : by profile likelihood, in the place of the intervals.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
@@ -80,8 +79,6 @@ def stiffness_rows(
         for name in free:
             at = row, COORDINATES.index(name)
             ends = NO_REGION if region is None else region.row(at)
-            held = identifiable is not None and bool(identifiable[at])
-            closed = not (ends["open_below"] or ends["open_above"])
             rows.append(
                 {
                     "joint": joint,
@@ -89,7 +86,7 @@ def stiffness_rows(
                     "unit": STIFFNESS_UNITS[name],
                     **interval(values[at], log_error[at], reach),
                     **ends,
-                    "identifiable": None if identifiable is None else held and closed,
+                    "identifiable": None if identifiable is None else bool(identifiable[at]),
                     "at_bound": _BOUND[int(at_bound[at])],
                 }
             )

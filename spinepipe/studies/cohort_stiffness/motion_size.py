@@ -5,6 +5,7 @@ Table 2). Motion that differs from what published stiffness gives by more than f
 that was measured before: a joint that is fused or cut, or a unit.
 """
 
+from collections.abc import Sequence
 from math import log, pi
 
 from spinepipe.units import TRANSLATIONS
@@ -32,13 +33,21 @@ _OF_ANGLES = {
 }
 
 
-def implausible(slope: float | None, coordinate: str) -> str:
+def implausible(slope: float | None) -> str:
     """What is wrong with measured over expected motion, in words; nothing where it may be right."""
     if slope is None or slope <= 0.0 or 1.0 / PLAUSIBLE <= slope <= PLAUSIBLE:
         return ""
-    told = f"{slope:.3g} times the motion that published stiffness gives"
+    return f"{slope:.3g} times the motion that published stiffness gives"
+
+
+def unit_of(slopes: Sequence[float], coordinate: str) -> str:
+    """The unit that explains the motion of all joints of a test, in words; nothing if none does.
+
+    One joint alone may be fused or cut; a unit is of all.
+    """
+    if not slopes or not all(implausible(slope) for slope in slopes):
+        return ""
+    middle = sum(map(log, slopes)) / len(slopes)
     known = _OF_FORCES if coordinate in TRANSLATIONS else _OF_ANGLES | _OF_LOADS
-    factor = min(known, key=lambda one: abs(log(slope / one)))
-    if abs(log(slope / factor)) > log(LIKE):
-        return f"{told}: no unit explains it; a joint that is fused or cut may"
-    return f"{told}, as {known[factor]} would give ({factor:.3g})"
+    factor = min(known, key=lambda one: abs(middle - log(one)))
+    return f"{known[factor]} ({factor:.3g})" if abs(middle - log(factor)) <= log(LIKE) else ""

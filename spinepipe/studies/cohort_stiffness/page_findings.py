@@ -80,8 +80,9 @@ def _sizes(implausible: pd.DataFrame) -> Iterator[str]:
     where = "1 place" if len(implausible) == 1 else f"{len(implausible)} places"
     first = implausible.iloc[int((slopes - slopes.median()).abs().argmin())]
     yield (
-        f"Look at units first: in {where} the measured motion is {number(slopes.min())} to "
-        f"{number(slopes.max())} times the expected one. {first['specimen']} {first['joint']} in "
+        f"Look at units too: in {where} the measured motion is less than a fifth of the expected "
+        f"one, or more than five times ({number(slopes.min())} to {number(slopes.max())}). "
+        f"{first['specimen']} {first['joint']} in "
         f"{case(first['test']).lower()}: {first['message']}."
     )
 

@@ -105,7 +105,7 @@ class CohortStiffness(Study):
         gt=0,
         le=100,
         description="a stiffness is identifiable when the standard error of its natural "
-        "logarithm is below this",
+        "logarithm is below this, and its region is open at neither bound",
     )
     cross_validation: CrossValidation = Field(
         default_factory=CrossValidation, description="what is held out"

@@ -11,9 +11,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
-from spinepipe.studies.cohort_stiffness.motion_size import implausible
+from spinepipe.studies.cohort_stiffness.motion_size import implausible, unit_of
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven
+from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
@@ -66,8 +67,18 @@ def sign_rows(
         found = list(_of_joints(cohort.joint_names, read, COORDINATES.index(loaded)))
         if all(row["verdict"] == "flipped" for row in found):
             found = [{**row, "message": f"{row['message']}; {ALL_FLIPPED}"} for row in found]
-        rows += [{"test": test, "coordinate": loaded, **row} for row in found]
+        rows += [{"test": test, "coordinate": loaded, **row} for row in _with_units(found, loaded)]
     return rows
+
+
+def _with_units(found: Sequence[Row], loaded: str) -> Iterator[Row]:
+    """Rows of a test; those of a wrong size with what may be behind it."""
+    slopes = [row["measured_over_expected"] for row in found if row["verdict"] != "undecided"]
+    unit = unit_of([slope for slope in slopes if slope is not None], loaded)
+    why = f"as {unit} would give" if unit else "a joint that is fused or cut, or a wrong unit"
+    for row in found:
+        wrong = row["verdict"] == "implausible"
+        yield {**row, "message": joined(row["message"], why)} if wrong else row
 
 
 def _independent(one: MeasuredCycle, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:
@@ -94,10 +105,10 @@ def _of_joints(joints: Sequence[str], read: Sequence[Reading], place: int) -> It
                     (number, measured[known, joint, place], expected[known, joint, place])
                 )
         if cycles:
-            yield {"joint": name, **_judged(cycles, COORDINATES[place])}
+            yield {"joint": name, **_judged(cycles)}
 
 
-def _judged(cycles: Sequence[Reading], coordinate: str) -> Row:
+def _judged(cycles: Sequence[Reading]) -> Row:
     """Slope of measured on expected motion of a joint, and what it tells.
 
     Each cycle is judged too: in all together, one that is flipped cancels another.
@@ -112,7 +123,7 @@ def _judged(cycles: Sequence[Reading], coordinate: str) -> Row:
     elif certain == 0:
         verdict, told = "undecided", UNDECIDED if len(measured) > 1 else ONE_READING
         told = told if np.isfinite(expected).all() else NO_POSE
-    elif size := implausible(slope, coordinate):
+    elif size := implausible(slope):
         verdict, told = "implausible", size
     return {
         "readings": len(measured),

@@ -76,8 +76,7 @@ STIFFNESS = Table(
         _stiffness(
             "low",
             "lower end of the 95 % region: all other stiffnesses fitted anew (profile likelihood); "
-            "of fits to all load cases but one, pooled fits and new specimens an interval of the "
-            "logarithm",
+            "of pooled fits and new specimens an interval of the logarithm",
             _OPEN,
         ),
         _stiffness("high", "upper end of the 95 % region", _OPEN),
@@ -425,7 +424,7 @@ FINDINGS = Table(
             "holds",
             "text",
             "yes: p_holm below the study's significance, on the claimed side; no: as sure, on the "
-            "other side, or surely too little to matter; undecided: this cohort cannot tell, as "
+            "other side, or by itself too little to matter; undecided: this cohort cannot tell, as "
             "with fewer than 3 specimens; circular: true by construction, fitted to the readings "
             "it is judged by; not_asked: the study leaves it out",
             allowed=HOLDS,

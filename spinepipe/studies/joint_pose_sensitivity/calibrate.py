@@ -116,7 +116,7 @@ def _region(name: str, value: float, found: Fit, index: int) -> dict[str, Any]:
         None if above else high,
         below,
         above,
-        steep and not below and not above,
+        steep and bool(region.closed[index]),
     )
     return dict(zip(region_columns(name), cells, strict=True))
 

@@ -17,6 +17,9 @@ from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
+FOLDED = 5.0
+"""Percent by which the interaction of sizes must be larger for folding to be named."""
+
 FEWEST_FOR_SPREAD = 3
 """Quartiles of fewer fits say nothing of a spread: those of a single one never differ."""
 
@@ -112,7 +115,7 @@ def _together(done: pd.DataFrame) -> str:
     """What pose and stiffness do only together, of errors and of their sizes."""
     rows = done[done["factor"] == "interaction"]
     signed, size = (100.0 * float(rows[c].median()) for c in ("signed_share", "share"))
-    folded = ": taking sizes folds errors at zero" if size > signed else ""
+    folded = ": sizes fold errors at zero" if size > signed + FOLDED else ""
     return (
         f"What they do only together takes {fixed(signed, 0)} % of the variance of an error "
         f"(median), and {fixed(size, 0)} % of that of its size{folded}."

@@ -26,7 +26,7 @@ def stiffness(study: JointPoseSensitivity, results: Results) -> str:
     solved = _reduced(results)
     is_open = chosen["open_share"].astype(float) > MOSTLY
     held = [
-        _medians(part, chosen) + _doubt(solved, str(name))
+        _medians(part, chosen) + _doubt(solved, str(name), part)
         for name, part in chosen[~is_open].groupby("coordinate", sort=False)
     ]
     not_held = [
@@ -105,11 +105,12 @@ def _place(row: pd.Series, part: pd.DataFrame) -> str:
     return " ".join(words)
 
 
-def _doubt(solved: pd.DataFrame, name: str) -> str:
+def _doubt(solved: pd.DataFrame, name: str, part: pd.DataFrame) -> str:
     """The share of fitted values that the data do not hold, where there are any."""
     if solved.empty:
         return ""
-    flags = solved[f"{name}_identifiable"].dropna()
+    own = solved.merge(part[["specimen", "joint"]].drop_duplicates())
+    flags = own[f"{name}_identifiable"].dropna()
     lost = int((~flags.astype(bool)).sum())
     if not lost:
         return ""

@@ -190,7 +190,7 @@ class Calibration(BaseModel):
         gt=0,
         le=100,
         description="a stiffness is identifiable when the standard error of its natural "
-        "logarithm is below this",
+        "logarithm is below this, and its region is open at neither bound",
     )
 
 

@@ -137,6 +137,10 @@ def _stiffness_rows(
             yield row | _regions(rows, name)
 
 
+FEW_OPEN_BELOW = 0.1
+"""Share of fits without a lower end up to which the others' lower ends speak for all."""
+
+
 def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
     """Share of fits whose region is open, and the spread of lower ends; of fits with regions."""
     _, low, _, below, above, _ = region_columns(name)
@@ -146,8 +150,11 @@ def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
     if known.empty:
         return {}
     is_open = known[below].astype(bool) | known[above].astype(bool)
+    few_below = known[below].astype(bool).mean() <= FEW_OPEN_BELOW
     ends = known[low].dropna().to_numpy(float)
-    quartiles = np.percentile(ends, [25, 50, 75]).tolist() if len(ends) else [None] * 3
+    quartiles = [None] * 3
+    if few_below and len(ends):
+        quartiles = np.percentile(ends, [25, 50, 75]).tolist()
     return {"open_share": float(is_open.mean()), **dict(zip(LOWER_ENDS, quartiles, strict=True))}
 
 

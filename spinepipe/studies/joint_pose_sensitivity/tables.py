@@ -82,7 +82,7 @@ def _calibration_columns() -> tuple[Column, ...]:
                     "number",
                     f"{which} end of the stiffness' 95 % region, all others fitted anew",
                     unit,
-                    null="held fixed, or open: the data allow the bound and what is beyond",
+                    null="held fixed, no stiffness was found, or open: the data allow the bound",
                     low=0.0,
                 )
                 for end, which in ((low, "lower"), (high, "upper"))
@@ -263,7 +263,7 @@ VARIANCE_SHARES = Table(
         _share("share_low", "lower end of its 95 % interval"),
         _share("share_high", "upper end of its 95 % interval"),
         _share("total", "share with the interaction added: what fixing all else would leave"),
-        _share("signed_share", "share of the variance of the error with its sign"),
+        _share("signed_share", "share of the variance of the error along the measured motion"),
         _share("signed_share_low", "lower end of its 95 % interval"),
         _share("signed_share_high", "upper end of its 95 % interval"),
         Column("n_poses", "integer", "joint poses in the grid", low=0),

@@ -142,6 +142,7 @@ def _value(name: str, meaning: str) -> Column:
 
 LOWER_ENDS = ("lower_end_low_quartile", "lower_end_median", "lower_end_high_quartile")
 _NO_REGION = "not a stiffness, or fits of a bootstrap, whose regions are not looked for"
+_NO_ENDS = f"{_NO_REGION}, or more than one fit in ten is open below"
 
 SUMMARY = Table(
     "summary",
@@ -200,7 +201,7 @@ SUMMARY = Table(
             high=1.0,
         ),
         *(
-            Column(name, "number", f"{which} of the lower ends of regions", "see unit", _NO_REGION)
+            Column(name, "number", f"{which} of the lower ends of regions", "see unit", _NO_ENDS)
             for name, which in zip(
                 LOWER_ENDS, ("25th percentile", "median", "75th percentile"), strict=True
             )

@@ -29,8 +29,15 @@ def absolute_error(simulations: pd.DataFrame) -> pd.DataFrame:
 
 
 def signed_error(simulations: pd.DataFrame) -> pd.DataFrame:
-    """Mean error over readings, predicted less measured; rows and columns as `absolute_error`."""
-    return _mean_error(simulations, pd.DataFrame.copy)
+    """Mean error along the measured motion; rows and columns as `absolute_error`.
+
+    Above zero a joint moves too far. Which way it is measured to move is that of its mean over
+    all poses in each test, or errors under opposite loads would cancel.
+    """
+    columns = [f"measured_{name}" for name in COORDINATE_COLUMNS]
+    by = [simulations[key] for key in ("specimen", "test", "joint")]
+    way = np.sign(simulations[columns].groupby(by).transform("mean").to_numpy(float))
+    return _mean_error(simulations, lambda errors: errors * way)
 
 
 def _mean_error(

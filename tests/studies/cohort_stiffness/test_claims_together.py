@@ -2,7 +2,7 @@
 
 import pytest
 
-from spinepipe.studies.cohort_stiffness.claims import Claim, Row
+from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, Claim, Row
 from spinepipe.studies.cohort_stiffness.claims_together import together
 
 SIGNIFICANCE = 0.05
@@ -40,7 +40,8 @@ def test_two_specimens_decide_nothing(own: int | None, study: int, holds: str) -
 
 
 def test_what_is_true_by_construction_is_no_test_beside_others() -> None:
-    circular, other = judged(row("circular", 1e-9), row("yes", 0.04))
+    construction = row("circular", 1e-9) | {BY_CONSTRUCTION: True}
+    circular, other = judged(construction, row("yes", 0.04))
     assert (circular["holds"], circular["p_holm"]) == ("circular", None)
     assert (other["holds"], other["p_holm"]) == ("yes", 0.04)
 

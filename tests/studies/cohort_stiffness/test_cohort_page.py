@@ -157,7 +157,7 @@ def test_motion_of_a_wrong_unit_is_told_before_all_else() -> None:
     signs["verdict"], signs["message"] = "implausible", "0.0175 times the motion, as radians give"
     signs["measured_over_expected"] = 0.0175
     sentence = told(Size(), sign_checks=signs)[0]
-    assert sentence.startswith(f"Look at units first: in {len(signs)} places")
+    assert sentence.startswith(f"Look at units too: in {len(signs)} places")
     assert sentence.endswith(": 0.0175 times the motion, as radians give.")
 
 

@@ -1,19 +1,18 @@
-"""Motion that no load makes: the unit that explains it is named."""
+"""Motion that no load makes: the unit that explains it in all joints is named."""
 
 from math import pi
 
 import pytest
 
-from spinepipe.studies.cohort_stiffness.motion_size import implausible
+from spinepipe.studies.cohort_stiffness.motion_size import implausible, unit_of
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])
 def test_motion_of_a_measured_size_is_left_alone(slope: float | None) -> None:
     """Motion against the load is another fault, and told elsewhere."""
-    assert implausible(slope, "extension") == ""
+    assert implausible(slope) == ""
 
 
-@pytest.mark.parametrize("stiffer", [0.6, 1.0, 1.8])
 @pytest.mark.parametrize(
     ("factor", "coordinate", "words"),
     [
@@ -25,13 +24,18 @@ def test_motion_of_a_measured_size_is_left_alone(slope: float | None) -> None:
         (1.0 / 25.4, "superior", "inches"),
     ],
 )
-def test_a_unit_is_named_whatever_the_joint(
-    factor: float, coordinate: str, words: str, stiffer: float
-) -> None:
-    assert words in implausible(factor / stiffer, coordinate)
+def test_a_unit_is_named_whatever_the_joints(factor: float, coordinate: str, words: str) -> None:
+    """Joints are half as stiff as published, as stiff, and 1.8 times as stiff."""
+    assert words in unit_of([factor / stiffer for stiffer in (0.6, 1.0, 1.8)], coordinate)
 
 
 def test_a_fused_joint_is_no_unit() -> None:
-    told = implausible(0.04, "extension")
-    assert told.startswith("0.04 times the motion that published stiffness gives")
-    assert "no unit explains it" in told
+    """It moves a tenth as far as expected, as moments in lbf in would have all joints do."""
+    assert implausible(0.1) == "0.1 times the motion that published stiffness gives"
+    assert unit_of([0.1, 0.9, 1.2], "extension") == ""
+    assert "lbf in" in unit_of([0.1, 0.12, 0.14], "extension")
+
+
+def test_no_unit_is_named_for_what_no_unit_makes() -> None:
+    assert unit_of([0.045, 0.04], "extension") == ""
+    assert unit_of([], "extension") == ""

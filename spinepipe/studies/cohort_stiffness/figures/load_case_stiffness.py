@@ -14,7 +14,7 @@ from spinepipe.report.marks import BAR_PT, Array, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
 from spinepipe.report.words import AXIS, case, count, short
-from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted, ends_shown
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, OF_JOINTS, SHARED
 from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
@@ -172,8 +172,8 @@ def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool
     low, high = axis.get_xlim()
     x = min(max(row["ratio"], low), high)
     beyond = x != row["ratio"]
-    if not pd.isna(row["low"]) and not beyond:
-        ends = [max(row["low"], low), min(row["high"], high)]
+    ends = ends_shown(row, low, high)
+    if ends and not beyond:
         axis.plot(
             ends,
             [y, y],

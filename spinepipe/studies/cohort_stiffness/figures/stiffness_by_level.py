@@ -231,10 +231,11 @@ def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None
         elif value > high or value < low:
             _at_edge(axis, at, float(value > high), "^" if value > high else "v", mark.color)
         else:
-            if not pd.isna(row["low"]):
+            ends = ends_shown(row, low, high)
+            if ends:
                 axis.plot(
                     [at, at],
-                    [max(row["low"], low), min(row["high"], high)],
+                    ends,
                     color=mark.color,
                     lw=0.9,
                     solid_capstyle="butt",
@@ -251,6 +252,17 @@ def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None
                 mew=0.7,
                 zorder=4,
             )
+
+
+def ends_shown(row: Mapping[Any, Any], low: float, high: float) -> list[float]:
+    """Ends of a region inside an axis, as far as it goes where one is open; nothing without any."""
+    below, above = row["low"], row["high"]
+    if pd.isna(below) and pd.isna(above):
+        return []
+    return [
+        low if pd.isna(below) else max(below, low),
+        high if pd.isna(above) else min(above, high),
+    ]
 
 
 def _at_edge(axis: Axes, x: float, top: float, shape: str, color: str) -> None:
