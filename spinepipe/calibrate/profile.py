@@ -47,6 +47,9 @@ FURTHEST = 3.0
 STRAIGHT = 0.1
 """Share of the rise allowed: where one linear step of the others gains less, its cost is taken."""
 
+EXACT = 1e-6
+"""A shorter way is below what the optimum itself is known to: it is taken as it is."""
+
 INSIDE = 1e-9
 """A descent begins so far inside its bounds."""
 
@@ -189,8 +192,8 @@ def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _En
     cost = float(optimum.residual @ optimum.residual)
     if side * (bound - origin) <= 0.0:
         return _End(bound, True, 0.0)
-    if rise.allowed == 0.0:
-        return _End(origin, False, 0.0)  # exact readings allow nothing
+    if rise.way < EXACT * problem.scale[unknown]:
+        return _End(_no_further(origin + side * rise.way, bound, side), False, 0.0)
     inner, outer, least = (origin, 0.0), None, 0.0
     value = _no_further(origin + side * rise.way, bound, side)
     direction, there = optimum.follow(unknown), optimum.x

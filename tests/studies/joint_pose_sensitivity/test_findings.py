@@ -238,9 +238,9 @@ def test_folding_is_told_where_sizes_have_more_interaction(study: JointPoseSensi
     rows = shares("J1", 0.5, 0.9, 0.1, 0.4)
     words = told(study, {"variance_shares": rows})
     assert "takes 4 % of the variance of an error (median), and 55 % of that of its size: " in words
-    assert "folds errors at zero" in words
+    assert "sizes fold errors at zero" in words
     alike = [row | {"share": row["signed_share"]} for row in rows]
-    assert "folds" not in told(study, {"variance_shares": alike})
+    assert "fold" not in told(study, {"variance_shares": alike})
 
 
 def test_parts_that_were_left_out_are_named(study: JointPoseSensitivity) -> None:
