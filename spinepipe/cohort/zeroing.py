@@ -60,7 +60,7 @@ def zeroed_alike(
     motion : rows of the format, cycles numbered. zeroed : all tests or none, or the names of some.
     """
     if motion is None or isinstance(zeroed, bool):
-        return motion, zeroed is True or (not isinstance(zeroed, bool) and bool(zeroed))
+        return motion, bool(zeroed)
     kept = ~motion["test"].isin(zeroed)
     if kept.all():
         return motion, False

@@ -151,11 +151,9 @@ def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
         return {}
     is_open = known[below].astype(bool) | known[above].astype(bool)
     few_below = known[below].astype(bool).mean() <= FEW_OPEN_BELOW
-    ends = known[low].dropna().to_numpy(float)
-    quartiles = [None] * 3
-    if few_below and len(ends):
-        quartiles = np.percentile(ends, [25, 50, 75]).tolist()
-    return {"open_share": float(is_open.mean()), **dict(zip(LOWER_ENDS, quartiles, strict=True))}
+    ends = spread(known[low] if few_below else [])
+    told = {name: ends[name.removeprefix("lower_end_")] for name in LOWER_ENDS}
+    return {"open_share": float(is_open.mean()), **told}
 
 
 def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Iterator[dict[str, Any]]:
