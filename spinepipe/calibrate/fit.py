@@ -15,7 +15,7 @@ from scipy.stats import qmc
 from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
-from spinepipe.calibrate.profile import Profile, profile
+from spinepipe.calibrate.profile import Profile, Reach, profile
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
@@ -108,6 +108,26 @@ class Fit:
     cases: tuple[MeasuredCase, ...]
     poses: tuple[Array, ...]
     profile: Profile | None = None
+
+    def identifiable(self, unknown: int) -> bool:
+        """Whether both ends of an unknown's region are known and its standard error is small."""
+        closed = self.profile is not None and self.profile.closed[unknown]
+        return bool(closed and self.uncertainty.identifiable[unknown])
+
+    def reach(self, unknown: int, value: float) -> Reach | None:
+        """Region of a value that a logarithmic unknown moves; none where none was looked for.
+
+        Parameters
+        ----------
+        value : what the fit has of it, such as one joint's stiffness (SI); ends are in its unit.
+        """
+        found = self.profile
+        if found is None:
+            return None
+        ends = value * np.exp(np.array([found.low[unknown], found.high[unknown]]) - self.x[unknown])
+        below, above = bool(found.open_below[unknown]), bool(found.open_above[unknown])
+        low, high = None if below else float(ends[0]), None if above else float(ends[1])
+        return Reach(low, high, below, above)
 
 
 def fit(

@@ -79,6 +79,16 @@ class Profile:
 
 
 @dataclass(frozen=True)
+class Reach:
+    """How far one value may be from where a fit has it: its ends, none where they are open."""
+
+    low: float | None
+    high: float | None
+    open_below: bool
+    open_above: bool
+
+
+@dataclass(frozen=True)
 class _End:
     """Where one side of a region ends, and the least rise seen on the way."""
 

@@ -209,3 +209,28 @@ def test_a_local_error_is_no_region() -> None:
     local = uncertainty(problem, Evaluator(problem).at(found.x), found.at_bound, 1.0, None)
     assert np.isfinite(local.standard_error[0])
     assert region(found).open_above[0]
+
+
+def test_a_stiffness_reaches_from_one_end_of_its_region_to_the_other() -> None:
+    """k = 1 / u, so its ends are 1 / (u + way) and, where the data have one, 1 / (u - way)."""
+    size = float(MOMENTS_NM @ MOMENTS_NM)
+    for stiffness, is_open in ((60.0, False), (8000.0, True)):
+        theta = noisy(1, stiffness)
+        u = float(MOMENTS_NM @ theta) / size
+        way = stats.norm.ppf(0.975) * 2e-3 / np.sqrt(size)
+        found = fit(one_spring(theta, 8.0), noise=np.full(6, 2e-3), profiled=True)
+        reach = found.reach(0, float(found.values[0]))
+        assert reach is not None
+        assert (reach.open_below, reach.open_above) == (False, is_open)
+        assert reach.low == pytest.approx(1.0 / (u + way), rel=2.0 * SLACK)
+        if is_open:
+            assert reach.high is None
+        else:
+            assert reach.high == pytest.approx(1.0 / (u - way), rel=2.0 * SLACK)
+        assert found.identifiable(0) is not is_open
+
+
+def test_a_fit_without_regions_identifies_nothing() -> None:
+    found = fit(one_spring(noisy(0, 60.0), 8.0))
+    assert found.reach(0, 60.0) is None
+    assert not found.identifiable(0)

@@ -12,7 +12,6 @@ from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
-    Region,
     criteria,
     independent,
     no_fit,
@@ -101,25 +100,24 @@ def _stiffness(
     k = model.effects[0].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
-    region = None if found.profile is None else Region.nowhere(k.shape)
+    reaches = {}
     for index, unknown in enumerate(problem.free):
         at = (list(unknown.rows), unknown.column)
         error[at] = found.uncertainty.standard_error[index]
-        known[at] = found.uncertainty.identifiable[index] and _closed(found, index)
+        known[at] = found.identifiable(index)
         bound[at] = found.at_bound[index]
-        if region is not None and found.profile is not None:
-            region.take(at, found.profile, index, k[at] * np.exp(-found.x[index]))
+        for row in unknown.rows:
+            one = row, unknown.column
+            reach = found.reach(index, k[one])
+            if reach is not None:
+                reaches[one] = reach
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
     rows = stiffness_rows(
-        cohort.joint_names, settings.free, values, error, freedom, known, bound, region
+        cohort.joint_names, settings.free, values, error, freedom, known, bound, reaches
     )
     ended = {"source": "own", "status": found.status.value, "message": found.message}
     return (k if usable else None), [{**row, **ended} for row in rows]
-
-
-def _closed(found: Fit, index: int) -> bool:
-    return found.profile is not None and bool(found.profile.closed[index])
 
 
 def _record(problem: Problem, found: Fit) -> Row:

@@ -1,7 +1,7 @@
 """Rows of the tables ``stiffness`` and ``fits``, whatever the fit."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spinepipe.calibrate import Problem
-from spinepipe.calibrate.profile import Profile
+from spinepipe.calibrate.profile import Reach
 from spinepipe.effects.contract import Array
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
@@ -21,39 +21,6 @@ LEVEL = 0.975
 _BOUND = {-1: "lower", 0: "no", 1: "upper"}
 
 
-@dataclass(frozen=True)
-class Region:
-    """How far each stiffness may go, (J, 6) each: ends in SI, and whether they are open."""
-
-    low: Array
-    high: Array
-    open_below: NDArray[np.bool_]
-    open_above: NDArray[np.bool_]
-
-    @classmethod
-    def nowhere(cls, shape: tuple[int, ...]) -> "Region":
-        """Open everywhere, to be filled in."""
-        ends = np.full(shape, np.nan), np.full(shape, np.nan)
-        return cls(*ends, np.ones(shape, dtype=bool), np.ones(shape, dtype=bool))
-
-    def take(self, at: Any, found: Profile, index: int, start: Array) -> None:
-        """Fill in what the profile of an unknown says of the stiffness ``start`` that it moves."""
-        self.low[at] = start * np.exp(found.low[index])
-        self.high[at] = start * np.exp(found.high[index])
-        self.open_below[at] = found.open_below[index]
-        self.open_above[at] = found.open_above[index]
-
-    def row(self, at: tuple[int, int]) -> Row:
-        """Cells of one stiffness; an open end is none."""
-        below, above = bool(self.open_below[at]), bool(self.open_above[at])
-        return {
-            "low": None if below else float(self.low[at]),
-            "high": None if above else float(self.high[at]),
-            "open_below": below,
-            "open_above": above,
-        }
-
-
 def stiffness_rows(
     joints: Sequence[str],
     free: Sequence[str],
@@ -62,7 +29,7 @@ def stiffness_rows(
     degrees_of_freedom: float,
     identifiable: NDArray[np.bool_] | None,
     at_bound: NDArray[np.int64],
-    region: Region | None = None,
+    reaches: Mapping[tuple[int, int], Reach] | None = None,
 ) -> list[Row]:
     """One row per joint and free coordinate.
 
@@ -71,14 +38,16 @@ def stiffness_rows(
     values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
         where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
     degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
-    region : by profile likelihood, in the place of the intervals.
+    reaches : of the stiffness at a joint and coordinate, by profile likelihood; it takes the place
+        of the interval.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
     for row, joint in enumerate(joints):
         for name in free:
             at = row, COORDINATES.index(name)
-            ends = NO_REGION if region is None else region.row(at)
+            told = (reaches or {}).get(at)
+            ends = NO_REGION if told is None else asdict(told)
             rows.append(
                 {
                     "joint": joint,

@@ -104,19 +104,16 @@ def _stiffness(
 
 def _region(name: str, value: float, found: Fit, index: int) -> dict[str, Any]:
     """What is known of one free stiffness: its standard error and how far it may be from there."""
-    region = found.profile
-    assert region is not None  # of every fit that has a stiffness
+    reach = found.reach(index, value)
+    assert reach is not None  # of every fit that has a stiffness
     error = value * found.uncertainty.standard_error[index]
-    low, high = value * np.exp([region.low[index], region.high[index]] - found.x[index])
-    below, above = bool(region.open_below[index]), bool(region.open_above[index])
-    steep = bool(found.uncertainty.identifiable[index])
     cells = (
         error if np.isfinite(error) else None,
-        None if below else low,
-        None if above else high,
-        below,
-        above,
-        steep and bool(region.closed[index]),
+        reach.low,
+        reach.high,
+        reach.open_below,
+        reach.open_above,
+        found.identifiable(index),
     )
     return dict(zip(region_columns(name), cells, strict=True))
 
