@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.descent import Point, Settled, descend, once
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
-from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.calibrate.uncertainty import UNSEEN_SHARE, uncertainty
 from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array, Indices
 
@@ -97,17 +97,24 @@ class _End:
     least: float
 
 
-At = Callable[[Array], Evaluation]
-
-
 @dataclass(frozen=True)
-class _Optimum:
-    """Where all unknowns are fitted: x (m,), residuals (N,), Jacobian (N, m)."""
+class Best:
+    """Where all unknowns are fitted.
 
-    evaluator: Evaluator
+    Attributes
+    ----------
+    x : (m,), residual (N,), jacobian (N, m). lower, upper : (m,) bounds.
+    scale : (m,) size of a typical change. bent : (m,) whether an unknown is the logarithm of a
+        stiffness: what is read grows with one over it.
+    """
+
     x: Array
     residual: Array
     jacobian: Array
+    lower: Array
+    upper: Array
+    scale: Array
+    bent: NDArray[np.bool_]
 
     def others(self, unknown: int) -> Indices:
         """All but one."""
@@ -129,6 +136,9 @@ class _Rise:
     way: float
 
 
+_Search = Callable[[Point], _End]
+
+
 def profile(
     evaluator: Evaluator,
     x: Array,
@@ -144,20 +154,67 @@ def profile(
     x, evaluation, at_bound : the optimum. noise : as in `uncertainty`.
     """
     evaluator.forget()  # or regions would hang on where other starts have been
-    low, high = evaluator.problem.lower.copy(), evaluator.problem.upper.copy()
-    is_open = np.ones((2, len(x)), dtype=bool)
+    problem = evaluator.problem
     if evaluation.residual is None or evaluation.jacobian is None:
-        return Profile(low, high, is_open[0], is_open[1], False)
-    optimum = _Optimum(evaluator, x, evaluation.residual, evaluation.jacobian)
-    rises = _rises(evaluator.problem, evaluation, at_bound, noise, level)
+        nothing = np.ones((2, len(x)), dtype=bool)
+        return Profile(problem.lower.copy(), problem.upper.copy(), nothing[0], nothing[1], False)
+    bent = np.array([parameter.logarithmic for parameter in problem.free])
+    measured, limits = (evaluation.residual, evaluation.jacobian), (problem.lower, problem.upper)
+    best = Best(x, *measured, *limits, problem.scale, bent)
+    rises = _rises(problem, evaluation, at_bound, noise, level)
+
+    def together(searches: Sequence[_Search]) -> list[_End]:
+        asking = [partial(_through, search) for search in searches]
+        return in_lockstep(asking, evaluator.together) if asking else []
+
+    return _profile(best, list(rises), together)
+
+
+def profile_in_turn(
+    best: Best, point: Point, asked: Sequence[int], level: float = LEVEL
+) -> Profile:
+    """Region of some unknowns where residuals are in their own SDs; all else is left open.
+
+    Parameters
+    ----------
+    point : residuals and Jacobian anywhere, None where there is no equilibrium.
+    """
+    limit = float(norm.ppf(0.5 + level / 2.0))
+    rises: list[_Rise | None] = [None] * len(best.x)
+    for unknown in asked:
+        left, _ = _not_made(best.jacobian, unknown, best.others(unknown))
+        size = float(np.linalg.norm(left))
+        if size > UNSEEN_SHARE * float(np.linalg.norm(best.jacobian[:, unknown])):
+            rises[unknown] = _Rise(limit**2, limit / size)
+    return _profile(best, rises, lambda searches: [search(point) for search in searches])
+
+
+def _profile(
+    best: Best,
+    rises: Sequence[_Rise | None],
+    together: Callable[[Sequence[_Search]], list[_End]],
+) -> Profile:
+    low, high = best.lower.copy(), best.upper.copy()
+    is_open = np.ones((2, len(best.x)), dtype=bool)
     sides = [(k, r, side) for k, r in enumerate(rises) if r is not None for side in (-1, 1)]
-    searches = [partial(_end, optimum, k, rise, side) for k, rise, side in sides]
-    ends = in_lockstep(searches, evaluator.together) if searches else []
+    ends = together([partial(_end, best, k, rise, side) for k, rise, side in sides])
     for (unknown, _, side), end in zip(sides, ends, strict=True):
         (low if side < 0 else high)[unknown] = end.at
         is_open[int(side > 0), unknown] = end.is_open
     lower = any(end.least < -NEAR for end in ends)
     return Profile(low, high, is_open[0], is_open[1], lower)
+
+
+def _through(search: _Search, at: Callable[[Array], Evaluation]) -> _End:
+    """The search, which asks by evaluations."""
+
+    def point(x: Array) -> tuple[Array, Array] | None:
+        found = at(x)
+        if found.residual is None or found.jacobian is None:
+            return None
+        return found.residual, found.jacobian
+
+    return search(point)
 
 
 def _rises(
@@ -195,21 +252,21 @@ def _not_made(jacobian: Array, unknown: int, others: Indices) -> tuple[Array, Ar
     return column - jacobian[:, others] @ by, by
 
 
-def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _End:
+def _end(best: Best, unknown: int, rise: _Rise, side: int, point: Point) -> _End:
     """Go from the optimum to one side until the cost has risen by what is allowed."""
-    problem, origin = optimum.evaluator.problem, float(optimum.x[unknown])
-    bound = float((problem.lower if side < 0 else problem.upper)[unknown])
-    cost = float(optimum.residual @ optimum.residual)
+    origin, bent = float(best.x[unknown]), bool(best.bent[unknown])
+    bound = float((best.lower if side < 0 else best.upper)[unknown])
+    cost = float(best.residual @ best.residual)
     if side * (bound - origin) <= 0.0:
         return _End(bound, True, 0.0)
-    if rise.way < EXACT * problem.scale[unknown]:
+    if rise.way < EXACT * best.scale[unknown]:
         return _End(_no_further(origin + side * rise.way, bound, side), False, 0.0)
     inner, outer, least = (origin, 0.0), None, 0.0
-    value = _no_further(origin + side * rise.way, bound, side)
-    direction, there = optimum.follow(unknown), optimum.x
+    value = _no_further(_from(origin, side * rise.way, bent), bound, side)
+    direction, there = best.follow(unknown), best.x
     for number in range(1, MOST_FITS + 1):
-        start = optimum.x + (value - origin) * direction
-        found, fitted = _refitted(optimum, unknown, value, (start, there), rise, at)
+        start = best.x + (value - origin) * direction
+        found, fitted = _refitted(best, unknown, value, (start, there), rise, point)
         share = (found - cost) / rise.allowed
         least = min(least, share)
         if share < 1.0 and value == bound:
@@ -220,10 +277,10 @@ def _end(optimum: _Optimum, unknown: int, rise: _Rise, side: int, at: At) -> _En
             outer = (value, share)
         else:
             inner, there = (value, share), fitted
-            direction = (fitted - optimum.x) / (value - origin)
+            direction = (fitted - best.x) / (value - origin)
         far = outer is None and number >= AFAR
-        value = bound if far else _next(origin, inner, outer, bound, side)
-    return _End(bound, True, least) if outer is None else _End(value, False, least)
+        value = bound if far else _next(origin, inner, outer, bound, bent)
+    return _End(bound, True, least) if outer is None else _End(outer[0], False, least)
 
 
 def _next(
@@ -231,18 +288,37 @@ def _next(
     inner: tuple[float, float],
     outer: tuple[float, float] | None,
     bound: float,
-    side: int,
+    bent: bool,
 ) -> float:
-    """Where to look next: the root of the rise is nearly straight."""
+    """Where to look next: the root of the rise is nearly straight, see `_from`."""
     value, share = inner
     root = np.sqrt(max(share, 0.0))
+    side = 1 if bound > origin else -1
     if outer is None:
         factor = float(np.clip(1.02 / max(root, 1e-6), 1.1, FURTHEST))
-        return _no_further(origin + (value - origin) * factor, bound, side)
+        return _no_further(_from(origin, factor * _way(origin, value, bent), bent), bound, side)
     if not np.isfinite(outer[1]):
         return 0.5 * (value + outer[0])
-    part = (1.0 - root) / (np.sqrt(outer[1]) - root)
-    return value + (outer[0] - value) * float(np.clip(part, 0.05, 0.95))
+    part = float(np.clip((1.0 - root) / (np.sqrt(outer[1]) - root), 0.05, 0.95))
+    return _from(value, part * _way(value, outer[0], bent), bent)
+
+
+def _from(start: float, way: float, bent: bool) -> float:
+    """Where a way leads from a start.
+
+    Parameters
+    ----------
+    bent : whether the unknown is a logarithm. Under a load what is read grows with one over the
+        stiffness: the way is straight in that, and beyond zero there is no stiffness.
+    """
+    if not bent:
+        return start + way
+    return start - float(np.log1p(-way)) if way < 1.0 else np.inf
+
+
+def _way(start: float, end: float, bent: bool) -> float:
+    """The way from a start to an end, to first order their difference."""
+    return -float(np.expm1(start - end)) if bent else end - start
 
 
 def _no_further(value: float, bound: float, side: int) -> float:
@@ -250,7 +326,7 @@ def _no_further(value: float, bound: float, side: int) -> float:
 
 
 def _refitted(
-    optimum: _Optimum, unknown: int, value: float, starts: Sequence[Array], rise: _Rise, at: At
+    best: Best, unknown: int, value: float, starts: Sequence[Array], rise: _Rise, point: Point
 ) -> tuple[float, Array]:
     """Cost with the unknown held at a value and the others fitted; infinite where nothing stands.
 
@@ -258,23 +334,21 @@ def _refitted(
     ----------
     starts : (m,) each, where the others may begin; the first that stands is taken.
     """
-    problem, others = optimum.evaluator.problem, optimum.others(unknown)
-    bounds = problem.lower[others], problem.upper[others]
+    others = best.others(unknown)
+    bounds = best.lower[others], best.upper[others]
 
     def whole(y: Array) -> Array:
-        x = np.full(len(optimum.x), value)
+        x = np.full(len(best.x), value)
         x[others] = y
         return x
 
-    def point(y: Array) -> tuple[Array, Array] | None:
-        found = at(whole(y))
-        if found.residual is None or found.jacobian is None:
-            return None
-        return found.residual, found.jacobian[:, others]
+    def held(y: Array) -> tuple[Array, Array] | None:
+        found = point(whole(y))
+        return None if found is None else (found[0], found[1][:, others])
 
     for start in starts:
         begin = np.clip(start[others], bounds[0] + INSIDE, bounds[1] - INSIDE)
-        found = point(begin)
+        found = held(begin)
         if found is None:
             continue
         cost, moved = _one_step(*found, begin)
@@ -282,10 +356,10 @@ def _refitted(
             (moved >= bounds[0]) & (moved <= bounds[1])
         ):
             return cost, whole(moved)
-        size, scale = len(optimum.residual), problem.scale[others]
-        ended = descend(once(point), begin, bounds, scale, size, ENOUGH)
+        size, scale = len(best.residual), best.scale[others]
+        ended = descend(once(held), begin, bounds, scale, size, ENOUGH)
         return 2.0 * ended.half_cost, whole(ended.x)
-    return np.inf, optimum.x
+    return np.inf, best.x
 
 
 def _one_step(residual: Array, jacobian: Array, start: Array) -> tuple[float, Array]:

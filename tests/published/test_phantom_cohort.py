@@ -240,6 +240,17 @@ def test_the_law_changes_nothing_but_the_motion() -> None:
     assert np.abs(stiffening.motion).max() < 0.8 * np.abs(linear.motion).max()
 
 
+def test_bridged_joints_are_stiffer_in_rotation_and_turn_less() -> None:
+    usual, bridged = made(), made(bridged=True)
+    factors = bridged.stiffness / usual.stiffness
+    assert (factors[:, :, :3] == 1.0).all()
+    assert factors[:, :, 3:].min() > 2.99
+    assert factors[:, :, 3:].max() < 50.01
+    assert np.unique(factors[:, :, 3:].round(6)).size == factors[:, :, 3:].size
+    np.testing.assert_allclose(noise(usual), noise(bridged), rtol=0, atol=1e-12)
+    assert np.abs(bridged.motion[..., 3:]).max() < 0.4 * np.abs(usual.motion[..., 3:]).max()
+
+
 def test_wrong_joint_centres_show_the_same_rigid_motion(tmp_path: Path) -> None:
     """spinepipe's own change of frame, from what joints.csv states, undoes the lab's mistake."""
     of, right = made(frame_error_mm=3.0, zeroed=False), made(zeroed=False)

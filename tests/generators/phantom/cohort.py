@@ -7,8 +7,8 @@ import numpy as np
 from . import anatomy, loads, measure, mechanics, truth
 from .anatomy import DONORS, JOINTS, Anatomy
 
-# One stream each, so that no choice (law, frame error, zeroing) changes what the others draw.
-ANATOMY, TRUTH, LOADS, NOISE, CENTRES = range(5)
+# One stream each, so that no choice (law, frame error, zeroing, bridges) changes what others draw.
+ANATOMY, TRUTH, LOADS, NOISE, CENTRES, BRIDGES = range(6)
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ class Phantom:
     law: mechanics.Law
     frame_error_mm: float
     zeroed: bool
+    bridged: bool
     specimens: tuple[Anatomy, ...]
     stiffness: np.ndarray
     moments: np.ndarray
@@ -40,13 +41,20 @@ class Phantom:
 
 
 def phantom(
-    seed: int, *, law: mechanics.Law = "linear", frame_error_mm: float = 0.0, zeroed: bool = True
+    seed: int,
+    *,
+    law: mechanics.Law = "linear",
+    frame_error_mm: float = 0.0,
+    zeroed: bool = True,
+    bridged: bool = False,
 ) -> Phantom:
     """Draw a phantom; equal seeds share geometry, truth, loads and noise whatever else is asked.
 
     Parameters
     ----------
     frame_error_mm : SD per axis of the stated joint centres; orientations are stated truly.
+    bridged : whether each joint is stiffer by a factor of its own in each rotation, up to nearly
+        rigid.
     """
 
     def stream(number):
@@ -55,6 +63,8 @@ def phantom(
     bones = stream(ANATOMY)
     specimens = tuple(anatomy.build(donor, bones) for donor in DONORS)
     stiffness = truth.draw(stream(TRUTH), len(DONORS))
+    if bridged:
+        stiffness = truth.bridged(stiffness, stream(BRIDGES))
     moments = loads.draw(stream(LOADS), len(DONORS))
     motion = _motion(specimens, stiffness, moments, law)
     true_origins = np.stack([specimen.origins for specimen in specimens])
@@ -67,6 +77,7 @@ def phantom(
         law,
         frame_error_mm,
         zeroed,
+        bridged,
         specimens,
         stiffness,
         moments,

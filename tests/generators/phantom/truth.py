@@ -36,12 +36,24 @@ RESIDUAL_LOG_SD = 0.15
 """Of one joint's stiffness around its specimen's factor times the level pattern."""
 
 
+BRIDGED = (3.0, 50.0)
+"""Assumed: by how much a joint that bone bridges is stiffer, evenly spread in the logarithm. At the
+upper end it turns by less than its readings err."""
+
+
 def draw(rng: np.random.Generator, n_specimens: int) -> np.ndarray:
     """(P, J, 6) true stiffness, rounded as in truth.csv."""
     rotations = [_direction(name, rng, n_specimens) for name in TABLE_3_NM_PER_RAD]
     shape = (*rotations[0].shape, 3)
     translations = np.broadcast_to(TRANSLATIONAL_N_PER_M, shape)
     return np.round(np.concatenate([translations, np.stack(rotations, axis=-1)], axis=-1), 4)
+
+
+def bridged(stiffness: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The same (P, J, 6) with every rotational stiffness times a factor of its own, rounded."""
+    found = stiffness.copy()
+    found[:, :, 3:] *= np.exp(rng.uniform(*np.log(BRIDGED), found[:, :, 3:].shape))
+    return np.round(found, 4)
 
 
 def _direction(name, rng, n_specimens):

@@ -68,7 +68,7 @@ def _yaml(phantom, name):
     error = phantom.frame_error_mm
     return COHORT_YAML.format(
         name=name,
-        law=phantom.law,
+        law=f"{phantom.law}, joints bridged" if phantom.bridged else phantom.law,
         seed=phantom.seed,
         centres=f"with an SD of {error:g} mm per axis" if error else "truly",
         vertebrae=", ".join(VERTEBRAE),

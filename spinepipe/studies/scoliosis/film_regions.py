@@ -1,0 +1,90 @@
+"""How far a segment's ratio may be from where the fit has it before both films speak against it.
+
+A population draws every number of a patient to itself, so an interval made with it is narrow where
+the films say nothing. Here one ratio at a time is rid of the population and moved, all else is
+fitted anew and keeps its population: a profile likelihood (`calibrate.profile`). Where films allow
+all that is tried, the ratio is the population's and no finding about the patient.
+"""
+
+import numpy as np
+
+from spinepipe.calibrate.descent import Point, descend, once
+from spinepipe.calibrate.profile import Best, Reach, profile_in_turn
+from spinepipe.effects.contract import Array
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, SETTLED, TOPS, FilmFit, Fitted
+from spinepipe.studies.scoliosis.population import Population
+
+OPEN = Reach(None, None, True, True)
+"""Of a segment of which films tell nothing."""
+
+
+def regions(fit: FilmFit, population: Population, fitted: Fitted) -> tuple[Reach, ...]:
+    """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
+    return tuple(_region(fit, population, fitted, one) for one in range(fit.segments))
+
+
+def _region(fit: FilmFit, population: Population, fitted: Fitted, segment: int) -> Reach:
+    fit.near = dict(fitted.poses)
+    numbers = by_ratio(fit.segments, len(fitted.unknowns), segment)
+    point = once(_of_films(fit, population, segment, numbers))
+    middle, scale = _usual(population)
+    middle = np.linalg.solve(numbers, middle)
+    lower, upper = middle - FARTHEST * scale, middle + FARTHEST * scale
+    begin = np.clip(np.linalg.solve(numbers, fitted.unknowns), lower + 1e-9, upper - 1e-9)
+    first = point(begin)
+    if first is None:
+        return OPEN
+    best = descend(point, begin, (lower, upper), scale, len(first[0]), SETTLED)
+    found = point(best.x)
+    if found is None or not best.arrived:
+        return OPEN
+    bent = np.arange(len(begin)) == segment
+    at = Best(best.x, *found, lower, upper, scale, bent)
+    seen = profile_in_turn(at, point, [segment])
+    below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])
+    if seen.lower_cost:
+        return OPEN
+    return Reach(
+        None if below else float(np.exp(seen.low[segment])),
+        None if above else float(np.exp(seen.high[segment])),
+        below,
+        above,
+    )
+
+
+def by_ratio(segments: int, unknowns: int, segment: int) -> Array:
+    """(n, n) that makes a fit's unknowns of the same with one number replaced by the ratio.
+
+    The ratio's logarithm is the number less the mean of all segments' numbers.
+    """
+    made = np.eye(unknowns)
+    made[segment, :segments] = 1.0 / (segments - 1)
+    made[segment, segment] = segments / (segments - 1)
+    return made
+
+
+def _usual(population: Population) -> tuple[Array, Array]:
+    """(n,) each: middle and SD of the unknowns before any film."""
+    tops = np.zeros(TOPS)
+    return (
+        np.concatenate([population.mean, tops]),
+        np.concatenate([population.sd, tops + 1.0]),
+    )
+
+
+def _of_films(fit: FilmFit, population: Population, segment: int, numbers: Array) -> Point:
+    """Errors of the films and of all but one number of the population, in their SD."""
+    middle, _ = _usual(population)
+    drawn = np.eye(len(middle))
+    drawn[: len(population.mean), : len(population.mean)] = population.root
+    drawn = np.delete(drawn, segment, axis=0)  # a ratio is drawn apart from all other numbers
+
+    def point(moved: Array) -> tuple[Array, Array] | None:
+        unknowns = numbers @ moved
+        found = fit.missed(unknowns)
+        if found is None:
+            return None
+        errors = np.append(found[0], drawn @ (unknowns - middle))
+        return errors, np.vstack([found[1], drawn]) @ numbers
+
+    return point
