@@ -106,6 +106,7 @@ class Best:
     x : (m,), residual (N,), jacobian (N, m). lower, upper : (m,) bounds.
     scale : (m,) size of a typical change. bent : (m,) whether an unknown is the logarithm of a
         stiffness: what is read grows with one over it.
+    enough : when the others have been fitted well enough.
     """
 
     x: Array
@@ -115,6 +116,7 @@ class Best:
     upper: Array
     scale: Array
     bent: NDArray[np.bool_]
+    enough: Settled = ENOUGH
 
     def others(self, unknown: int) -> Indices:
         """All but one."""
@@ -357,7 +359,7 @@ def _refitted(
         ):
             return cost, whole(moved)
         size, scale = len(best.residual), best.scale[others]
-        ended = descend(once(held), begin, bounds, scale, size, ENOUGH)
+        ended = descend(once(held), begin, bounds, scale, size, best.enough)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, best.x
 

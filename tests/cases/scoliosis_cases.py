@@ -111,6 +111,16 @@ def _from_jobs(size: Size) -> dict[str, pd.DataFrame]:
 _OF_JOBS = (LAWS, POSITIONS, DISPLACEMENTS, CURVES)
 
 
+def _by_films(model: str, at: int) -> dict[str, Any]:
+    """What films say of a ratio: of the lower ten segments both ends, of two one, of two none."""
+    cells = ("films_low", "films_high", "open_below", "open_above", "identifiable")
+    if model != "tangent_fitted":
+        return dict.fromkeys(cells)
+    low, high = at < 12, at < 10
+    told = (0.5 if low else None, 2.0 if high else None, not low, not high, low and high)
+    return dict(zip(cells, told, strict=True))
+
+
 def _rows(
     size: Size, cohort: Cohort, patient: str, number: int, model: str, lost: bool
 ) -> dict[str, list[dict[str, Any]]]:
@@ -123,6 +133,7 @@ def _rows(
     for at, joint in enumerate(cohort.joint_names):
         law = {"at_rest_nm_per_rad": 50.0 + at, "ratio": 1.0, "ratio_low": None}
         law |= {"lower_end_deg": -5.0 if ends else None, "upper_end_deg": 6.0 if ends else None}
+        law |= _by_films(model, at)
         law |= {"ratio_high": None, "opposite": at == 13, "constrained": ends and at == 13}
         found["laws"].append(
             known | {"joint": joint} | law | taken | {"scale_from": "apical_moment"}

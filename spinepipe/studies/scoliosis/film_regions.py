@@ -8,11 +8,17 @@ all that is tried, the ratio is the population's and no finding about the patien
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Point, descend, once
+from spinepipe.calibrate.descent import Point, Settled, descend, once
 from spinepipe.calibrate.profile import Best, Reach, profile_in_turn
 from spinepipe.effects.contract import Array
-from spinepipe.studies.scoliosis.film_fit import FARTHEST, SETTLED, TOPS, FilmFit, Fitted
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, Fitted
 from spinepipe.studies.scoliosis.population import Population
+
+SETTLED = Settled(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
+"""Of a cost of some fifty, a thousandth is a hundredth of what the noise allows."""
+
+ENOUGH = Settled(cost=1e-2, step=1e-2, slope=1e-4, evaluations=6)
+"""With one ratio held, which is done often: ends move by less than a hundredth."""
 
 OPEN = Reach(None, None, True, True)
 """Of a segment of which films tell nothing."""
@@ -20,36 +26,33 @@ OPEN = Reach(None, None, True, True)
 
 def regions(fit: FilmFit, population: Population, fitted: Fitted) -> tuple[Reach, ...]:
     """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
-    return tuple(_region(fit, population, fitted, one) for one in range(fit.segments))
+    return tuple(region(fit, population, fitted, one) for one in range(fit.segments))
 
 
-def _region(fit: FilmFit, population: Population, fitted: Fitted, segment: int) -> Reach:
+def region(fit: FilmFit, population: Population, fitted: Fitted, segment: int) -> Reach:
+    """95 % region of one segment's ratio."""
     fit.near = dict(fitted.poses)
     numbers = by_ratio(fit.segments, len(fitted.unknowns), segment)
     point = once(_of_films(fit, population, segment, numbers))
-    middle, scale = _usual(population)
-    middle = np.linalg.solve(numbers, middle)
+    usual, scale = _usual(population)
+    middle = np.asarray(np.linalg.solve(numbers, usual), dtype=np.float64)
     lower, upper = middle - FARTHEST * scale, middle + FARTHEST * scale
     begin = np.clip(np.linalg.solve(numbers, fitted.unknowns), lower + 1e-9, upper - 1e-9)
     first = point(begin)
     if first is None:
         return OPEN
-    best = descend(point, begin, (lower, upper), scale, len(first[0]), SETTLED)
-    found = point(best.x)
-    if found is None or not best.arrived:
+    ended = descend(point, begin, (lower, upper), scale, len(first[0]), SETTLED)
+    found = point(ended.x)
+    if found is None or not ended.arrived:
         return OPEN
     bent = np.arange(len(begin)) == segment
-    at = Best(best.x, *found, lower, upper, scale, bent)
-    seen = profile_in_turn(at, point, [segment])
-    below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])
+    best = Best(ended.x, *found, lower, upper, scale, bent, ENOUGH)
+    seen = profile_in_turn(best, point, [segment])
     if seen.lower_cost:
         return OPEN
-    return Reach(
-        None if below else float(np.exp(seen.low[segment])),
-        None if above else float(np.exp(seen.high[segment])),
-        below,
-        above,
-    )
+    below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])
+    low, high = float(np.exp(seen.low[segment])), float(np.exp(seen.high[segment]))
+    return Reach(None if below else low, None if above else high, below, above)
 
 
 def by_ratio(segments: int, unknowns: int, segment: int) -> Array:

@@ -182,6 +182,27 @@ def ratios(study: Scoliosis, results: Results) -> Iterator[str]:
         )
 
 
+def by_films(study: Scoliosis, results: Results) -> Iterator[str]:
+    """Whose stiffness a fitted one is: the patient's, or that of all."""
+    rows = results.table("laws")
+    asked = rows[rows["identifiable"].notna()] if len(rows) else rows
+    if asked.empty:
+        return
+    known = asked["identifiable"].astype(bool)
+    neither = asked["open_below"].astype(bool) & asked["open_above"].astype(bool)
+    told, none = int(known.sum()), int(neither.sum())
+    yield (
+        f"In {TOLD['tangent_fitted']} a patient's own films tell both ends of {told} of "
+        f"{count(len(asked), 'ratio')} ({percent(told, len(asked))}), one end of "
+        f"{len(asked) - told - none} and neither of {none}. Where an end is open the ratio is "
+        "drawn to that of all patients and is no finding about this one."
+    )
+    shares = known.groupby(asked["joint"], sort=False).mean()
+    few = [str(joint) for joint, share in shares.items() if share < 0.5]
+    if few:
+        yield f"At {listed(few)} films tell both ends in fewer than half of the patients."
+
+
 def enlargement(study: Scoliosis, results: Results) -> Iterator[str]:
     """Which enlargement of the published ends has the least error."""
     rows = _varied(results, "enlargement").dropna(subset=["rotation_rmse_deg"])
@@ -271,6 +292,6 @@ def beside_the_paper(study: Scoliosis, results: Results) -> Iterator[str]:
 
 
 MAKERS: tuple[Finding, ...] = (
-    *(ended, errors, both_ways, opposite, constrained, ratios, enlargement),
+    *(ended, errors, both_ways, opposite, constrained, ratios, by_films, enlargement),
     *(parameters, beyond, sizes, beside_the_paper),
 )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.profile import Reach
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
@@ -96,6 +97,7 @@ class Personal:
     free : number of parameters taken from this patient's films.
     decided : of how many the films decided; all, where the model draws them to no population.
     ratio_range : (2, S) 95 % interval of the segments' ratios; none where the model gives none.
+    by_films : (S,) how far the films let each ratio go; none where they were not asked.
     """
 
     model: SpineModel
@@ -105,6 +107,7 @@ class Personal:
     free: int
     decided: float
     ratio_range: Array | None = None
+    by_films: tuple[Reach, ...] | None = None
 
     @property
     def ratio(self) -> Array:

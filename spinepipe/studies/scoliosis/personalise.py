@@ -1,6 +1,7 @@
 """Job: one patient in one model, personalised and held where every film has the top."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import read_mark
 from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
+from spinepipe.studies.scoliosis.film_regions import regions
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import Posed
 from spinepipe.studies.scoliosis.misses import POSED, miss_of
@@ -27,6 +29,9 @@ from spinepipe.units import DEG_PER_RAD, MM_PER_M
 Row = dict[str, Any]
 
 NOT_ARRIVED = "the fit to the films did not settle"
+
+REGION = ("films_low", "films_high", "open_below", "open_above")
+"""Columns of what films say of a ratio."""
 
 PUSHES = ("push_right_n", "push_up_n", "push_right_bending_nm", "push_extension_nm")
 
@@ -113,7 +118,10 @@ def _personal(
         fitted = fit.fit(everyone)
     except NoFit as why:
         return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
-    return fit.personal(fitted), "" if fitted.arrived else NOT_ARRIVED
+    personal, told = fit.personal(fitted), "" if fitted.arrived else NOT_ARRIVED
+    if not settings.film_regions:
+        return personal, told
+    return replace(personal, by_films=regions(fit, everyone, fitted)), told
 
 
 def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
@@ -125,11 +133,22 @@ def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
             "ratio": float(personal.ratio[number]),
             "ratio_low": None if reach is None else float(reach[0, number]),
             "ratio_high": None if reach is None else float(reach[1, number]),
+            **_by_films(personal, number),
             "lower_end_deg": None if ends is None else DEG_PER_RAD * float(ends.lower[number]),
             "upper_end_deg": None if ends is None else DEG_PER_RAD * float(ends.upper[number]),
             "opposite": bool(patient.pairs.opposite[number]),
             "constrained": bool(personal.constrained[number]),
         }
+
+
+def _by_films(personal: Personal, number: int) -> Row:
+    """How far the films let a segment's ratio go."""
+    if personal.by_films is None:
+        return dict.fromkeys((*REGION, "identifiable"))
+    reach = personal.by_films[number]
+    cells = (reach.low, reach.high, reach.open_below, reach.open_above)
+    known = not (reach.open_below or reach.open_above)
+    return dict(zip(REGION, cells, strict=True)) | {"identifiable": known}
 
 
 def _position(patient: Patient, position: str, posed: Posed) -> Row:

@@ -113,6 +113,11 @@ class Scoliosis(Study):
     model_sd_mm: float = Field(
         default=1.0, gt=0, le=50, description="the same of a vertebra's place on a film, each way"
     )
+    film_regions: bool = Field(
+        default=True,
+        description="whether tangent_fitted looks for how far a patient's films let each ratio go; "
+        "some 5 s a patient",
+    )
     tilt_sd_deg: float | None = Field(
         default=None, gt=0, le=20, description="SD of a vertebra's tilt, where no repeats tell it"
     )

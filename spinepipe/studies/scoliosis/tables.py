@@ -26,6 +26,8 @@ STATUS = Column("status", "text", "how the solve ended", allowed=tuple(Ended))
 NO_POSE = "the solve found no pose"
 _LINEAR = "the law is linear"
 _NO_INTERVAL = "the model gives none"
+_NO_REGION = "no region was looked for"
+_OPEN = "the films leave this end open, or no region was looked for"
 
 
 def angle(name: str, meaning: str, null: str | None = None) -> Column:
@@ -50,6 +52,29 @@ LAWS = Table(
         ),
         Column("ratio_low", "number", "lower end of its 95 % interval", null=_NO_INTERVAL, low=0.0),
         Column("ratio_high", "number", "upper end of it", null=_NO_INTERVAL, low=0.0),
+        Column(
+            "films_low",
+            "number",
+            "lower end of the 95 % region that the patient's films leave the ratio: all else is "
+            "fitted anew, and the ratio itself is not drawn to the population (profile likelihood)",
+            null=_OPEN,
+            low=0.0,
+        ),
+        Column("films_high", "number", "upper end of it", null=_OPEN, low=0.0),
+        Column(
+            "open_below",
+            "flag",
+            "whether the films allow every ratio below, down to 5 SD of the population",
+            null=_NO_REGION,
+        ),
+        Column("open_above", "flag", "the same above, up to 5 SD", null=_NO_REGION),
+        Column(
+            "identifiable",
+            "flag",
+            "whether the films tell both ends; else the ratio is the population's, and no finding "
+            "about the patient",
+            null=_NO_REGION,
+        ),
         angle("lower_end_deg", "end of the tangent to the left, negative", _LINEAR),
         angle("upper_end_deg", "end of the tangent to the right", _LINEAR),
         Column("opposite", "flag", "whether it turns against a bend, or not at all"),

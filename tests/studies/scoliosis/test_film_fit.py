@@ -17,6 +17,7 @@ from spinepipe.studies.scoliosis.film_fit import (
     laws_of,
     weighed_with,
 )
+from spinepipe.studies.scoliosis.film_regions import by_ratio, region
 from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, Film
 from spinepipe.studies.scoliosis.learn import learn, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
@@ -123,6 +124,37 @@ def test_an_interval_holds_the_ratio(patient: Patient) -> None:
     assert (low < personal.ratio).all()
     assert (personal.ratio < high).all()
     assert personal.free == 3 * patient.chain.n_joints - 1
+
+
+def test_a_ratio_takes_the_place_of_a_number() -> None:
+    """The logarithm of a stiffness over the geometric mean, the other numbers as they are."""
+    numbers = np.array([0.3, -0.1, 0.4, 0.2, 7.0, 8.0])  # four segments, two other unknowns
+    by = by_ratio(4, 6, 2)
+    moved = np.linalg.solve(by, numbers)
+    assert moved[2] == pytest.approx(0.4 - 0.2)
+    np.testing.assert_allclose(np.delete(moved, 2), np.delete(numbers, 2), rtol=0, atol=1e-14)
+
+
+def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Patient) -> None:
+    """Films of a known chain: regions hold its ratios. Coarsely read, nothing is told."""
+    hidden = some_unknowns(patient)
+    hidden[-TOPS:] = 0.0
+    sd, s = weights_of_a_usual_study(), patient.chain.n_joints
+    fit, population = FilmFit(patient, sd), assumed(s)
+    spine = fit.spine.with_model(fit._model(hidden[:-TOPS]))
+    poses = [spine.at(patient.read.films[position].top).film for position in (RIGHT, LEFT)]
+    filmed = FilmFit(with_films(patient, *poses), sd)
+    fitted = filmed.fit(population)
+    true = np.exp(hidden[:s] - hidden[:s].mean())
+    for segment, is_open in ((5, False), (12, True)):
+        reach = region(filmed, population, fitted, segment)
+        assert reach.open_below is reach.open_above is is_open
+        if not is_open:
+            assert (reach.low or np.inf) < true[segment] < (reach.high or 0.0)
+    coarse = FilmFit(patient, 100.0 * sd)
+    reach = region(coarse, population, coarse.fit(population), 5)
+    assert reach.open_below
+    assert reach.open_above
 
 
 def test_a_patient_without_a_pose_is_told_and_keeps_the_population(

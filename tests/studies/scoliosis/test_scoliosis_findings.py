@@ -34,6 +34,23 @@ def statistics(*rows: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def test_ratios_that_films_leave_open_are_no_findings_about_a_patient() -> None:
+    """Three patients of 14 segments: of ten films tell both ends, of two one, of two neither."""
+    words = told(Size())
+    assert "a patient's own films tell both ends of 30 of 42 ratios (71 %)" in words
+    assert "one end of 6 and neither of 6" in words
+    assert "films tell both ends in fewer than half of the patients" in words
+    laws = tables_of(Size())["laws"]
+    fitted = laws["model"] == "tangent_fitted"
+    laws.loc[fitted, ["open_below", "open_above"]] = False
+    laws.loc[fitted, "identifiable"] = True
+    closed = told(Size(), laws=laws)
+    assert "both ends of 42 of 42 ratios (100 %), one end of 0 and neither of 0" in closed
+    assert "fewer than half" not in closed
+    laws[["open_below", "open_above", "identifiable"]] = None
+    assert "both ends" not in told(Size(), laws=laws)
+
+
 def test_the_best_model_is_that_of_the_least_error_on_held_out_films() -> None:
     found = answer(Size()).words
     # three patients: 0.3 deg times the root mean square of 1, 1.1 and 1.2
