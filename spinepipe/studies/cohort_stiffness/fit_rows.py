@@ -11,6 +11,7 @@ from scipy import stats
 from spinepipe.calibrate import Problem
 from spinepipe.calibrate.profile import Profile
 from spinepipe.effects.contract import Array
+from spinepipe.studies.cohort_stiffness.stiffening import LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
 Row = dict[str, Any]
@@ -63,6 +64,7 @@ def stiffness_rows(
     identifiable: NDArray[np.bool_] | None,
     at_bound: NDArray[np.int64],
     region: Region | None = None,
+    growth: Growth | None = None,
 ) -> list[Row]:
     """One row per joint and free coordinate.
 
@@ -71,7 +73,7 @@ def stiffness_rows(
     values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
         where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
     degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
-    region : by profile likelihood, in the place of the intervals.
+    region : by profile likelihood, in the place of the intervals. growth : of laws that stiffen.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
@@ -88,6 +90,7 @@ def stiffness_rows(
                     **ends,
                     "identifiable": None if identifiable is None else bool(identifiable[at]),
                     "at_bound": _BOUND[int(at_bound[at])],
+                    **(LINEAR if growth is None else growth.row(at)),
                 }
             )
     return rows
