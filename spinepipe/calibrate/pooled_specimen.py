@@ -41,7 +41,7 @@ class PooledSpecimen:
 
     Attributes
     ----------
-    x, at_bound : (m,) logarithms relative to the start; -1 lower bound, 0 none, 1 upper.
+    x, at_bound : (m,) moves from the start as in `Problem`; -1 lower bound, 0 none, 1 upper.
     values : (m,) value of each unknown's first row, SI.
     covariance : (m, m) posterior of x at the pooled spreads, as if there were no bounds.
     cost : sum of squared weighted (and whitened) residuals, mm2 and deg2; infinite without pose.
@@ -66,7 +66,8 @@ class PooledSpecimen:
 class Member:
     """A specimen's problem, where it stands and what it sees there.
 
-    One without readings or without a stable pose tells nothing of the cohort.
+    One without readings or without a stable pose tells nothing of the cohort. Its unknowns are
+    those of the problem in their own `Problem.scale`: logarithms, or prior SDs.
 
     Attributes
     ----------
@@ -76,8 +77,9 @@ class Member:
     """
 
     def __init__(self, problem: Problem, start: Array, noise: Array | None) -> None:
-        """Load the problem and find a point near ``start`` (m,) that stands."""
-        self.problem, self.x, self.noise = problem, start, noise
+        """Load the problem and find a point near ``start`` (m,), as in `Problem`, that stands."""
+        self.problem, self.noise, self.scale = problem, noise, problem.scale
+        self.x = start / self.scale
         self.arrived, self.stuck, self.step = False, False, np.zeros(len(start))
         self.evaluator: Evaluator | None = None
         self.evaluation: Evaluation | None = None
@@ -88,14 +90,20 @@ class Member:
             self.refusal = str(refused)
             return
         self.problem = self.evaluator.problem
-        standing, _ = stand_up(self.problem, self.evaluator.at, self.clipped(start))
+        begin = self.clipped(self.x) * self.scale
+        standing, _ = stand_up(self.problem, self.evaluator.at, begin)
         if standing is not None:
-            self.x, self.evaluation = standing, self.evaluator.at(standing)
+            self.x, self.evaluation = standing / self.scale, self.evaluator.at(standing)
             self.trial = (self.x, self.evaluation)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper (m,) of x."""
+        return self.problem.lower / self.scale, self.problem.upper / self.scale
 
     def clipped(self, x: Array) -> Array:
         """The point x (m,) drawn into the bounds."""
-        return np.clip(x, self.problem.lower, self.problem.upper)
+        return np.clip(x, *self.bounds)
 
     @property
     def at_rest(self) -> bool:
@@ -113,10 +121,11 @@ class Member:
         """Residual and Jacobian, in declared SDs where there are such."""
         assert evaluation.residual is not None
         assert evaluation.jacobian is not None
+        jacobian = evaluation.jacobian * self.scale
         if self.noise is None:
-            return evaluation.residual, evaluation.jacobian
+            return evaluation.residual, jacobian
         deviation = declared_deviation(self.problem, evaluation.coordinate, self.noise)
-        return evaluation.residual / deviation, evaluation.jacobian / deviation[:, None]
+        return evaluation.residual / deviation, jacobian / deviation[:, None]
 
     def aim(self, target: Array, deviation: Array, hierarchy: Hierarchy) -> None:
         """Plan a step towards a target (m,) known to an SD (m,), inside bounds and as trusted."""
@@ -132,8 +141,8 @@ class Member:
             return
         self.trial = (self.x, self.evaluation)
         while share > SMALLEST_SHARE:
-            x = self.x + share * self.step
-            found = self.evaluator.at(x)
+            x = self.clipped(self.x + share * self.step)
+            found = self.evaluator.at(x * self.scale)
             if found.residual is not None:
                 self.trial = (x, found)
                 return
@@ -169,7 +178,7 @@ class Member:
 
     def _within_bounds(self, target: Array, hierarchy: Hierarchy) -> Array:
         """The target (m,), or where the linearised cost is least inside the bounds."""
-        low, high = self.problem.lower, self.problem.upper
+        low, high = self.bounds
         if np.all((low <= target) & (target <= high)):
             return target
         design, aim = self.linearised()
@@ -180,9 +189,10 @@ class Member:
 
     def result(self, expected: Array, covariance: Array, effective: float) -> PooledSpecimen:
         """Where it has ended; at what is ``expected`` (m,) of it where it has no pose."""
-        x, evaluation = self.x, self.evaluation
+        here, evaluation = self.x, self.evaluation
         if evaluation is None:
-            x = self.clipped(expected)
+            here = self.clipped(expected)
+        x = here * self.scale
         at_bound = bounds_reached(self.problem, x)
         status, message = self._ending(at_bound)
         residual = None if evaluation is None else evaluation.residual
@@ -190,7 +200,7 @@ class Member:
             x=x,
             values=values(self.problem, x),
             at_bound=at_bound,
-            covariance=covariance,
+            covariance=covariance * np.outer(self.scale, self.scale),
             cost=np.inf if residual is None else float(residual @ residual),
             n_readings=0 if self.evaluator is None else len(self.evaluator.coordinate),
             effective_parameters=effective,
@@ -208,7 +218,7 @@ class Member:
             return Status.UNSTABLE, TIPPED
         if not self.arrived:
             return Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
-        if self.evaluator.on_record(self.x) is None:
+        if self.evaluator.on_record(self.x * self.scale) is None:
             return Status.NOT_CONVERGED, OFF_THE_PATH
         if at_bound.any():
             return Status.CONVERGED_AT_BOUND, names_at_bound(self.problem, at_bound)

@@ -22,7 +22,9 @@ from spinepipe.status import Status
 
 @dataclass(frozen=True)
 class CohortSpread:
-    """How one degree of freedom spreads: mean and SDs of logarithms relative to the start.
+    """How one degree of freedom spreads: mean and SDs of moves from the start.
+
+    Moves are logarithms, or of what is no logarithm in its own unit.
 
     Attributes
     ----------
@@ -90,7 +92,8 @@ def pool(
 
     Parameters
     ----------
-    problems : with the same logarithmic unknowns and the same stiffness to start from.
+    problems : with the same unknowns and the same values to start from. What is no logarithm is
+        pooled in prior SDs.
     noise : (6,) m and rad, SD of one reading (before zeroing): likelihood is then by these SDs and
         weights only choose the readings. None estimates one scatter of all weighted residuals.
     starts : (m,) x of each specimen to start from; zeros by default.
@@ -98,11 +101,11 @@ def pool(
     Raises
     ------
     ValueError
-        For unknowns or starting values that differ, unknowns that are no logarithms, and ``noise``
-        that is not positive or given for correlated readings that a problem takes for independent.
+        For unknowns or starting values that differ, and ``noise`` that is not positive or given
+        for correlated readings that a problem takes for independent.
     """
     _check(problems, noise)
-    dof = _degrees_of_freedom(problems[0])
+    dof, scale = _degrees_of_freedom(problems[0]), problems[0].scale
     starts = starts or [np.zeros(len(dof))] * len(problems)
     members = [Member(p, x, noise) for p, x in zip(problems, starts, strict=True)]
     hierarchy, iterations, unsettled = _travel(members, dof, None if noise is None else 1.0)
@@ -115,8 +118,8 @@ def pool(
     return Pooled(
         specimens=specimens,
         spreads=_cohort_spreads(problems[0], dof, hierarchy),
-        newcomer=found.common,
-        newcomer_covariance=found.newcomer_covariance,
+        newcomer=found.common * scale,
+        newcomer_covariance=found.newcomer_covariance * np.outer(scale, scale),
         scatter=hierarchy.spreads.scatter,
         effective_parameters=float(found.effective_parameters.sum()),
         log_likelihood=hierarchy.log_likelihood,
@@ -132,8 +135,6 @@ def _check(problems: Sequence[Problem], noise: Array | None) -> None:
         raise ValueError("no specimen to pool")
     first = problems[0]
     nowhere = np.zeros(len(first.free))
-    if not all(parameter.logarithmic for parameter in first.free):
-        raise ValueError("only logarithmic unknowns can be pooled")
     for problem in problems:
         name = problem.model.specimen
         if problem.free != first.free:
@@ -230,17 +231,18 @@ def _cohort_spreads(
     problem: Problem, dof: Indices, hierarchy: Hierarchy
 ) -> tuple[CohortSpread, ...]:
     found, spreads = hierarchy.posterior(), hierarchy.spreads
-    first = [problem.free[int(np.argmax(dof == d))] for d in range(dof.max() + 1)]
+    places = [int(np.argmax(dof == d)) for d in range(dof.max() + 1)]
+    first, scale = [problem.free[place] for place in places], problem.scale[places]
     return tuple(
         CohortSpread(
             name=parameter.label.partition("@")[0],
             effect=parameter.effect,
             column=parameter.column,
-            mean=float(found.mean[d]),
-            mean_se=float(found.mean_sd[d]),
-            level=float(spreads.level[d]),
-            specimen=float(spreads.specimen[d]),
-            rest=float(spreads.rest[d]),
+            mean=float(found.mean[d] * scale[d]),
+            mean_se=float(found.mean_sd[d] * scale[d]),
+            level=float(spreads.level[d] * scale[d]),
+            specimen=float(spreads.specimen[d] * scale[d]),
+            rest=float(spreads.rest[d] * scale[d]),
         )
         for d, parameter in enumerate(first)
     )

@@ -37,6 +37,8 @@ Tables = dict[str, pd.DataFrame]
 class Chains:
     """Specimens with their stiffness (3 joints, 3 rotations) in N m/rad, and what was done to them.
 
+    With ``growth`` b in 1/rad, per specimen, joints hold ``k (exp(b |q|) - 1) / b``, so that a
+    moment M turns them by ``log(1 + b M / k) / b``.
     ``loads`` and ``motion`` may be changed before they are written.
     """
 
@@ -49,6 +51,7 @@ class Chains:
     zeroed: bool = False
     sd: bool = True
     study: str = ""
+    growth: Mapping[str, Any] = field(default_factory=dict)
     loads: pd.DataFrame = field(init=False)
     motion: pd.DataFrame = field(init=False)
 
@@ -61,8 +64,14 @@ class Chains:
             moment = sign * self.step_nm * step
             key = {"specimen": specimen, "test": test, "cycle": cycle, "step": step}
             loads.append({**key, "vertebra": TOP, **dict.fromkeys(WRENCH, 0.0), column: moment})
-            for joint, k in zip(JOINTS, np.asarray(self.stiffness[specimen]), strict=True):
-                turned = np.rad2deg(moment / k) * [name == driven for name in ROTATIONS]
+            for level, (joint, k) in enumerate(
+                zip(JOINTS, np.asarray(self.stiffness[specimen]), strict=True)
+            ):
+                linear = moment / k
+                if specimen in self.growth:
+                    b = np.broadcast_to(self.growth[specimen], (3, 3))[level]
+                    linear = np.sign(moment) * np.log1p(b * np.abs(moment) / k) / b
+                turned = np.rad2deg(linear) * [name == driven for name in ROTATIONS]
                 read = turned + self.noise_deg * rng.normal(size=3)
                 motion.append({**key, "joint": joint, **dict(zip(DEGREES, read, strict=True))})
         self.loads, self.motion = pd.DataFrame(loads), pd.DataFrame(motion)
@@ -144,10 +153,15 @@ class Written:
         left_out.run(root, STUDY, paths, specimen, representation, fitted_to, **files)
         return _read(files)
 
-    def pool(self, fitted_to: str = "all", without: str = "nobody") -> Tables:
+    def pool(
+        self,
+        fitted_to: str = "all",
+        without: str = "nobody",
+        representation: str = "partially_pooled",
+    ) -> Tables:
         """Tables of the job ``pool``."""
         files = self._files("stiffness", "fits", "errors", "pooling")
-        pool.run(str(self.root), STUDY, fitted_to, without, **files)
+        pool.run(str(self.root), STUDY, representation, fitted_to, without, **files)
         return _read(files)
 
     def _files(self, *names: str) -> dict[str, str]:

@@ -227,7 +227,8 @@ def _pooling(size: Size) -> Iterator[Row]:
     if "partially_pooled" not in size.representations:
         return
     for coordinate, centre in PUBLISHED.items():
-        row = {"fitted_to": size.label, "without": "nobody", "coordinate": coordinate}
+        row = {"representation": "partially_pooled", "fitted_to": size.label}
+        row |= {"without": "nobody", "coordinate": coordinate}
         row |= {"unit": "N m/rad", "specimens": len(size.specimens), "iterations": 5}
         several = len(size.specimens) > 1
         found = {"centre": centre, "between_joints": 0.15}

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from example_effects import NOWHERE, JointCentreOffset, loaded, scoped, spine
+from example_effects import NOWHERE, loaded, spine
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal, norm
@@ -563,7 +563,3 @@ def test_what_does_not_belong_together_is_refused() -> None:
         pool(problems, noise=np.zeros(6))
     with pytest.raises(ValueError, match="no specimen"):
         pool([])
-    model = spine(2, effects=(scoped(JointCentreOffset(), (0, 1)),))
-    free = free_parameters(model, 1, ["forward"], "per_joint")
-    with pytest.raises(ValueError, match="logarithmic"):
-        pool([replace(problems[0], model=model, free=free)])

@@ -3,7 +3,7 @@
 
 COHORTS = results_of("cohort_stiffness")
 OWN = "specimen={specimen}/representation={representation}/fitted_to={fitted_to}"
-POOL = "fitted_to={fitted_to}/without={without}"
+POOL = "representation={representation}/fitted_to={fitted_to}/without={without}"
 
 
 wildcard_constraints:

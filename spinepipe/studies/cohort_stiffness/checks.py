@@ -1,12 +1,16 @@
 """What a cohort study demands of its cohort."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, one_of
-from spinepipe.studies.cohort_stiffness.representations import named
+from spinepipe.effects import create
+from spinepipe.model.file import read_model
+from spinepipe.problems import InputError, Problem, one_of
+from spinepipe.studies.cohort_stiffness.representations import STIFFENING, named
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     ALL_BUT,
@@ -14,6 +18,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     NOTHING,
     CohortStiffness,
 )
+from spinepipe.studies.cohort_stiffness.stiffening import EFFECT
 from spinepipe.studies.places import at, readings, unknown_levels, unknown_tests
 from spinepipe.units import ROTATIONS
 
@@ -116,3 +121,28 @@ def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterato
         allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
         remedy = "free rotations only, or choose cost: measurement_sd"
         yield Problem(*at(document, "free"), ", ".join(others), allowed, remedy)
+
+
+def check_one_stiffening(
+    document: Document, study: CohortStiffness, cohort: Cohort, root: Path
+) -> Iterator[Problem]:
+    """A base model that stiffens leaves nothing for a representation that does."""
+    asked = [name for name in study.representations if name in STIFFENING]
+    path = None if study.base is None else study.base.path(root)
+    if not asked or path is None or not path.is_file():
+        return
+    try:
+        effects = read_model(path).effects
+    except InputError:
+        return  # told by the check of the file itself
+    if any(one.effect == EFFECT and _coordinate(one.options) in study.free for one in effects):
+        found = f"{one_of(asked)}, and {EFFECT} in the base model too"
+        allowed = "one of them: two laws that scale one bushing cannot be told apart"
+        remedy = "leave these representations out, or take the effect out of the model file"
+        yield Problem(*at(document, "representations"), found, allowed, remedy)
+
+
+def _coordinate(options: Mapping[str, Any] | None) -> str:
+    effect: Any = create(EFFECT, options)
+    name: str = effect.coordinate
+    return name

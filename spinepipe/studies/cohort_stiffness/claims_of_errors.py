@@ -21,7 +21,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     listed,
     words,
 )
-from spinepipe.studies.cohort_stiffness.representations import EVERY, named
+from spinepipe.studies.cohort_stiffness.representations import EVERY, STIFFENING, named
 from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
     LEFT_OUT_CASE,
@@ -204,8 +204,11 @@ ERROR_CLAIMS = {"per_specimen": "", "level_ratio": "level_ratio_"}
 
 def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
     """Rows of the table ``findings`` that follow from those of ``errors``."""
-    seen = compared_motion(errors)
+    seen, asked = compared_motion(errors), set(errors["representation"])
     for comparison in COMPARISONS:
+        better = comparison.smaller.representation
+        if better in STIFFENING and better not in asked:
+            continue  # fitted only where a study asks for it: of nobody else is it claimed
         yield compared(comparison, seen, significance)
     yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)
     yield loaded_direction(_of(seen, UNIFORM), seen, significance)

@@ -11,6 +11,7 @@ from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.claims import FACTORS, NO_SUCH_FITS, Claim, Row, told, words
+from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
@@ -197,6 +198,7 @@ def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, wh
     if pooling is None:
         return ""
     here = (pooling["fitted_to"] == label) & (pooling["without"] == NOBODY)
+    here &= pooling["representation"] == POOLED[0]
     rows = pooling[here & (pooling["coordinate"] == coordinate)]
     usable = rows["status"].map(lambda name: Status(name).usable).astype(bool)
     if not usable.all():

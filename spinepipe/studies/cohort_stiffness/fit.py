@@ -1,5 +1,6 @@
 """Job: stiffness of one specimen in one representation, fitted to some of its load cases."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.stiffening import Growth, ended, fitted_growth, laws
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, write
 from spinepipe.tables.shared import joined
@@ -52,11 +54,13 @@ def run(
     where = specimen, representation, fitted_to
     problem, found, refusal = _fit(settings, cohort, *where, tests, others)
     if problem is None or found is None:
-        k, rows = None, _no_stiffness(settings, cohort, refusal)
+        k, growth, rows = None, None, _no_stiffness(settings, cohort, refusal)
         record = no_fit(Status.REFUSED.value, refusal)
     else:
-        k, rows = _stiffness(settings, cohort, problem, found)
+        growth = fitted_growth(settings, problem, found)
+        k, rows = _stiffness(settings, cohort, problem, found, growth)
         record = _record(problem, found)
+    others = (*laws(settings, None if growth is None else growth.values), *others)
     seen = [] if k is None else error_rows(cohort, specimen, tests, k, others)
     labelled = [
         {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
@@ -86,13 +90,19 @@ def _fit(
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
         below = settings.identifiable_below
-        return problem, fit(problem, settings.starts, seed, below, profiled=True), ""
+        found = fit(problem, settings.starts, seed, below, profiled=True)
+        status, message = ended(problem, found.at_bound, found.status, found.message)
+        return problem, replace(found, status=status, message=message), ""
     except RefusedModel as error:
         return None, None, str(error)
 
 
 def _stiffness(
-    settings: CohortStiffness, cohort: Cohort, problem: Problem, found: Fit
+    settings: CohortStiffness,
+    cohort: Cohort,
+    problem: Problem,
+    found: Fit,
+    growth: Growth | None,
 ) -> tuple[Any, list[Row]]:
     """Fitted stiffness (J, 6), None where the fit has none, and its rows."""
     usable = found.status.usable
@@ -102,6 +112,8 @@ def _stiffness(
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
     reaches = {}
     for index, unknown in enumerate(problem.free):
+        if unknown.effect:
+            continue  # of a law that stiffens
         at = (list(unknown.rows), unknown.column)
         error[at] = found.uncertainty.standard_error[index]
         known[at] = found.identifiable(index)
@@ -114,7 +126,8 @@ def _stiffness(
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
     rows = stiffness_rows(
-        cohort.joint_names, settings.free, values, error, freedom, known, bound, reaches
+        *(cohort.joint_names, settings.free, values, error, freedom, known, bound, reaches),
+        growth if usable else None,
     )
     ended = {"source": "own", "status": found.status.value, "message": found.message}
     return (k if usable else None), [{**row, **ended} for row in rows]

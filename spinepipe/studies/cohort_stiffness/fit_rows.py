@@ -11,6 +11,7 @@ from scipy import stats
 from spinepipe.calibrate import Problem
 from spinepipe.calibrate.profile import Reach
 from spinepipe.effects.contract import Array
+from spinepipe.studies.cohort_stiffness.stiffening import LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
 Row = dict[str, Any]
@@ -30,6 +31,7 @@ def stiffness_rows(
     identifiable: NDArray[np.bool_] | None,
     at_bound: NDArray[np.int64],
     reaches: Mapping[tuple[int, int], Reach] | None = None,
+    growth: Growth | None = None,
 ) -> list[Row]:
     """One row per joint and free coordinate.
 
@@ -40,6 +42,7 @@ def stiffness_rows(
     degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
     reaches : of the stiffness at a joint and coordinate, by profile likelihood; it takes the place
         of the interval.
+    growth : of laws that stiffen.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
@@ -57,6 +60,7 @@ def stiffness_rows(
                     **ends,
                     "identifiable": None if identifiable is None else bool(identifiable[at]),
                     "at_bound": _BOUND[int(at_bound[at])],
+                    **(LINEAR if growth is None else growth.row(at)),
                 }
             )
     return rows

@@ -7,7 +7,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.base_checks import BaseCheck
-from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness
+from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
@@ -101,7 +101,7 @@ class CohortLayout(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
-        pooled = ("pooling",) if POOLED in self.representations else ()
+        pooled = ("pooling",) if self._pooled_ones else ()
         analysed = (
             job.name for job in _ANALYSES if self.rebuilt or not job.name.startswith("against")
         )
@@ -126,7 +126,7 @@ class CohortLayout(StudyFiles):
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
-        whole = table != "sign_checks" and POOLED in self.representations
+        whole = table != "sign_checks" and self._pooled_ones
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
@@ -152,7 +152,12 @@ class CohortLayout(StudyFiles):
     @property
     def _single(self) -> tuple[str, ...]:
         """Representations fitted specimen by specimen."""
-        return tuple(name for name in self.representations if name != POOLED)
+        return tuple(name for name in self.representations if name not in POOLED)
+
+    @property
+    def _pooled_ones(self) -> tuple[str, ...]:
+        """Representations fitted to all specimens at once."""
+        return tuple(name for name in self.representations if name in POOLED)
 
     def _fits(self) -> list[str]:
         return [
@@ -180,14 +185,15 @@ class CohortLayout(StudyFiles):
         return tuple(label for label in self.load_sets if label == ALL or label in self.tests)
 
     def _pooled(self) -> list[str]:
-        places = [f"fitted_to={label}/without={NOBODY}" for label in self.load_sets]
+        folds = [(label, NOBODY) for label in self.load_sets]
         if self._held_out:
-            places += [
-                f"fitted_to={label}/without={name}"
-                for label in self._without_case_folds()
-                for name in self.specimens
-            ]
-        return places
+            labels = self._without_case_folds()
+            folds += [(label, name) for label in labels for name in self.specimens]
+        return [
+            f"representation={representation}/fitted_to={label}/without={without}"
+            for representation in self._pooled_ones
+            for label, without in folds
+        ]
 
 
 def _fits_of_others(expected: Any, place: Mapping[str, str]) -> list[str]:
@@ -204,7 +210,7 @@ KIND = Kind(
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
-    checks_of_files=(BaseCheck(own_bushings=True),),
+    checks_of_files=(BaseCheck(own_bushings=True), check_one_stiffening),
     tables=TABLES,
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),

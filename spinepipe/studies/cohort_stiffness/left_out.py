@@ -20,6 +20,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.stiffening import Growth, laws, median_growth
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.tables.shared import joined
@@ -41,11 +42,15 @@ def run(
     """Write the median of the other specimens' stiffness and the errors it leaves."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
-    k, used = _median(settings, cohort, representation, [read_frame(path) for path in others])
+    found = [read_frame(path) for path in others]
+    k, growth, used = _median(settings, cohort, representation, found)
     note = seen_note(root, settings, cohort, specimen)
-    rows = _stiffness(settings, cohort, k, used, len(others), note)
+    rows = _stiffness(settings, cohort, k, growth, used, len(others), note)
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
-    effects = base_effects(root, settings, cohort, specimen, left_out=True)
+    effects = (
+        *laws(settings, growth),
+        *base_effects(root, settings, cohort, specimen, left_out=True),
+    )
     seen = [] if not used else error_rows(cohort, specimen, tests, k, effects)
     labelled = [
         {**row, "source": SOURCE, "stage": "left_out_specimen"}
@@ -61,21 +66,32 @@ def run(
 
 def _median(
     settings: CohortStiffness, cohort: Cohort, representation: str, others: list[pd.DataFrame]
-) -> tuple[Array, int]:
-    """(J, 6) median over the others that have a stiffness, and how many these are."""
+) -> tuple[Array, Array | None, int]:
+    """(J, 6) median over the others that have a stiffness, that of growth, and how many they are.
+
+    Growth is None where the representation is linear, or nobody has any.
+    """
     k = start_stiffness(settings, cohort, representation)
     fitted = [frame for frame in others if frame["stiffness"].notna().all()]
     if not fitted:
-        return k, 0
-    keys = ["joint", "coordinate"]
-    median = pd.concat(fitted).groupby(keys, as_index=False)["stiffness"].median()
+        return k, None, 0
+    keys, values = ["joint", "coordinate"], ["stiffness", "growth"]
+    rows = pd.concat(fitted).astype(dict.fromkeys(values, float))
+    median = rows.groupby(keys, as_index=False)[values].median()
     joints = [cohort.joint_names.index(joint) for joint in median["joint"]]
     k[joints, [COORDINATES.index(name) for name in median["coordinate"]]] = median["stiffness"]
-    return k, len(fitted)
+    growth = median_growth(settings, cohort.joint_names, representation, median)
+    return k, growth, len(fitted)
 
 
 def _stiffness(
-    settings: CohortStiffness, cohort: Cohort, k: Array, used: int, others: int, note: str
+    settings: CohortStiffness,
+    cohort: Cohort,
+    k: Array,
+    growth: Array | None,
+    used: int,
+    others: int,
+    note: str,
 ) -> list[dict[str, Any]]:
     whole = f"median of {used} specimen{'s' if used != 1 else ''}"
     part = f"{others - used} of {others} have no stiffness" if used < others else ""
@@ -85,7 +101,8 @@ def _stiffness(
     values = k if used else np.full(k.shape, np.nan)
     none = np.zeros(k.shape, dtype=int)
     rows = stiffness_rows(
-        cohort.joint_names, settings.free, values, np.full(k.shape, np.inf), 0.0, None, none
+        *(cohort.joint_names, settings.free, values, np.full(k.shape, np.inf), 0.0, None, none),
+        growth=None if growth is None else Growth.of(growth),
     )
     ended = {"source": SOURCE, "status": status.value, "message": message}
     return [{**row, **ended} for row in rows]

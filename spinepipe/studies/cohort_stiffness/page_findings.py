@@ -9,7 +9,8 @@ import pandas as pd
 from spinepipe.report.page.document import Results, judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, PUBLISHED
+from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, POOLED, PUBLISHED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 
@@ -268,6 +269,7 @@ def spreads(study: CohortStiffness, results: Results) -> Iterator[str]:
     rows = results.table("pooling")
     if rows.empty:
         return
+    rows = rows[rows["representation"] == POOLED[0]]
     whole = rows[(rows["without"] == NOBODY) & (rows["fitted_to"] == joint_label_of(rows))]
     settled = whole[whole["status"].map(lambda name: Status(name).usable).astype(bool)]
     told = [_spread(row) for row in settled.dropna(subset=["centre"]).to_dict("records")]
@@ -297,5 +299,5 @@ def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
 
 MAKERS: tuple[Finding, ...] = (
     *(signs, failed, bounds, optima, identifiable),
-    *(ranking, claims, loaded_errors, spreads, beside_the_paper),
+    *(ranking, stiffening, claims, loaded_errors, spreads, beside_the_paper),
 )

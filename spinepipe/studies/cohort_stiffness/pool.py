@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem, pool
 from spinepipe.cohort import Cohort
@@ -13,6 +14,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import (
+    LEVEL,
     criteria,
     independent,
     no_fit,
@@ -27,10 +29,18 @@ from spinepipe.studies.cohort_stiffness.problem import (
     specimen_tests,
     start_stiffness,
 )
-from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
+from spinepipe.studies.cohort_stiffness.stiffening import (
+    Growth,
+    PooledUnknowns,
+    growth_spread,
+    laws,
+    pooled_ended,
+    pooled_growth,
+)
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables_of_laws import SPREAD_CELLS
 from spinepipe.tables import from_rows, write
 from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
@@ -41,12 +51,16 @@ NOBODY_FITTED = "no specimen has motion to fit"
 DECIDED = 0.5
 """Share of a newcomer's variance below which a specimen's own readings decide."""
 
+IN_POOLED = ("representation", "fitted_to")
+"""Columns that the folders of a file of one pooled fit carry."""
+
 NOT_DECIDED = "the specimen's readings do not decide: value and interval are the cohort's"
 
 
 def run(
     root: str,
     study: str,
+    representation: str,
     fitted_to: str,
     without: str,
     stiffness: str,
@@ -61,28 +75,32 @@ def run(
         name: base_effects(root, settings, cohort, name, left_out=name == without)
         for name in cohort.specimen_names
     }
-    problems, refusals = _problems(settings, cohort, fitted, fitted_to, others)
-    found = pool(list(problems.values())) if problems else None
+    problems, refusals = _problems(settings, cohort, representation, fitted, fitted_to, others)
+    asked = list(problems.values())
+    found = pooled_ended(asked, pool(asked)) if asked else None
     everyone = without == NOBODY
     note = "" if everyone else seen_note(root, settings, cohort, without)
-    rows = PooledRows(settings, cohort, fitted_to, problems, refusals, found, others, note)
+    rows = PooledRows(
+        *(settings, cohort, representation, fitted_to, problems, refusals, found, others, note)
+    )
     told = fitted if everyone else [without]
     values = [row for name in told for row in rows.stiffness(name)]
     seen = [row for name in told for row in rows.errors(name)]
     records = [rows.record(name) for name in told] if everyone else []
     source = "own" if everyone else "others_pooled"
-    by = {"representation": POOLED, "source": source}
+    by = {"source": source}
     made = origin("pool", root, settings, cohort)
-    shape = STIFFNESS.without("fitted_to")
-    write(from_rows(shape, [{**row, **by} for row in values]), stiffness, made)
-    write(from_rows(ERRORS.without("fitted_to"), [{**row, **by} for row in seen]), errors, made)
-    write(from_rows(FITS.without("fitted_to"), [{**row, **by} for row in records]), fits, made)
-    write(from_rows(POOLING.without("fitted_to", "without"), rows.pooling()), pooling, made)
+    shapes = [table.without(*IN_POOLED) for table in (STIFFNESS, ERRORS, FITS)]
+    write(from_rows(shapes[0], [{**row, **by} for row in values]), stiffness, made)
+    write(from_rows(shapes[1], [{**row, **by} for row in seen]), errors, made)
+    write(from_rows(shapes[2], records), fits, made)
+    write(from_rows(POOLING.without(*IN_POOLED, "without"), rows.pooling()), pooling, made)
 
 
 def _problems(
     settings: CohortStiffness,
     cohort: Cohort,
+    representation: str,
     names: list[str],
     fitted_to: str,
     others: Mapping[str, tuple[ScopedEffect, ...]],
@@ -97,7 +115,7 @@ def _problems(
             continue
         try:
             found[name] = calibration_problem(
-                settings, cohort, name, POOLED, tests.frames, chosen, others[name]
+                settings, cohort, name, representation, tests.frames, chosen, others[name]
             )
         except RefusedModel as error:
             refusals[name] = str(error)
@@ -118,6 +136,7 @@ class PooledRows:
 
     study: CohortStiffness
     cohort: Cohort
+    representation: str
     fitted_to: str
     problems: Mapping[str, Problem]
     refusals: Mapping[str, str]
@@ -139,7 +158,10 @@ class PooledRows:
         if values is None:
             return []
         tests = specimen_tests(self.study, self.cohort, specimen)
-        found = error_rows(self.cohort, specimen, tests, values[0], self.others.get(specimen, ()))
+        growth = self._growth(specimen)
+        effects = laws(self.study, None if growth is None else growth.values)
+        others = (*effects, *self.others.get(specimen, ()))
+        found = error_rows(self.cohort, specimen, tests, values[0], others)
         rows = [{**row, "specimen": specimen} for row in found]
         if specimen not in self.problems:
             within = [r for r in rows if tests.stage(r["test"], self.fitted_to) == "fitted"]
@@ -172,7 +194,7 @@ class PooledRows:
 
     def pooling(self) -> list[Row]:
         """Rows of table ``pooling``, one per free coordinate."""
-        spreads = {s.name: s for s in self.found.spreads} if self.found else {}
+        spreads = {s.name: s for s in self.found.spreads if not s.effect} if self.found else {}
         return [self._spread(name, spreads) for name in self.study.free]
 
     def _spread(self, name: str, spreads: Mapping[str, CohortSpread]) -> Row:
@@ -188,6 +210,7 @@ class PooledRows:
                 "scatter",
                 "effective_unknowns",
                 "log_likelihood",
+                *SPREAD_CELLS,
             )
         )
         row: Row = {
@@ -201,13 +224,14 @@ class PooledRows:
         }
         if found is None or spread is None:
             return row
-        start = float(start_stiffness(self.study, self.cohort, POOLED)[0, place])
+        start = float(start_stiffness(self.study, self.cohort, self.representation)[0, place])
         alone = all(independent(problem) for problem in self.problems.values())
         return row | {
             "centre": start * float(np.exp(spread.mean)),
             "between_levels": spread.level or None,  # zero: not told from the rest
             "between_specimens": spread.specimen or None,
             "between_joints": spread.rest,
+            **growth_spread(self.study, found, name),
             "scatter": found.scatter,
             "effective_unknowns": found.effective_parameters,
             "log_likelihood": found.log_likelihood if alone else None,
@@ -238,28 +262,53 @@ class PooledRows:
     def _values(self, specimen: str) -> tuple[Array, Array, Indices, Indices] | None:
         """Stiffness, error of its logarithm, bounds reached and what readings decide, (J, 6).
 
-        None without a fit. A newcomer has one where the pool has ended: it can be expected to be
-        like the others.
+        None without a fit.
         """
-        if self.found is None or not self._ended(specimen)[0].usable:
+        told = self._told(specimen)
+        if told is None:
             return None
-        own = self._own(specimen)
-        x = self.found.newcomer if own is None else own.x
-        covariance = self.found.newcomer_covariance if own is None else own.covariance
-        free = next(iter(self.problems.values())).free
-        k = start_stiffness(self.study, self.cohort, POOLED)
+        k = start_stiffness(self.study, self.cohort, self.representation)
         error = np.full(k.shape, np.inf)
         bound = np.zeros(k.shape, dtype=int)
         decided = np.zeros(k.shape, dtype=int)
-        expected = DECIDED * np.diagonal(self.found.newcomer_covariance)
-        for index, unknown in enumerate(free):
+        for index, unknown in enumerate(told.free):
+            if unknown.effect:
+                continue  # of a law that stiffens
             at = unknown.rows[0], unknown.column
-            k[at] *= np.exp(x[index])
-            bound[at] = 0 if own is None else own.at_bound[index]
-            decided[at] = covariance[index, index] < expected[index]
+            k[at] *= np.exp(told.x[index])
+            bound[at] = told.at_bound[index]
+            decided[at] = told.decided is not None and told.decided[index]
             if not bound[at]:  # the covariance is not told of bounds
-                error[at] = np.sqrt(covariance[index, index])
+                error[at] = np.sqrt(told.variance[index])
         return k, error, bound, decided
+
+    def _told(self, specimen: str) -> PooledUnknowns | None:
+        """What the pool says of the unknowns of a fitted specimen or a newcomer.
+
+        A newcomer has them where the pool has ended: it can be expected to be like the others.
+        """
+        if self.found is None or not self._ended(specimen)[0].usable:
+            return None
+        own, newcomer = self._own(specimen), np.diagonal(self.found.newcomer_covariance)
+        free = next(iter(self.problems.values())).free
+        if own is None:
+            nothing = np.zeros(len(free), dtype=int)
+            return PooledUnknowns(free, self.found.newcomer, newcomer, nothing, None)
+        variance = np.diagonal(own.covariance)
+        decided = variance < DECIDED * newcomer
+        return PooledUnknowns(free, own.x, variance, own.at_bound, decided)
+
+    def _growth(self, specimen: str) -> Growth | None:
+        """What is known of growth; None for a linear fit or without one."""
+        told, joints = self._told(specimen), len(self.cohort.joint_names)
+        freedom = self._freedom(specimen)
+        reach = float(stats.t.ppf(LEVEL, freedom)) if freedom > 0.0 else np.inf
+        return None if told is None else pooled_growth(self.study, told, joints, reach)
+
+    def _freedom(self, specimen: str) -> float:
+        """Degrees of freedom of intervals: a newcomer's hang on spreads that are estimated."""
+        fitted = specimen in {*self.problems, *self.refusals}
+        return np.inf if fitted else self._specimens() - 1.0
 
     def _rows(
         self, k: Array, error: Array, bound: Indices, decided: Indices, specimen: str
@@ -267,8 +316,11 @@ class PooledRows:
         status, message = self._ended(specimen)
         joints, fitted = self.cohort.joint_names, specimen in {*self.problems, *self.refusals}
         known = (error < self.study.identifiable_below) & (decided > 0) if fitted else None
-        freedom = np.inf if fitted else self._specimens() - 1.0
-        rows = stiffness_rows(joints, self.study.free, k, error, freedom, known, bound)
+        freedom = self._freedom(specimen)
+        rows = stiffness_rows(
+            *(joints, self.study.free, k, error, freedom, known, bound),
+            growth=self._growth(specimen),
+        )
         for row in rows:
             at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
             of_cohort = fitted and np.isfinite(error[at]) and not decided[at]

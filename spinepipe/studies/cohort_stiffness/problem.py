@@ -28,6 +28,7 @@ from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
+from spinepipe.studies.cohort_stiffness.stiffening import free_growth, laws
 from spinepipe.studies.parts import Damping, stiffness_of_joints
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
 
@@ -112,13 +113,17 @@ def calibration_problem(
     RefusedModel
         When frames and loads make no model.
     """
-    start = start_stiffness(study, cohort, representation)
-    model = stiff_model(cohort, specimen, frames, start, others)
+    start, one = start_stiffness(study, cohort, representation), named(representation)
+    growth = np.zeros(start.shape) if one.stiffens else None
+    model = stiff_model(cohort, specimen, frames, start, (*laws(study, growth), *others))
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
-    grouping = named(representation).grouping
-    assert grouping is not None  # nothing of a published set is fitted
-    free = free_parameters(model, 0, names, grouping)
-    reach = np.full(len(free), np.log(study.bound_factor))
+    assert one.grouping is not None  # nothing of a published set is fitted
+    stiffness = free_parameters(model, 0, names, one.grouping)
+    growths = free_growth(study, model, representation)
+    free = stiffness + growths
+    reach = np.append(
+        np.full(len(stiffness), np.log(study.bound_factor)), np.full(len(growths), np.inf)
+    )  # of growth its declared bounds
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested
     )

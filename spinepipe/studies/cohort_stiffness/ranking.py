@@ -27,7 +27,8 @@ from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.tables.shared import joined
 
 INFORMATION = ("aicc", "bic")
-SPREADS = ("between_levels", "between_specimens", "between_joints")
+_SPREADS = ("between_levels", "between_specimens", "between_joints")
+SPREADS = (*_SPREADS, *(f"growth_{name}" for name in _SPREADS))
 NO_P = "no p for information criteria: pooled specimens are not independent"
 NO_RESULT = "no specimen has a result"
 NONE_COMPLETE = "no specimen has a result in every representation"
@@ -57,9 +58,9 @@ def ranking_rows(
     for criterion in CRITERIA:
         if criterion in INFORMATION:
             found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
-            count = estimated_spreads(fits, pooling)
-            order = ranked(found, True, specimens, _penalty(fits, criterion, count))
-            order = [_conditional(row, count) for row in order]
+            counts = {name: estimated_spreads(fits, pooling, name) for name in POOLED}
+            order = ranked(found, True, specimens, _penalty(fits, criterion, counts))
+            order = [_conditional(row, counts) for row in order]
         else:
             found = _errors(errors, criterion, names)
             order = ranked(found, False, specimens, unit=unit_of(errors))
@@ -67,27 +68,34 @@ def ranking_rows(
     return rows
 
 
-def estimated_spreads(fits: pd.DataFrame, pooling: pd.DataFrame | None) -> int:
-    """How many spreads the pooled fit to all load cases and specimens has estimated."""
+def estimated_spreads(fits: pd.DataFrame, pooling: pd.DataFrame | None, name: str) -> int:
+    """How many spreads a pooled fit to all load cases and specimens has estimated."""
     if pooling is None:
         return 0
     here = (pooling["fitted_to"] == joint_label_of(fits)) & (pooling["without"] == NOBODY)
+    here &= pooling["representation"] == name
     return int(pooling.loc[here, list(SPREADS)].notna().sum().sum())
 
 
-def _penalty(fits: pd.DataFrame, criterion: str, count: int) -> dict[Candidate, float]:
+def _penalty(
+    fits: pd.DataFrame, criterion: str, counts: Mapping[str, int]
+) -> dict[Candidate, float]:
     """What the spreads add to the cohort's criterion, which fits of specimens do not count."""
-    here = (fits["fitted_to"] == joint_label_of(fits)) & (fits["representation"] == POOLED)
-    readings = int(fits.loc[here, "readings"].sum())
-    if not count or not readings:
-        return {}
-    return {(POOLED, "own"): count * (2.0 if criterion == "aicc" else float(np.log(readings)))}
+    found = {}
+    for name, count in counts.items():
+        here = (fits["fitted_to"] == joint_label_of(fits)) & (fits["representation"] == name)
+        readings = int(fits.loc[here, "readings"].sum())
+        if count and readings:
+            each = 2.0 if criterion == "aicc" else float(np.log(readings))
+            found[name, "own"] = count * each
+    return found
 
 
-def _conditional(row: Row, count: int) -> Row:
+def _conditional(row: Row, counts: Mapping[str, int]) -> Row:
     """The row of a pooled fit told of what its criterion is (Vaida and Blanchard 2005)."""
-    if row["representation"] != POOLED or row["value"] is None:
+    if row["representation"] not in POOLED or row["value"] is None:
         return row
+    count = counts[row["representation"]]
     note = f"conditional criterion; {count} spreads of the cohort counted once as unknowns"
     return row | {"message": joined(note, row["message"])}
 
@@ -108,7 +116,7 @@ def _source(name: str, criterion: str) -> str:
         return "literature"
     if criterion != LEFT_OUT_SPECIMEN:
         return "own"
-    return "others_pooled" if name == POOLED else "others_median"
+    return "others_pooled" if name in POOLED else "others_median"
 
 
 def _information(

@@ -21,7 +21,9 @@ class Representation:
     by_level : whether it starts from the published values of each level, else from one for all.
     grouping : which joints share an unknown, as in `free_parameters`; None where it is published
         and nothing is fitted.
-    pooled : whether it is fitted to all specimens at once; one representation is.
+    pooled : whether it is fitted to all specimens at once.
+    stiffens : whether resistance grows as the joint moves, by an unknown beside each stiffness.
+        Studies ask for such a one by name.
     beats : those that it is claimed to be better than on held-out motion.
     """
 
@@ -32,6 +34,7 @@ class Representation:
     by_level: bool = False
     grouping: Literal["per_specimen", "per_joint"] | None = None
     pooled: bool = False
+    stiffens: bool = False
     beats: tuple[str, ...] = ()
 
 
@@ -82,8 +85,37 @@ EVERY = (
         pooled=True,
         beats=("per_specimen", "level_ratio", "per_joint"),
     ),
+    Representation(
+        "stiffening",
+        words="one value per specimen, stiffening",
+        sentence="one stiffening law for all joints",
+        about="one law for all joints of a specimen: stiffness at rest, and how fast it grows",
+        grouping="per_specimen",
+        stiffens=True,
+        beats=("per_specimen",),
+    ),
+    Representation(
+        "per_joint_stiffening",
+        words="each joint its own, stiffening",
+        sentence="a stiffening law for each joint",
+        about="a law for each joint: stiffness at rest, and how fast it grows",
+        grouping="per_joint",
+        stiffens=True,
+        beats=("per_joint",),
+    ),
+    Representation(
+        "pooled_stiffening",
+        words="partially pooled, stiffening",
+        sentence="partially pooled stiffening laws",
+        about="a law for each joint, stiffness and growth drawn towards specimen and cohort as far "
+        "as the data ask for it",
+        grouping="per_joint",
+        pooled=True,
+        stiffens=True,
+        beats=("partially_pooled", "per_joint_stiffening"),
+    ),
 )
-"""All of them, from what is taken as published to what is free in each joint."""
+"""All of them, from what is taken as published to what is free in each joint; linear ones first."""
 
 _NAMED = {one.name: one for one in EVERY}
 
@@ -99,14 +131,20 @@ PUBLISHED = tuple(one.name for one in EVERY if one.grouping is None)
 FITTED = tuple(one.name for one in EVERY if one.grouping is not None)
 """Those that are fitted, among which studies choose."""
 
+UNLESS_ASKED = tuple(name for name in FITTED if not _NAMED[name].stiffens)
+"""Those that are fitted where a study does not choose."""
+
+STIFFENING = tuple(name for name in FITTED if _NAMED[name].stiffens)
+"""Those whose resistance grows as the joint moves."""
+
 SHARED = tuple(one.name for one in EVERY if one.grouping == "per_specimen")
 """Those of which all joints of a specimen share an unknown."""
 
 OF_JOINTS = tuple(one.name for one in EVERY if one.grouping == "per_joint")
 """Those with an unknown for each joint."""
 
-(POOLED,) = (one.name for one in EVERY if one.pooled)
-"""The one that is fitted to all specimens at once."""
+POOLED = tuple(one.name for one in EVERY if one.pooled)
+"""Those that are fitted to all specimens at once; the linear one first."""
 
 
 def named(name: str) -> Representation:

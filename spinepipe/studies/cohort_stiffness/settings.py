@@ -9,7 +9,7 @@ from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.studies.base_model import Base
-from spinepipe.studies.cohort_stiffness.representations import FITTED, named
+from spinepipe.studies.cohort_stiffness.representations import FITTED, UNLESS_ASKED, named
 from spinepipe.studies.parts import (
     FORM,
     Coordinates,
@@ -69,9 +69,10 @@ class CohortStiffness(Study):
         default="all", description="load steps that enter the cost: all, or that of largest moment"
     )
     representations: EachOnce[Fitted] = Field(
-        default=FITTED,
+        default=UNLESS_ASKED,
         description="how stiffness is described; what the literature says is always shown beside. "
-        "Ratios of levels are left out, unless asked for here, where none are published",
+        "Ratios of levels are left out, unless asked for here, where none are published; laws that "
+        "stiffen are fitted only where asked for",
     )
     free: Coordinates = Field(
         default=("extension", "right_bending", "left_rotation"),

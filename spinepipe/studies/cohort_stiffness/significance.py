@@ -200,7 +200,7 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
 
     Pooled fits are no least squares fits: they are drawn towards the cohort.
     """
-    plain = fits[fits["representation"] != POOLED]
+    plain = fits[~fits["representation"].isin(POOLED)]
     for (representation, specimen), rows in plain.groupby(
         ["representation", "specimen"], sort=False
     ):

@@ -1,7 +1,8 @@
 """Tables of studies of kind cohort_stiffness: fits, their errors, and what follows from them."""
 
 from spinepipe.studies.cohort_stiffness.claims import HOLDS
-from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES
+from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES, POOLED
+from spinepipe.studies.cohort_stiffness.tables_of_laws import GROWTH, GROWTH_SPREADS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.tables.shared import STATISTICS, against_paper
 from spinepipe.units import COORDINATES
@@ -100,6 +101,7 @@ STIFFNESS = Table(
         Column(
             "at_bound", "text", "whether the fit ended at a bound", allowed=("no", "lower", "upper")
         ),
+        *GROWTH,
         status("fit"),
         MESSAGE,
     ),
@@ -209,10 +211,12 @@ def _spread(name: str, meaning: str) -> Column:
 
 POOLING = Table(
     "pooling",
-    "Partial pooling: what the hierarchical fit found out about the cohort, one row per load cases "
-    "fitted to, specimen left out and coordinate. Spreads are SDs of the logarithm of stiffness.",
-    ("fitted_to", "without", "coordinate"),
+    "Partial pooling: what the hierarchical fit found out about the cohort, one row per "
+    "representation, load cases fitted to, specimen left out and coordinate. Spreads are SDs of "
+    "the logarithm of stiffness.",
+    ("representation", "fitted_to", "without", "coordinate"),
     (
+        Column("representation", "text", "see stiffness", allowed=POOLED),
         FITTED_TO,
         Column("without", "text", "specimen left out, or nobody"),
         COORDINATE,
@@ -221,6 +225,7 @@ POOLING = Table(
         _spread("between_levels", "SD between levels, the same in all specimens"),
         _spread("between_specimens", "SD between specimens, the same at all levels"),
         _spread("between_joints", "SD of what is left: each joint for itself"),
+        *GROWTH_SPREADS,
         Column("specimens", "integer", "specimens it was fitted to", low=0),
         Column("scatter", "number", "scatter of readings, see fits", null=NO_FIT, low=0.0),
         Column(

@@ -280,6 +280,7 @@ def test_loaded_stiffness_of_specimens_with_different_main_moments() -> None:
 def test_pooled_spreads_are_told_beside() -> None:
     pooling = [
         {
+            "representation": "partially_pooled",
             "fitted_to": "all",
             "without": who,
             "coordinate": "extension",

@@ -5,7 +5,7 @@ import pytest
 from cohort_analysis_cases import fit, only, seen, series
 
 from spinepipe.studies.cohort_stiffness.mae import mae_rows
-from spinepipe.studies.cohort_stiffness.ranking import ranked, ranking_rows
+from spinepipe.studies.cohort_stiffness.ranking import SPREADS, ranked, ranking_rows
 from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, of_single_cases, specimen_rms
 from spinepipe.studies.cohort_stiffness.tables import MAE
 from spinepipe.tables import from_rows
@@ -126,12 +126,14 @@ def test_spreads_of_the_cohort_count_once_in_its_criteria() -> None:
     fits = pd.concat([fits, fits.assign(fitted_to="x"), fits.assign(fitted_to="y")])
     pooling = pd.DataFrame(
         {
+            "representation": "partially_pooled",
             "fitted_to": label,
             "without": who,
             "coordinate": c,
             "between_levels": level,
             "between_specimens": 0.2,
             "between_joints": 0.1,
+            **dict.fromkeys(SPREADS[3:]),  # of growth, in fits that stiffen alone
         }
         for label in ("all", "x")
         for who in ("nobody", "a")

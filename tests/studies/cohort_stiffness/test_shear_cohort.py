@@ -100,8 +100,9 @@ def frames(project: Written) -> Frames:
     for label in (*TESTS, "all"):
         for without in ("nobody", *TRUE_N_PER_MM):
             found = project.pool(label, without)
-            keep({"pooling": found.pop("pooling")}, without=without, fitted_to=label)
-            keep(found, representation="partially_pooled", fitted_to=label)
+            where = {"representation": "partially_pooled", "fitted_to": label}
+            keep({"pooling": found.pop("pooling")}, without=without, **where)
+            keep(found, **where)
     joined = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
     joined["mae"] = _table(MAE, mae_rows(joined["errors"]))
     joined["ranking"] = _table(

@@ -22,6 +22,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     POOLED,
     PUBLISHED,
     SHARED,
+    STIFFENING,
 )
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import compared_motion, joint_label_of, unit_of
@@ -36,7 +37,7 @@ _BY_WHOM = {
 _FEW = (
     (PUBLISHED[0], "literature"),
     (OF_JOINTS[0], "fitted"),
-    (POOLED, "left_out_specimen"),
+    (POOLED[0], "left_out_specimen"),
 )
 _ALL = (
     _FEW[0],
@@ -45,7 +46,7 @@ _ALL = (
     (OF_JOINTS[0], "left_out_specimen"),
     _FEW[2],
 )
-_INSTEAD = (*OF_JOINTS[::-1], *SHARED)
+_INSTEAD = tuple(sorted((*OF_JOINTS[::-1], *SHARED), key=STIFFENING.__contains__))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     OF_JOINTS,
     PUBLISHED,
     SHARED,
+    STIFFENING,
     named,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -61,7 +62,9 @@ _MOST_LETTERS = 140
 
 _PANEL_MM, _KEY_MM = 56.0, 22.0
 _MOST_NAMES = 12
-_FROM_BEST = (*OF_JOINTS, *SHARED)
+_FROM_BEST = tuple(sorted((*OF_JOINTS, *SHARED), key=STIFFENING.__contains__))
+"""Linear ones first: a stiffness at rest is not to be compared with one of the whole motion."""
+
 _MARKS = (Mark(OURS, "o", 3.4), Mark(BEST, "D", 2.9))
 _DASHES: tuple[int, tuple[int, int]] = (0, (4, 2))
 
@@ -94,6 +97,7 @@ def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
     """At most two: those with a value for each joint first; one where two would crowd."""
     known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
     found = [name for name in _FROM_BEST if name in set(known["representation"])]
+    found = [name for name in found if name not in STIFFENING] or found
     free = [name for name in found if name in OF_JOINTS] or found[:1]
     one = len(cohort.joint_names) * len(cohort.specimen_names)
     return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]

@@ -1,0 +1,200 @@
+"""Laws that stiffen: found where joints do, not claimed where they do not.
+
+Truth in closed form: a joint that holds ``k (exp(b |q|) - 1) / b`` turns by ``log(1 + b M/k) / b``.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from chain_cases import STUDY, Chains, Written, by_joint
+
+from spinepipe.jobs.tested_rows import corrected_rows
+from spinepipe.problems import InputError
+from spinepipe.report.page.document import Results
+from spinepipe.studies.cohort_stiffness import left_out
+from spinepipe.studies.cohort_stiffness.findings import finding_rows
+from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
+from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.cohort_stiffness.significance import all_tests
+from spinepipe.studies.cohort_stiffness.tables import FINDINGS, RANKING
+from spinepipe.studies.read import check, read
+from spinepipe.tables import Tables, from_rows, read_frame
+
+K = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
+B = np.array([[8.0, 6.0, 20.0], [10.0, 5.0, 15.0], [6.0, 9.0, 30.0]])
+SPECIMENS = {"a": 1.0, "b": 0.8, "c": 1.5, "d": 1.2, "e": 0.9}
+PER_JOINT = "per_joint_stiffening"
+TESTS = ("flexion", "left_lateral_bending", "left_axial_rotation")
+ASKED = ("per_specimen", "stiffening", "per_joint_stiffening", "pooled_stiffening")
+STIFFENS = f"representations: [{', '.join(ASKED)}]\nstarts: 1\n"
+
+Frames = dict[str, pd.DataFrame]
+
+
+def cohort(growth: float, noise_deg: float, specimens: int = 5, steps: int = 6) -> Chains:
+    """Specimens that are stiffer than each other alike; growth in shares of `B`, 0 linear."""
+    names = list(SPECIMENS)[:specimens]
+    return Chains(
+        {name: SPECIMENS[name] * K for name in names},
+        steps=steps,
+        step_nm=1.5,
+        noise_deg=noise_deg,
+        study=STIFFENS,
+        growth=dict.fromkeys(names, growth * B) if growth else {},
+    )
+
+
+@pytest.mark.parametrize("representation", ["per_joint_stiffening", "pooled_stiffening"])
+def test_each_law_is_found_from_motion_without_noise(representation: str, tmp_path: Path) -> None:
+    project = cohort(1.0, 0.0, specimens=2, steps=4).write(tmp_path)
+    pooled = representation == "pooled_stiffening"
+    found = (
+        project.pool(representation=representation) if pooled else project.fit("a", representation)
+    )
+    stiffness = found["stiffness"]
+    if pooled:
+        stiffness = stiffness[stiffness["specimen"] == "a"]
+    # |q| is rounded over 1e-4 rad, and a joint turns by 0.007 to 0.08
+    names = ["extension", "right_bending", "left_rotation"]
+    np.testing.assert_allclose(by_joint(stiffness)[names], K, rtol=5e-3)
+    np.testing.assert_allclose(by_joint(stiffness, "growth")[names], B, rtol=5e-2)
+    assert set(stiffness["growth_unit"]) == {"1/rad"}
+    assert (found["errors"]["rmse"] < 2e-3).all()
+    if not pooled:
+        assert found["fits"]["unknowns"].item() == 18
+        assert stiffness["growth_identifiable"].all()
+        assert not stiffness["growth_open_below"].any()
+
+
+def test_the_spread_of_growth_over_a_cohort_is_that_of_the_truth(tmp_path: Path) -> None:
+    """Growth differs between levels alone: means and SDs of the columns of the truth."""
+    spread = cohort(1.0, 0.02, specimens=4).write(tmp_path).pool(representation="pooled_stiffening")
+    rows = spread["pooling"].set_index("coordinate")
+    for column, name in enumerate(("extension", "right_bending")):
+        levels = B[:, column]
+        assert rows.loc[name, "growth_centre"] == pytest.approx(levels.mean(), rel=0.1)
+        assert levels.std() < rows.loc[name, "growth_between_levels"] < 3.0 * levels.std(ddof=1)
+        assert rows.loc[name, "growth_between_joints"] < 0.5 * levels.std()
+
+
+def test_a_linear_joint_is_told_to_be_open_below(tmp_path: Path) -> None:
+    found = cohort(0.0, 0.05, specimens=1).write(tmp_path).fit("a", "per_joint_stiffening")
+    rows = found["stiffness"]
+    assert rows["growth_open_below"].mean() > 0.7  # each is wrong in 2.5 % by chance
+    assert (rows.loc[rows["growth_open_below"], "growth_low"] == 0.0).all()
+    assert not rows.loc[rows["growth_open_below"], "growth_identifiable"].any()
+
+
+def test_a_left_out_specimen_gets_the_medians_of_both(tmp_path: Path) -> None:
+    project = cohort(1.0, 0.0, specimens=4, steps=4).write(tmp_path)
+    rows = project.left_out(["b", "c", "d"], "a", "stiffening")["stiffness"]
+    own = [project.fit(name, "stiffening")["stiffness"] for name in "bcd"]
+    for value in ("stiffness", "growth"):
+        expected = np.median([by_joint(one, value) for one in own], axis=0)
+        np.testing.assert_allclose(by_joint(rows, value), expected, rtol=1e-9)
+    assert rows["growth_identifiable"].isna().all()
+
+
+def test_what_no_reading_tells_of_stays_linear(tmp_path: Path) -> None:
+    """Bending tells nothing of extension and rotation: their laws must not be a start value."""
+    project = cohort(1.0, 0.02, specimens=2, steps=4).write(tmp_path)
+    for found in (
+        project.fit("a", "stiffening", "left_lateral_bending"),
+        project.pool("left_lateral_bending", representation="pooled_stiffening"),
+    ):
+        rows = found["stiffness"].set_index("coordinate")
+        assert (rows.loc[["extension", "left_rotation"], "growth"] < 1e-6).all()
+        assert (rows.loc["right_bending", "growth"] > 1.0).all()
+        assert not rows.loc[["extension", "left_rotation"], "growth_identifiable"].any()
+
+
+def test_a_growth_of_zero_is_a_linear_joint_and_no_bound_of_stiffness(tmp_path: Path) -> None:
+    """Joints that soften: growth ends at zero, which is told as linear."""
+    softening = cohort(0.0, 0.0, specimens=2)
+    softening.motion["extension_deg"] *= 1.0 + 0.2 * softening.motion["step"] / 5.0
+    project = softening.write(tmp_path)
+    for found in (project.fit("a", "stiffening"), project.pool(representation="pooled_stiffening")):
+        extension = found["stiffness"][found["stiffness"]["coordinate"] == "extension"]
+        assert (extension["growth"] == 0.0).all()
+        assert set(extension["growth_at_bound"]) == {"lower"}
+        assert set(found["fits"]["status"]) == {"converged"}
+        assert found["fits"]["message"].str.contains("linear: ").all()
+
+
+def linear_and_stiffening(project: Written) -> Frames:
+    """Tables of a study of one linear and one stiffening law and one test, job by job."""
+    parts: dict[str, list[pd.DataFrame]] = {}
+
+    def keep(found: Frames, **where: str) -> None:
+        for table, rows in found.items():
+            parts.setdefault(table, []).append(rows.assign(**where))
+
+    for name in ("per_specimen", "stiffening"):
+        where = {"representation": name, "fitted_to": "flexion"}
+        kept = {}
+        for specimen in SPECIMENS:
+            keep(project.fit(specimen, name, "flexion"), specimen=specimen, **where)
+            kept[specimen] = str(project.root / f"{specimen}.parquet")
+            (project.root / "stiffness.parquet").replace(kept[specimen])
+        for specimen in SPECIMENS:
+            others = [path for other, path in kept.items() if other != specimen]
+            files = {key: str(project.root / f"{key}.parquet") for key in ("stiffness", "errors")}
+            left_out.run(str(project.root), STUDY, others, specimen, name, "flexion", **files)
+            found = {key: read_frame(path) for key, path in files.items()}
+            keep(found, specimen=specimen, **where)
+    for specimen in SPECIMENS:
+        keep(project.literature(specimen), specimen=specimen)
+    frames = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
+    rows = ranking_rows(frames["errors"], frames["fits"])
+    frames["ranking"] = from_rows(RANKING, rows).to_pandas()
+    tested = list(all_tests(frames["errors"], frames["fits"]))
+    frames["statistics"] = pd.DataFrame(list(corrected_rows(tested)))
+    frames["findings"] = from_rows(FINDINGS, list(finding_rows(frames, 0.05))).to_pandas()
+    return frames
+
+
+def alike(growth: float) -> Chains:
+    """A cohort in which joints of a specimen are alike, so that only stiffening is at stake."""
+    flat = {name: np.tile(K.mean(axis=0), (3, 1)) * SPECIMENS[name] ** 0.1 for name in SPECIMENS}
+    rates = {name: growth * np.tile(B.mean(axis=0), (3, 1)) for name in SPECIMENS}
+    study = "representations: [per_specimen, stiffening]\nfree: [extension]\nstarts: 1\n"
+    chosen = rates if growth else {}
+    tests = ["flexion"]
+    return Chains(flat, tests, steps=6, step_nm=1.5, noise_deg=0.05, study=study, growth=chosen)
+
+
+@pytest.mark.parametrize(("growth", "wins"), [(1.0, True), (0.0, False)])
+def test_stiffening_wins_where_joints_stiffen_and_only_there(
+    growth: float, wins: bool, tmp_path: Path
+) -> None:
+    study = read(alike(growth).write(tmp_path).root / "config/studies" / f"{STUDY}.yaml", tmp_path)
+    assert isinstance(study, CohortStiffness)
+    frames = linear_and_stiffening(Written(tmp_path))
+    findings = frames["findings"].set_index("finding")
+    claim = findings.loc["stiffening_beats_per_specimen_left_out_specimen"]
+    assert (claim["holds"] == "yes") is wins
+    best = frames["ranking"]
+    best = best[(best["criterion"] == "aicc") & (best["rank"] == 1)]["representation"].item()
+    assert best == ("stiffening" if wins else "per_specimen")
+    first, held = stiffening(study, Results(Tables(frames), {}, {}))
+    assert first.startswith("Are joints that stiffen worth their parameters? Yes") is wins
+    assert ("5 of 5 laws" in held) is wins
+
+
+def test_a_base_model_that_stiffens_leaves_nothing_to_such_a_representation(
+    tmp_path: Path,
+) -> None:
+    model = (
+        "model: probe\ncohort: chains\neffects:\n- effect: linear_bushing\n"
+        "- effect: nonlinear_stiffening\n  options: {coordinate: extension}\n"
+        "  values:\n  - {rate: 5.0}\n"
+    )
+    (tmp_path / "model.yaml").write_text(model)
+    chains = cohort(0.0, 0.0, specimens=1)
+    chains.study += "base: {model: model.yaml}\n"
+    root = chains.write(tmp_path).root
+    with pytest.raises(InputError, match="two laws that scale one bushing"):
+        check(root, STUDY)
