@@ -1,4 +1,7 @@
-"""`spinepipe check`: every problem of studies and cohorts, before anything runs."""
+"""`spinepipe check`: every problem of studies and cohorts, and every doubt, before anything runs.
+
+A problem stops a run, a doubt (`warn`) does not: units and signs that no cell gives away.
+"""
 
 import argparse
 from collections.abc import Callable
@@ -7,6 +10,7 @@ from pathlib import Path
 from spinepipe import cohort as cohorts
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.doubts import doubts
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
@@ -28,17 +32,24 @@ def run(options: argparse.Namespace) -> int:
     """Print one line for what is sound and all problems of what is not."""
     root: Path = options.root
     told: set[Problem] = set()
-    sound = [_tell(title, look, told) for title, look in _tasks(root, options.names)]
+    warned: dict[str, tuple[Problem, ...]] = {}
+    sound = [_tell(title, look, told, warned) for title, look in _tasks(root, options.names)]
     if told:
         print(f"\n{count(len(told), 'problem')} in all; nothing was changed.")
+    if any(warned.values()):
+        number = sum(map(len, warned.values()))
+        print(f"\n{count(number, 'warning')} in all, which stop no run: look at the files first.")
     return 0 if all(sound) else 1
 
 
-Task = tuple[str, Callable[[], str]]
+Look = Callable[[], tuple[str, Cohort | None]]
+"""Describes what is looked at and gives the cohort whose data may be doubted, or raises."""
+
+Task = tuple[str, Look]
 
 
 def _tasks(root: Path, names: list[str]) -> list[Task]:
-    """What is looked at: its title, and a function that describes it or raises."""
+    """What is looked at: its title, and what looks at it."""
     known_studies, known_cohorts = study_names(root), cohort_names(root)
     if not known_studies and not known_cohorts:
         allowed = "a folder with config/studies and config/cohorts"
@@ -47,7 +58,7 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
             [Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
         )
     if not names:
-        tasks: list[Task] = [("config/config.yaml", lambda: _selection(root))]
+        tasks: list[Task] = [("config/config.yaml", lambda: (_selection(root), None))]
         tasks += [_study_task(root, name) for name in known_studies]
         return tasks + [_cohort_task(root, name) for name in known_cohorts]
     tasks = []
@@ -62,15 +73,19 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
 
 
 def _study_task(root: Path, name: str) -> Task:
-    def look() -> str:
+    def look() -> tuple[str, Cohort]:
         study, cohort = studies.check(root, name)
-        return f"{study.kind} on cohort {cohort.name}"
+        return f"{study.kind} on cohort {cohort.name}", cohort
 
     return f"study {name}", look
 
 
 def _cohort_task(root: Path, name: str) -> Task:
-    return f"cohort {name}", lambda: _described(cohorts.read(root / COHORTS / name, every_form()))
+    def look() -> tuple[str, Cohort]:
+        cohort = cohorts.read(root / COHORTS / name, every_form())
+        return _described(cohort), cohort
+
+    return f"cohort {name}", look
 
 
 def _selection(root: Path) -> str:
@@ -93,10 +108,17 @@ def _described(cohort: Cohort) -> str:
     return ", ".join((*parts, *further))
 
 
-def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:
-    """Print how one thing is; a problem that was told before is not told again."""
+def _tell(
+    title: str, look: Look, told: set[Problem], warned: dict[str, tuple[Problem, ...]]
+) -> bool:
+    """Print how one thing is; what was told before is not told again.
+
+    Parameters
+    ----------
+    warned : doubts of each cohort that was looked at, by its folder.
+    """
     try:
-        print(f"ok    {title}: {look()}")
+        words, cohort = look()
     except InputError as error:
         new = [problem for problem in error.problems if problem not in told]
         known = len(error.problems) - len(new)
@@ -106,4 +128,10 @@ def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:
             print(f"      {problem}")
         told.update(new)
         return False
+    print(f"ok    {title}: {words}")
+    folder = "" if cohort is None else str(cohort.folder.resolve())
+    if cohort is not None and folder not in warned:
+        warned[folder] = doubts(cohort)
+        for doubt in warned[folder]:
+            print(f"warn  {doubt}")
     return True

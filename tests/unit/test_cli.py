@@ -5,8 +5,11 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from chain_cases import Chains
 from cohort_cases import swap, text, without, write
+from cohort_edge_cases import A
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
@@ -294,3 +297,21 @@ def test_a_cohort_of_films_is_sound_and_shown_in_words(
     assert "  traction" in out
     assert out.endswith("no picture: ais has neither landmarks.csv nor joints.csv to draw\n")
     assert not picture.exists()
+
+
+def test_check_warns_of_units_and_ends_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Motion in radians: one line for each test and column, told once though a study reads it."""
+    chains = Chains({"a": A, "b": A}, ["flexion"], cycles=2)
+    chains.motion["extension_deg"] = np.deg2rad(chains.motion["extension_deg"])
+    chains.write(tmp_path)
+    code, out, _ = run(capsys, "--root", tmp_path, "check")
+    assert code == 0
+    (warning,) = [line for line in out.splitlines() if line.startswith("warn")]
+    assert warning.startswith("warn  chains/motion.csv, line 5, extension_deg: found extension_deg")
+    assert "(all specimens, test flexion); allowed: 1/5 to 5 times" in warning
+    assert warning.endswith(
+        "suspected: angles in radians and not degrees (0.0175); convert the column"
+    )
+    assert "1 warning in all, which stop no run" in out
