@@ -5,6 +5,8 @@ A problem stops a run, a doubt (`warn`) does not: units and signs that no cell g
 
 import argparse
 from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from spinepipe import cohort as cohorts
@@ -14,8 +16,8 @@ from spinepipe.cohort.doubts import doubts
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
-from spinepipe.studies.registry import every_form
-from spinepipe.studies.study import COHORTS
+from spinepipe.studies.registry import PACKAGE, every_form, kind_of
+from spinepipe.studies.study import COHORTS, Study
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,8 +44,17 @@ def run(options: argparse.Namespace) -> int:
     return 0 if all(sound) else 1
 
 
-Look = Callable[[], tuple[str, Cohort | None]]
-"""Describes what is looked at and gives the cohort whose data may be doubted, or raises."""
+@dataclass(frozen=True)
+class Seen:
+    """What is sound: in words, its own warnings, and the cohort whose data may be doubted."""
+
+    words: str
+    warnings: tuple[Problem, ...] = ()
+    cohort: Cohort | None = None
+
+
+Look = Callable[[], Seen]
+"""Looks at one thing, or raises."""
 
 Task = tuple[str, Look]
 
@@ -58,7 +69,7 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
             [Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
         )
     if not names:
-        tasks: list[Task] = [("config/config.yaml", lambda: (_selection(root), None))]
+        tasks: list[Task] = [("config/config.yaml", lambda: Seen(_selection(root)))]
         tasks += [_study_task(root, name) for name in known_studies]
         return tasks + [_cohort_task(root, name) for name in known_cohorts]
     tasks = []
@@ -73,19 +84,33 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
 
 
 def _study_task(root: Path, name: str) -> Task:
-    def look() -> tuple[str, Cohort]:
+    def look() -> Seen:
         study, cohort = studies.check(root, name)
-        return f"{study.kind} on cohort {cohort.name}", cohort
+        words, warnings = _told_by_kind(study, cohort, root)
+        told = f"{study.kind} on cohort {cohort.name}"
+        return Seen("; ".join(filter(None, (told, words))), warnings, cohort)
 
     return f"study {name}", look
 
 
 def _cohort_task(root: Path, name: str) -> Task:
-    def look() -> tuple[str, Cohort]:
+    def look() -> Seen:
         cohort = cohorts.read(root / COHORTS / name, every_form())
-        return _described(cohort), cohort
+        return Seen(_described(cohort), cohort=cohort)
 
     return f"cohort {name}", look
+
+
+def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[Problem, ...]]:
+    """What the kind of a sound study says of it, and warns of."""
+    place = kind_of(study.kind).told_by_check
+    if place is None:
+        return "", ()
+    module, _, function = place.partition(":")
+    told: tuple[str, tuple[Problem, ...]] = getattr(
+        import_module(f"{PACKAGE}.{study.kind}.{module}"), function
+    )(study, cohort, root)
+    return told
 
 
 def _selection(root: Path) -> str:
@@ -115,10 +140,10 @@ def _tell(
 
     Parameters
     ----------
-    warned : doubts of each cohort that was looked at, by its folder.
+    warned : what was warned of, by the title of the study or the folder of the cohort.
     """
     try:
-        words, cohort = look()
+        seen = look()
     except InputError as error:
         new = [problem for problem in error.problems if problem not in told]
         known = len(error.problems) - len(new)
@@ -128,10 +153,12 @@ def _tell(
             print(f"      {problem}")
         told.update(new)
         return False
-    print(f"ok    {title}: {words}")
-    folder = "" if cohort is None else str(cohort.folder.resolve())
-    if cohort is not None and folder not in warned:
-        warned[folder] = doubts(cohort)
-        for doubt in warned[folder]:
-            print(f"warn  {doubt}")
+    print(f"ok    {title}: {seen.words}")
+    new_warnings = {title: seen.warnings}
+    folder = None if seen.cohort is None else str(seen.cohort.folder.resolve())
+    if seen.cohort is not None and folder is not None and folder not in warned:
+        new_warnings[folder] = doubts(seen.cohort)
+    for warning in (one for group in new_warnings.values() for one in group):
+        print(f"warn  {warning}")
+    warned |= new_warnings
     return True

@@ -1,11 +1,13 @@
 """The command line: what it prints, what it writes, how it ends."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from chain_cases import Chains
 from cohort_cases import swap, text, without, write
@@ -33,9 +35,43 @@ def test_check_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert code == 0
     assert out.splitlines() == [
         "ok    config/config.yaml: a plain run builds probe",
-        "ok    study probe: joint_pose_sensitivity on cohort straight",
+        "ok    study probe: joint_pose_sensitivity on cohort straight; the data tell 2 of 2 free "
+        "stiffnesses (superior, extension)",
         "ok    cohort straight: 2 specimens, 2 joints, 1 test, 8 rows of motion",
     ]
+
+
+PURE_MOMENTS = (
+    "study: pose\nkind: joint_pose_sensitivity\ncohort: t12s1_phantom\nposes: 200\n"
+    "landmark_sd_mm: 1\nbest_models: 2\n"
+)
+
+
+@pytest.mark.parametrize("free", ["", "[anterior, superior, extension]"])
+def test_check_tells_how_much_the_data_tell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], free: str
+) -> None:
+    """Moments, and rotations alone were read: translations asked for are warned of."""
+    shutil.copytree(
+        ROOT / "config/cohorts/t12s1_phantom", tmp_path / "config/cohorts/t12s1_phantom"
+    )
+    motion = pd.read_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv")
+    motion[["anterior_mm", "superior_mm", "right_mm"]] = np.nan
+    motion.to_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv", index=False)
+    (tmp_path / "config/studies").mkdir()
+    asked = f"calibration: {{free: {free}}}\n" if free else ""
+    (tmp_path / "config/studies/pose.yaml").write_text(PURE_MOMENTS + asked)
+    code, out, _ = run(capsys, "--root", tmp_path, "check", "pose")
+    assert code == 0
+    if not free:
+        told = "the data tell 3 of 3 free stiffnesses (extension, right_bending, left_rotation)"
+        assert told in out
+        assert "warn" not in out
+    else:
+        assert "the data tell 1 of 3 free stiffnesses" in out
+        (line,) = [line for line in out.splitlines() if line.startswith("warn")]
+        assert "pose.yaml, calibration.free: found 3 stiffnesses, of which the data of" in line
+        assert line.endswith("leave some out: anterior, superior would keep their start")
 
 
 def test_check_tells_each_problem_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
