@@ -45,6 +45,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    tell_doubts()
     lift_rate_limit()
     look_at_few()
     keep_the_graph()

@@ -1,17 +1,23 @@
-"""`spinepipe check`: every problem of studies and cohorts, before anything runs."""
+"""`spinepipe check`: every problem of studies and cohorts, and every doubt, before anything runs.
+
+A problem stops a run, a doubt (`warn`) does not: units and signs that no cell gives away.
+"""
 
 import argparse
 from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from spinepipe import cohort as cohorts
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.doubts import doubts
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
-from spinepipe.studies.registry import every_form
-from spinepipe.studies.study import COHORTS
+from spinepipe.studies.registry import PACKAGE, every_form, kind_of
+from spinepipe.studies.study import COHORTS, Study
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,17 +34,33 @@ def run(options: argparse.Namespace) -> int:
     """Print one line for what is sound and all problems of what is not."""
     root: Path = options.root
     told: set[Problem] = set()
-    sound = [_tell(title, look, told) for title, look in _tasks(root, options.names)]
+    warned: dict[str, tuple[Problem, ...]] = {}
+    sound = [_tell(title, look, told, warned) for title, look in _tasks(root, options.names)]
     if told:
         print(f"\n{count(len(told), 'problem')} in all; nothing was changed.")
+    if any(warned.values()):
+        number = sum(map(len, warned.values()))
+        print(f"\n{count(number, 'warning')} in all, which stop no run: look at the files first.")
     return 0 if all(sound) else 1
 
 
-Task = tuple[str, Callable[[], str]]
+@dataclass(frozen=True)
+class Seen:
+    """What is sound: in words, its own warnings, and the cohort whose data may be doubted."""
+
+    words: str
+    warnings: tuple[Problem, ...] = ()
+    cohort: Cohort | None = None
+
+
+Look = Callable[[], Seen]
+"""Looks at one thing, or raises."""
+
+Task = tuple[str, Look]
 
 
 def _tasks(root: Path, names: list[str]) -> list[Task]:
-    """What is looked at: its title, and a function that describes it or raises."""
+    """What is looked at: its title, and what looks at it."""
     known_studies, known_cohorts = study_names(root), cohort_names(root)
     if not known_studies and not known_cohorts:
         allowed = "a folder with config/studies and config/cohorts"
@@ -47,7 +69,7 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
             [Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
         )
     if not names:
-        tasks: list[Task] = [("config/config.yaml", lambda: _selection(root))]
+        tasks: list[Task] = [("config/config.yaml", lambda: Seen(_selection(root)))]
         tasks += [_study_task(root, name) for name in known_studies]
         return tasks + [_cohort_task(root, name) for name in known_cohorts]
     tasks = []
@@ -62,15 +84,33 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
 
 
 def _study_task(root: Path, name: str) -> Task:
-    def look() -> str:
+    def look() -> Seen:
         study, cohort = studies.check(root, name)
-        return f"{study.kind} on cohort {cohort.name}"
+        words, warnings = _told_by_kind(study, cohort, root)
+        told = f"{study.kind} on cohort {cohort.name}"
+        return Seen("; ".join(filter(None, (told, words))), warnings, cohort)
 
     return f"study {name}", look
 
 
 def _cohort_task(root: Path, name: str) -> Task:
-    return f"cohort {name}", lambda: _described(cohorts.read(root / COHORTS / name, every_form()))
+    def look() -> Seen:
+        cohort = cohorts.read(root / COHORTS / name, every_form())
+        return Seen(_described(cohort), cohort=cohort)
+
+    return f"cohort {name}", look
+
+
+def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[Problem, ...]]:
+    """What the kind of a sound study says of it, and warns of."""
+    place = kind_of(study.kind).told_by_check
+    if place is None:
+        return "", ()
+    module, _, function = place.partition(":")
+    told: tuple[str, tuple[Problem, ...]] = getattr(
+        import_module(f"{PACKAGE}.{study.kind}.{module}"), function
+    )(study, cohort, root)
+    return told
 
 
 def _selection(root: Path) -> str:
@@ -93,10 +133,17 @@ def _described(cohort: Cohort) -> str:
     return ", ".join((*parts, *further))
 
 
-def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:
-    """Print how one thing is; a problem that was told before is not told again."""
+def _tell(
+    title: str, look: Look, told: set[Problem], warned: dict[str, tuple[Problem, ...]]
+) -> bool:
+    """Print how one thing is; what was told before is not told again.
+
+    Parameters
+    ----------
+    warned : what was warned of, by the title of the study or the folder of the cohort.
+    """
     try:
-        print(f"ok    {title}: {look()}")
+        seen = look()
     except InputError as error:
         new = [problem for problem in error.problems if problem not in told]
         known = len(error.problems) - len(new)
@@ -106,4 +153,12 @@ def _tell(title: str, look: Callable[[], str], told: set[Problem]) -> bool:
             print(f"      {problem}")
         told.update(new)
         return False
+    print(f"ok    {title}: {seen.words}")
+    new_warnings = {title: seen.warnings}
+    folder = None if seen.cohort is None else str(seen.cohort.folder.resolve())
+    if seen.cohort is not None and folder is not None and folder not in warned:
+        new_warnings[folder] = doubts(seen.cohort)
+    for warning in (one for group in new_warnings.values() for one in group):
+        print(f"warn  {warning}")
+    warned |= new_warnings
     return True

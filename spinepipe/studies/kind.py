@@ -89,6 +89,11 @@ class Kind:
         the document, and in words what it is.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).
+    settled : gives the study with what its file leaves to the cohort in place; asked before the
+        checks, so that all else sees what is meant.
+    told_by_check : ``file:function`` of what `spinepipe check` says of a sound study besides;
+        called with study, cohort and the folder of the Snakefile, it returns words, and what it
+        warns of.
     """
 
     settings: type[Study]
@@ -103,6 +108,8 @@ class Kind:
     exports: str | None = None
     forms: tuple[TableForm, ...] = ()
     holds: bool = False
+    settled: Callable[[Any, Cohort], Any] | None = None
+    told_by_check: str | None = None
 
     def job(self, name: str) -> Job:
         """The job of that name."""

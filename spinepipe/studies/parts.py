@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     StringConstraints,
@@ -176,3 +177,21 @@ Tests = EachOnce[Annotated[str, StringConstraints(min_length=1)]]
 
 Coordinates = EachOnce[Coordinate]
 """Coordinates of a joint."""
+
+AUTO: Literal["auto"] = "auto"
+"""In place of coordinates: those that were loaded and measured (`spinepipe.studies.free`)."""
+
+
+def _alone(names: tuple[str, ...]) -> tuple[str, ...]:
+    if AUTO in names and len(names) > 1:
+        raise ValueError(f"{AUTO} by itself, or coordinates")
+    return distinct(names)
+
+
+Free = Annotated[
+    tuple[Coordinate | Literal["auto"], ...],
+    BeforeValidator(lambda given: (given,) if given == AUTO else given),
+    Field(strict=False, min_length=1),
+    AfterValidator(_alone),
+]
+"""Coordinates whose stiffness is fitted; `auto` until the cohort is known."""

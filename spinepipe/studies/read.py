@@ -99,10 +99,17 @@ def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Co
     cohort, faults = _cohort(document, root)
     problems += faults
     if document and study and cohort:
+        study = _settled(study, cohort)
         problems += _misfits(document, study, cohort, root, starting and not problems)
     if problems or study is None or cohort is None:
         raise InputError(problems)
     return study, cohort
+
+
+def _settled(study: Study, cohort: Cohort) -> Study:
+    """The study with what its file leaves to the cohort in place."""
+    settled = kind_of(study.kind).settled
+    return study if settled is None else settled(study, cohort)
 
 
 def _misfits(

@@ -1,12 +1,17 @@
 """The command line: what it prints, what it writes, how it ends."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
+import pandas as pd
 import pytest
+from chain_cases import Chains
 from cohort_cases import swap, text, without, write
+from cohort_edge_cases import A
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
@@ -30,9 +35,43 @@ def test_check_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert code == 0
     assert out.splitlines() == [
         "ok    config/config.yaml: a plain run builds probe",
-        "ok    study probe: joint_pose_sensitivity on cohort straight",
+        "ok    study probe: joint_pose_sensitivity on cohort straight; the data tell 2 of 2 free "
+        "stiffnesses (superior, extension)",
         "ok    cohort straight: 2 specimens, 2 joints, 1 test, 8 rows of motion",
     ]
+
+
+PURE_MOMENTS = (
+    "study: pose\nkind: joint_pose_sensitivity\ncohort: t12s1_phantom\nposes: 200\n"
+    "landmark_sd_mm: 1\nbest_models: 2\n"
+)
+
+
+@pytest.mark.parametrize("free", ["", "[anterior, superior, extension]"])
+def test_check_tells_how_much_the_data_tell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], free: str
+) -> None:
+    """Moments, and rotations alone were read: translations asked for are warned of."""
+    shutil.copytree(
+        ROOT / "config/cohorts/t12s1_phantom", tmp_path / "config/cohorts/t12s1_phantom"
+    )
+    motion = pd.read_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv")
+    motion[["anterior_mm", "superior_mm", "right_mm"]] = np.nan
+    motion.to_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv", index=False)
+    (tmp_path / "config/studies").mkdir()
+    asked = f"calibration: {{free: {free}}}\n" if free else ""
+    (tmp_path / "config/studies/pose.yaml").write_text(PURE_MOMENTS + asked)
+    code, out, _ = run(capsys, "--root", tmp_path, "check", "pose")
+    assert code == 0
+    if not free:
+        told = "the data tell 3 of 3 free stiffnesses (extension, right_bending, left_rotation)"
+        assert told in out
+        assert "warn" not in out
+    else:
+        assert "the data tell 1 of 3 free stiffnesses" in out
+        (line,) = [line for line in out.splitlines() if line.startswith("warn")]
+        assert "pose.yaml, calibration.free: found 3 stiffnesses, of which the data of" in line
+        assert line.endswith("leave some out: anterior, superior would keep their start")
 
 
 def test_check_tells_each_problem_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -294,3 +333,21 @@ def test_a_cohort_of_films_is_sound_and_shown_in_words(
     assert "  traction" in out
     assert out.endswith("no picture: ais has neither landmarks.csv nor joints.csv to draw\n")
     assert not picture.exists()
+
+
+def test_check_warns_of_units_and_ends_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Motion in radians: one line for each test and column, told once though a study reads it."""
+    chains = Chains({"a": A, "b": A}, ["flexion"], cycles=2)
+    chains.motion["extension_deg"] = np.deg2rad(chains.motion["extension_deg"])
+    chains.write(tmp_path)
+    code, out, _ = run(capsys, "--root", tmp_path, "check")
+    assert code == 0
+    (warning,) = [line for line in out.splitlines() if line.startswith("warn")]
+    assert warning.startswith("warn  chains/motion.csv, line 5, extension_deg: found extension_deg")
+    assert "(all specimens, test flexion); allowed: 1/5 to 5 times" in warning
+    assert warning.endswith(
+        "suspected: angles in radians and not degrees (0.0175); convert the column"
+    )
+    assert "1 warning in all, which stop no run" in out

@@ -8,6 +8,7 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
+from spinepipe.cohort.doubts import doubts
 from spinepipe.jobs.pool import Progress, submit_and_wait, warm_up
 from spinepipe.studies.registry import place_of
 
@@ -65,6 +66,16 @@ def check_writable():
                 f"results cannot be written to {Path(folder).resolve()}: {error.strerror}. Make "
                 "room or change permissions, then run again (finished jobs are kept)."
             )
+
+
+def tell_doubts():
+    """Say which units and signs of the data look wrong; the run goes on."""
+    if not workflow.is_main_process:
+        return
+    cohorts = {cohort.digest: cohort for _, cohort in map(load, studies_at_work())}
+    for cohort in cohorts.values():
+        for doubt in doubts(cohort):
+            print(f"warn  {doubt}", file=sys.stderr)
 
 
 def studies_at_work():

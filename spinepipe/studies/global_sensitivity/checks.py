@@ -11,6 +11,7 @@ from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.global_sensitivity.change import Change, Of
 from spinepipe.studies.global_sensitivity.settings import DUMMY, INDICES, GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by
+from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import (
     at,
     measured_columns,
@@ -161,6 +162,10 @@ def _motion(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Ite
     ]
     if missing:
         yield Problem(*place, f"true, and no motion of {', '.join(missing)}", allowed, remedy)
+    if AUTO in study.calibration.free:
+        found = "auto, and no coordinate was both loaded and measured"
+        place = at(document, "calibration.free")
+        yield Problem(*place, found, "coordinates that were", "name some, or choose other tests")
     columns = measured_columns(read)
     weights = zip(COORDINATE_COLUMNS, study.calibration.weights.in_order(), strict=True)
     if columns and not any(weight for name, weight in weights if name in columns):

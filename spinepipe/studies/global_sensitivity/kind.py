@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
@@ -124,6 +125,7 @@ KIND = Kind(
     files=SensitivityFiles,
     checks=(check_global_sensitivity,),
     checks_at_start=(check_size_of_design,),
+    settled=calibration_settled,
     tables=(DESIGN, RESPONSES, CALIBRATED, INDICES, CONVERGENCE),
     jobs=(
         Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),

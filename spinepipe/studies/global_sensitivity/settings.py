@@ -16,11 +16,12 @@ from spinepipe.sensitivity.global_indices.spread import (
 from spinepipe.studies.global_sensitivity.change import Change, Of
 from spinepipe.studies.global_sensitivity.factors import AnyFactor, AnySpread, Times
 from spinepipe.studies.parts import (
+    AUTO,
     FORM,
     Coordinate,
-    Coordinates,
     Damping,
     EachOnce,
+    Free,
     LevelStiffness,
     PublishedStiffness,
     Tests,
@@ -35,9 +36,10 @@ class SampleCalibration(BaseModel):
 
     model_config = FORM
 
-    free: Coordinates = Field(
-        default=("anterior", "superior", "extension"),
-        description="coordinates whose stiffness is fitted; the others keep the sample's",
+    free: Free = Field(
+        default=(AUTO,),
+        description="coordinates whose stiffness is fitted, or auto: those that were loaded and "
+        "measured, each of which then counts in the cost; the others keep the sample's",
     )
     weights: Weights = Field(default_factory=Weights, description="weights on mm and degrees")
     bound_factor: float = Field(

@@ -12,8 +12,9 @@ from spinepipe.cohort.text import Document
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import Problem, one_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import at, unknown_tests
-from spinepipe.units import COORDINATE_COLUMNS
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 __all__ = ["check_joint_pose_sensitivity"]
 
@@ -107,6 +108,11 @@ def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> I
             remedy = "choose more tests, or leave the specimen out of the cohort"
             yield Problem(*at(document, "tests"), found, allowed, remedy)
     yield from _weights(document, study, measured)
+    if AUTO in study.calibration.free:
+        found = "auto, and no coordinate was both loaded and measured"
+        allowed = f"{one_of(COORDINATES)}, whose stiffness the data tell"
+        place = at(document, "calibration.free")
+        yield Problem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")
 
 
 def _weights(

@@ -1,12 +1,15 @@
 """Stiffness of a joint-pose study as sentences: what is held by the data, and what is not."""
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.report.page.document import Results
 from spinepipe.report.panels import EVERY_JOINT
 from spinepipe.report.words import AXIS, count, number, percent
 from spinepipe.status import USABLE
+from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 MOSTLY = 0.5
 """Where more fits have an open region, the median value is one that the data do not exclude."""
@@ -24,6 +27,8 @@ def stiffness(study: JointPoseSensitivity, results: Results) -> str:
         & rows["coordinate"].isin(study.calibration.free)
     ].dropna(subset=["median"])
     solved = _reduced(results)
+    kept = _kept_starts(study, results)
+    chosen = chosen[~chosen["coordinate"].isin(list(kept))]
     is_open = chosen["open_share"].astype(float) > MOSTLY
     held = [
         _medians(part, chosen) + _doubt(solved, str(name), part)
@@ -35,9 +40,35 @@ def stiffness(study: JointPoseSensitivity, results: Results) -> str:
     told = (
         f"Median stiffness over the reduced poses: {'; '.join(held)}." if held else "",
         f"Not held by the data: {'; '.join(not_held)}." if not_held else "",
-        _exact(solved) if held or not_held else "",
+        f"Nothing is known of {'; '.join(kept.values())}." if kept else "",
+        _exact(solved) if held or not_held or kept else "",
     )
     return " ".join(words for words in told if words)
+
+
+def _kept_starts(study: JointPoseSensitivity, results: Results) -> dict[str, str]:
+    """Coordinates whose stiffness most fits left where it started, and in words how many.
+
+    Such a value is the study's own input; a median of it is no result. Values that the data hold
+    are left alone, wherever they are.
+    """
+    fitted = results.table("calibrations")
+    if fitted.empty:
+        return {}
+    solved = fitted[fitted["status"].isin(USABLE)]
+    found: dict[str, str] = {}
+    for name, column, start in zip(
+        COORDINATES, STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True
+    ):
+        if name not in study.calibration.free or not {column, f"{name}_identifiable"} <= {*solved}:
+            continue
+        values = solved[[column]].to_numpy(float)
+        near = near_start(values, np.array([start]), study.success.near_start_percent)[:, 0]
+        lost = near & ~solved[f"{name}_identifiable"].fillna(False).to_numpy(bool)
+        if lost.sum() > MOSTLY * len(solved):
+            title = AXIS[name].lower()
+            found[name] = f"{title}: {lost.sum()} of {len(solved)} fits left it at its start"
+    return found
 
 
 def _not_held(part: pd.DataFrame, chosen: pd.DataFrame) -> str:

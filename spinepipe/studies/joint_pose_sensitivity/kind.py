@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
@@ -364,4 +365,6 @@ KIND = Kind(
     ignored_by_figures=("block",),
     makes_models="start_model",
     exports="export:exported",
+    settled=calibration_settled,
+    told_by_check="told_by_data:told",
 )

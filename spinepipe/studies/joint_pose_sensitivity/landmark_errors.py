@@ -21,16 +21,19 @@ from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import PRECISION_ER
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 
+_ERRORS = ("translation_error_mm", "rotation_error_deg")
+
 
 def run(root: str, study: str, specimen: str, sd_mm: str, output: str) -> None:
     """Write two rows per sampled pose: with its own stiffness and with the cohort's own pose's."""
     settings, cohort = study_and_cohort(root, study)
-    nominal = _nominal(root, settings, cohort, specimen)
+    nominal, errors = _nominal(root, settings, cohort, specimen)
+    as_they_are = {f"nominal_{name}": errors[name] for name in _ERRORS}
     rows = []
     for pose, points in enumerate(_landmark_sets(settings, cohort, specimen, float(sd_mm))):
         key = {"specimen": specimen, "sd_mm": float(sd_mm), "pose": pose}
         for name, ended in _errors(root, settings, cohort, specimen, points, nominal).items():
-            rows.append({**key, "stiffness": name, **ended})
+            rows.append({**key, "stiffness": name, **ended, **as_they_are})
     metadata = provenance("landmark_errors", settings, cohort, [specimen])
     write(from_rows(PRECISION_ERRORS, rows), output, metadata)
 
@@ -60,18 +63,18 @@ def _landmark_sets(
 
 def _nominal(
     root: str, settings: JointPoseSensitivity, cohort: Cohort, specimen: str
-) -> Array | str:
-    """(J, 6) stiffness fitted in the cohort's own pose, or why there is none."""
+) -> tuple[Array | str, dict[str, Any]]:
+    """(J, 6) stiffness fitted in the cohort's own pose, or why there is none; and its errors."""
     frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
     try:
         problem = calibration_problem(root, settings, specimen, frames)
         found = _fit(settings, problem)
     except RefusedModel as error:
-        return str(error)
+        return str(error), _row((), (), Status.REFUSED, str(error))
     if not found.status.usable:
-        return found.message
+        return found.message, _fitted(found)
     values: Array = moved(problem.model, problem.free, found.x).effects[0].values
-    return values
+    return values, _fitted(found)
 
 
 def _errors(
@@ -132,7 +135,7 @@ def _row(
 ) -> dict[str, Any]:
     ended = {"status": status.value, "message": message}
     if not status.usable:
-        return {"translation_error_mm": None, "rotation_error_deg": None, **ended}
+        return {**dict.fromkeys(_ERRORS), **ended}
     errors = absolute_errors(cases, poses)
     return {
         "translation_error_mm": _largest(errors[..., :3]),

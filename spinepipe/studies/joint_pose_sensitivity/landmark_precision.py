@@ -1,6 +1,6 @@
 """Job: how errors grow with the landmarks' SD, and the largest SD that will do."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +53,8 @@ def run(
         found = measured_errors(rows)
         spread += [{**key, **row} for row in _spread(asked, found)]
         seed = specimen_seed(settings.seed, f"required/{specimen}/{stiffness}")
-        needed += [{**key, **row} for row in _required(asked, found, seed)]
+        shares = nominal_shares(asked, rows, found)
+        needed += [{**key, **row} for row in _required(asked, found, shares, seed)]
     origin = provenance("landmark_precision", settings, cohort)
     write(from_rows(LANDMARK_PRECISION, spread), landmark_precision, origin)
     write(from_rows(REQUIRED_PRECISION, needed), required_precision, origin)
@@ -94,18 +95,57 @@ def _quantiles(values: Array) -> dict[str, Any]:
 
 
 def _required(
-    asked: LandmarkPrecision, errors: Mapping[str, pd.DataFrame], seed: int
+    asked: LandmarkPrecision,
+    errors: Mapping[str, pd.DataFrame],
+    shares: Mapping[str, float | None],
+    seed: int,
 ) -> Iterator[dict[str, Any]]:
     relative = {kind: grid / _limits(asked)[kind][0] for kind, grid in errors.items()}
     if len(relative) > 1:
         relative["both"] = pd.concat(relative.values()).groupby(level="sd_mm").max()
     for kind, grid in relative.items():
         sds, n = grid.index.to_numpy(float), grid.shape[1]
-        found = required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
+        why = _not_of_landmarks(shares[kind])
+        found = (
+            Required(None, None, None, why)
+            if why
+            else required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
+        )
         ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
         numbers = {"sd_mm": found.sd, **ends, "message": found.message}
-        numbers["message"] = "; ".join(filter(None, (found.message, _too_few(n, asked.share))))
-        yield {"motion": kind, "share": asked.share, "n": n, **numbers}
+        too_few = "" if why else _too_few(n, asked.share)
+        numbers["message"] = "; ".join(filter(None, (found.message, too_few)))
+        key = {"motion": kind, "share": asked.share, "n": n}
+        yield {**key, **numbers, "nominal_share": shares[kind]}
+
+
+def nominal_shares(
+    asked: LandmarkPrecision, rows: pd.DataFrame, kinds: Iterable[str]
+) -> dict[str, float | None]:
+    """Error over its limit with the landmarks as they are, by kind of motion and of both.
+
+    Parameters
+    ----------
+    rows : of one specimen. kinds : of motion that were measured.
+    """
+    found: dict[str, float | None] = {}
+    for kind in kinds:
+        error = float(rows[f"nominal_{COLUMNS[kind]}"].iloc[0])
+        found[kind] = error / _limits(asked)[kind][0] if np.isfinite(error) else None
+    known = [share for share in found.values() if share is not None]
+    return {**found, "both": max(known) if len(known) == len(found) else None}
+
+
+def _not_of_landmarks(share: float | None) -> str:
+    """Why no precision of landmarks can be told, "" where it can."""
+    if share is None:
+        return "not told: the cohort's own joint pose has no fit"
+    if share < 1.0:
+        return ""
+    return (
+        f"not told: with the landmarks as they are the model misses by {share:.3g} times the "
+        "limit, which no landmark mends"
+    )
 
 
 def _too_few(n: int, share: float) -> str:

@@ -7,10 +7,11 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from spinepipe.anatomy import published
 from spinepipe.studies.parts import (
+    AUTO,
     FORM,
-    Coordinates,
     Damping,
     EachOnce,
+    Free,
     Shift,
     Stiffness,
     Tests,
@@ -172,9 +173,10 @@ class Calibration(BaseModel):
 
     model_config = FORM
 
-    free: Coordinates = Field(
-        default=("anterior", "superior", "extension"),
-        description="coordinates whose stiffness is fitted; the others keep their start",
+    free: Free = Field(
+        default=(AUTO,),
+        description="coordinates whose stiffness is fitted, or auto: those that were loaded and "
+        "measured, each of which then counts in the cost; the others keep their start",
     )
     grouping: Literal["per_specimen", "per_joint"] = Field(
         default="per_specimen",

@@ -330,6 +330,18 @@ PRECISION_ERRORS = Table(
             null="not measured, or no pose was found",
             low=0.0,
         ),
+        *(
+            Column(
+                f"nominal_{kind}_error_{unit}",
+                "number",
+                f"largest absolute error of a {kind} with the landmarks as they are and the "
+                "stiffness that fits these; the same in all rows of a specimen",
+                unit,
+                null="not measured, or no fit",
+                low=0.0,
+            )
+            for kind, unit in (("translation", "mm"), ("rotation", "deg"))
+        ),
         status("solve"),
         MESSAGE,
     ),
@@ -379,13 +391,26 @@ REQUIRED_PRECISION = Table(
         Column("n", "integer", "poses per SD", low=0),
         *(
             Column(
-                name, "number", meaning, "mm", low=0.0, null="outside the sampled SDs, see message"
+                name,
+                "number",
+                meaning,
+                "mm",
+                low=0.0,
+                null="outside the sampled SDs, or not told, see message",
             )
             for name, meaning in (
                 ("sd_mm", "largest SD that will do"),
                 ("sd_low_mm", "lower end of its 95 % interval (bootstrap over poses)"),
                 ("sd_high_mm", "upper end of its 95 % interval"),
             )
+        ),
+        Column(
+            "nominal_share",
+            "number",
+            "largest error with the landmarks as they are, fitted, over its limit; from 1 on the "
+            "model misses the limit whatever the landmarks, and no SD is given",
+            null="no fit in the cohort's own joint pose: no SD is given",
+            low=0.0,
         ),
         MESSAGE,
     ),

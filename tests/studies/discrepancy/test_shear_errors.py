@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from spinepipe.cohort.answers import joint_loads
 from spinepipe.effects import Wrench
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
-from spinepipe.studies.discrepancy.mistakes.suspected import joint_loads
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 

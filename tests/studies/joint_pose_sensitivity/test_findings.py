@@ -105,6 +105,24 @@ def test_stiffness_that_data_do_not_hold_has_a_warning(study: JointPoseSensitivi
     assert "readings" not in told(study, sound)
 
 
+def test_a_start_value_is_no_median(study: JointPoseSensitivity) -> None:
+    """Extension starts at the study's value; three of four fits, and no region, left it there."""
+    start = study.stiffness.extension_nm_per_rad
+    fits = calibrations([False] * 4, [1] * 4)
+    for fit, value in zip(fits, (start, start, 1.001 * start, 2.0 * start), strict=True):
+        fit["extension_nm_per_rad"] = value
+    words = told(
+        study, {"summary": [summary(4, 0.0, "poses", "equilibrium")], "calibrations": fits}
+    )
+    assert "Nothing is known of flexion–extension: 3 of 4 fits left it at its start." in words
+    assert "Median stiffness" not in words
+    held = [{**fit, "extension_identifiable": True} for fit in fits]
+    words = told(
+        study, {"summary": [summary(4, 0.0, "poses", "equilibrium")], "calibrations": held}
+    )
+    assert "Median stiffness over the reduced poses: flexion–extension 10" in words
+
+
 def test_a_median_that_most_fits_do_not_hold_is_not_told(study: JointPoseSensitivity) -> None:
     """Nine of ten regions are open: what is known is above what the stiffness lies."""
     most = {"open_share": 0.9}

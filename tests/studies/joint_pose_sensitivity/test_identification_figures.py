@@ -1,5 +1,6 @@
 """Figures of the study's later parts: drawn for any cohort, and their words true to the tables."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,16 +9,20 @@ import pytest
 from identification_cases import identification, write_table
 from matplotlib.figure import Figure
 from PIL import Image
-from study_cases import FIGURES, Size, drawing, drawn, project, results
+from study_cases import FIGURES, STUDY, Size, drawing, drawn, project, results
 
 from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM
 from spinepipe.report.words import number
 from spinepipe.studies import joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import bootstrap_rows, draw_paper
+from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
+    landmark_precision_figure,
+)
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     importance_by_factor,
 )
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.units import COORDINATES
 
@@ -227,6 +232,22 @@ def test_required_precision_is_told_or_why_not(tmp_path: Path) -> None:
     assert "1.25 mm (1.00–1.50)" in told
     assert "too many poses are above the limit even at 0.5 mm" in told
     assert "95 % asked for" in told
+
+
+def test_the_papers_landmarks_stand_where_their_sd_per_axis_is(tmp_path: Path) -> None:
+    """2.9 mm is the resultant of three axes: 1.67 mm on each, and not 2.9 on an axis per axis."""
+    folder = tables(tmp_path, ONE)
+    study, cohort = study_and_cohort(str(tmp_path), STUDY)
+    rebuilt = replace(cohort, name="palanca_l1l4")
+    names = FIGURES["landmark_precision"]
+    read = {name: pd.read_parquet(folder / f"{name}.parquet") for name in names}
+    figure = landmark_precision_figure(study, rebuilt, read)
+    lines = [line for axis in figure.axes for line in axis.lines]
+    ends = [list(map(float, line.get_xdata())) for line in lines]
+    upright = [first for first, *others in ends if others and set(others) == {first}]
+    assert upright == pytest.approx([1.674] * 4, abs=1e-3)
+    told = " ".join(text.get_text() for axis in figure.axes for text in axis.texts)
+    assert "1.67 mm per axis\n(2.9 mm resultant)" in told
 
 
 def test_precision_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -> None:

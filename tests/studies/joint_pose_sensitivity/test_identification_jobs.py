@@ -630,22 +630,31 @@ def test_a_straight_spine_in_compression_and_flexion_in_closed_form(
 Grids = dict[str, list[list[float | None]]]
 
 
-def precision_file(path: Path, grids: Grids) -> str:
+def precision_file(path: Path, grids: Grids, nominal: float | None = 0.05) -> str:
     """Errors of poses at 1 and 2 mm, by kind of motion; None without result."""
     rows = []
+    as_they_are = {f"nominal_{name}": nominal for name in grids}
     for level, sd in enumerate((1.0, 2.0)):
         for pose in range(len(next(iter(grids.values()))[level])):
             found = {name: grid[level][pose] for name, grid in grids.items()}
             lost = all(value is None for value in found.values())
             key = {"specimen": "a", "sd_mm": sd, "pose": pose, "stiffness": "calibrated"}
             rows.append(
-                {**key, **found, "status": "unstable" if lost else "converged", "message": ""}
+                {
+                    **key,
+                    **found,
+                    **as_they_are,
+                    "status": "unstable" if lost else "converged",
+                    "message": "",
+                }
             )
     return write_rows(path, PRECISION_ERRORS, rows)
 
 
-def precision_tables(root: Path, grids: Grids) -> tuple[pd.DataFrame, pd.DataFrame]:
-    errors = precision_file(root / "precision_errors.parquet", grids)
+def precision_tables(
+    root: Path, grids: Grids, nominal: float | None = 0.05
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    errors = precision_file(root / "precision_errors.parquet", grids, nominal)
     files = [str(root / f"{name}.parquet") for name in ("precision", "required")]
     landmark_precision.run(str(root), STUDY, [errors], *files)
     spread, required = (read_frame(file) for file in files)
@@ -690,6 +699,23 @@ def test_precision_where_every_pose_is_lost_is_not_silence(tmp_path: Path) -> No
     assert (spread["below"] == 0.0).all()
     assert (spread["without_result"] == 3).all()
     assert required["message"].str.contains("1 mm will not do").all()
+
+
+@pytest.mark.parametrize(
+    ("nominal", "says"),
+    [(2.5, "misses by 2.5 times the limit"), (None, "own joint pose has no fit")],
+)
+def test_no_precision_is_told_where_the_nominal_pose_does_not_fit(
+    tmp_path: Path, nominal: float | None, says: str
+) -> None:
+    """The limit is 1 deg; 4 of 5 poses are below it, which says nothing of landmarks then."""
+    root = project(tmp_path, Size(specimens=("a",)))
+    grids = {"rotation_error_deg": [[0.1] * 5, [0.1] * 4 + [3.0]]}
+    _, required = precision_tables(root, grids, nominal)
+    row = required.loc["rotation"]
+    assert row[["sd_mm", "sd_low_mm", "sd_high_mm"]].isna().all()
+    assert says in row["message"]
+    assert np.isnan(row["nominal_share"]) if nominal is None else row["nominal_share"] == 2.5
 
 
 def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from spinepipe.decomposition import lstsq
-from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.mistakes.suspected import (
+from spinepipe.cohort.answers import (
     joint_loads,
     of_specimens,
 )
+from spinepipe.decomposition import lstsq
+from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.noise import MAD_PER_SD
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.verdict import SuspectedError

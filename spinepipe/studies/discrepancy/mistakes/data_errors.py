@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     bad_markers,
@@ -15,7 +16,6 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     between_cycles,
 )
 from spinepipe.studies.discrepancy.mistakes.exchanged import exchanged
-from spinepipe.studies.discrepancy.mistakes.suspected import answers
 from spinepipe.studies.discrepancy.mistakes.wrong_units_and_signs import wrong_signs, wrong_units
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
@@ -23,6 +23,7 @@ from spinepipe.studies.discrepancy.search.inquiry import Found
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.verdict import SuspectedError
+from spinepipe.units import COORDINATES
 
 CLEAR = 5.0
 """SDs of one reading that a joint's motion must exceed to tell a sign or a unit."""
@@ -71,3 +72,20 @@ def before_a_fit(
     if _is_repeated(measured):
         errors += bad_markers(between_cycles(measured), list(by_name), joints, in_every=False)
     return tuple(errors)
+
+
+def answers(
+    readings: Mapping[str, SpecimenReadings], zeroed: bool, sd: Array, clear: float
+) -> list[Answer]:
+    """All driven coordinates whose motion is clear of the noise.
+
+    Parameters
+    ----------
+    sd : (6,) of a reading, m and rad. clear : SDs that the motion's root mean square exceeds.
+    """
+    found: list[Answer] = []
+    for name, one in readings.items():
+        for test in one.tests:
+            loads = joint_loads(one.frames, test.case)
+            found += answers_of_test(name, test.case.test, loads, test.mean, zeroed)
+    return [a for a in found if a.rms > clear * sd[COORDINATES.index(a.coordinate)]]

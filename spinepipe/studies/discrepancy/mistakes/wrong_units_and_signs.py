@@ -15,14 +15,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.mistakes.published_range import middle, published_range
-from spinepipe.studies.discrepancy.mistakes.suspected import (
+from spinepipe.anatomy.stiffness_range import middle, published_range
+from spinepipe.cohort.answers import (
     ALL,
     Answer,
     of_specimens,
     typical,
 )
+from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, MM_PER_M, ROTATIONS, TRANSLATIONS
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain, head, lines_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, THEIRS, blank, saying
-from spinepipe.report.words import count, fixed, number, tick
+from spinepipe.report.words import count, fixed, tick
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
@@ -190,15 +190,19 @@ def _mark_required(
 
 
 def _mark_paper(upper: Axes, lower: Axes, cohort: Cohort) -> None:
-    """The SD that the paper reports for its landmarks."""
+    """The SD that the paper reports for its landmarks, per axis as this axis is.
+
+    The paper's is that of the resultant; the axes are taken to share it alike.
+    """
     paper = GOULD_2024A.beside(cohort.name)
     if paper is None:
         return
-    sd = paper[1]["landmarks"]["largest_resultant_sd_mm"]
+    resultant = float(paper[1]["landmarks"]["largest_resultant_sd_mm"])
+    sd = resultant / np.sqrt(3.0)
     for axis in (upper, lower):
         axis.axvline(sd, color=THEIRS, lw=0.9, zorder=1)
     upper.annotate(
-        f"{paper[0]}: {number(sd, 2)} mm",
+        f"{paper[0]}: {fixed(sd)} mm per axis\n({tick(resultant)} mm resultant)",
         (sd, 1.0),
         (2, -1),
         xycoords=("data", "axes fraction"),
@@ -228,5 +232,9 @@ def _words(
         if specimens == 1
     ]
     paper = GOULD_2024A.beside(cohort.name)
-    resultant = "the paper's SD is the largest resultant, not per axis" if paper else ""
+    resultant = (
+        "the paper's SD is that of its worst landmark, the resultant over the root of three"
+        if paper
+        else ""
+    )
     return "; ".join(part for part in (poses, lines, shown, *told, resultant) if part) + "."

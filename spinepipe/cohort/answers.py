@@ -4,27 +4,19 @@ No model is fitted and no stiffness supposed, so that a mistake in the files can
 along. The load is what a chain carries in its neutral pose; it needs the joint frames alone.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.anatomy.stiffness_range import middle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
-from spinepipe.studies.discrepancy.mistakes.published_range import middle
-from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import COORDINATES, less_step_0
 
 ALL = "all specimens"
-
-
-def of_specimens(names: Iterable[str], every: Iterable[str]) -> str:
-    """Specimens in words; all of them by one word where there are several."""
-    chosen, known = list(names), list(every)
-    return ALL if len(known) > 1 and set(chosen) == set(known) else ", ".join(chosen)
-
 
 ABOUT = (2, 0, 1)
 """Axis of the joint frame about which each of `ROTATIONS` turns."""
@@ -72,21 +64,10 @@ class Answer:
         size = np.sqrt((self.load @ self.load) * (self.motion @ self.motion))
         return float(self.load @ self.motion / size) if size > 0.0 else 0.0
 
-
-def answers(
-    readings: Mapping[str, SpecimenReadings], zeroed: bool, sd: Array, clear: float
-) -> list[Answer]:
-    """All driven coordinates whose motion is clear of the noise.
-
-    Parameters
-    ----------
-    sd : (6,) of a reading, m and rad. clear : SDs that the motion's root mean square exceeds.
-    """
-    found = []
-    for name, one in readings.items():
-        for test in one.tests:
-            found += _of_test(name, test, joint_loads(one.frames, test.case), zeroed)
-    return [a for a in found if _rms(a.motion) > clear * sd[COORDINATES.index(a.coordinate)]]
+    @property
+    def rms(self) -> float:
+        """Root mean square of the motion, rad or m."""
+        return float(np.sqrt(np.mean(self.motion**2)))
 
 
 def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
@@ -103,20 +84,25 @@ def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
     return loads
 
 
-def _of_test(specimen: str, test: Repeats, loads: Array, zeroed: bool) -> list[Answer]:
+def answers_of_test(
+    specimen: str, test: str, loads: Array, motion: Array, zeroed: bool
+) -> Iterator[Answer]:
+    """All driven coordinates that were read under loads that changed.
+
+    Parameters
+    ----------
+    loads : (T, J, 6) see `joint_loads`. motion : (T, J, 6) m and rad, NaN where not read.
+    """
     centred = less_step_0(loads, True) if zeroed else loads - loads.mean(axis=0)
-    found = []
     for joint, number in np.argwhere(_driven(np.sum(centred**2, axis=0))):
-        motion = test.mean[:, joint, number]
+        read = motion[:, joint, number]
         load = loads[:, joint, number]
-        there = np.isfinite(motion)
-        load, motion = less_step_0(load, zeroed)[there], motion[there]
+        there = np.isfinite(read)
+        load, read = less_step_0(load, zeroed)[there], read[there]
         if not zeroed and len(load):
-            load, motion = load - load.mean(), motion - motion.mean()
+            load, read = load - load.mean(), read - read.mean()
         if load @ load > 0.0:
-            name = COORDINATES[number]
-            found.append(Answer(specimen, test.case.test, int(joint), name, load, motion))
-    return found
+            yield Answer(specimen, test, int(joint), COORDINATES[number], load, read)
 
 
 def _driven(power: Array) -> NDArray[np.bool_]:
@@ -136,10 +122,12 @@ def _driven(power: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def typical(slopes: list[float]) -> float:
+def typical(slopes: Sequence[float]) -> float:
     """Size of an answer, whatever the signs."""
     return float(np.median(np.abs(slopes)))
+
+
+def of_specimens(names: Iterable[str], every: Iterable[str]) -> str:
+    """Specimens in words; all of them by one word where there are several."""
+    chosen, known = list(names), list(every)
+    return ALL if len(known) > 1 and set(chosen) == set(known) else ", ".join(chosen)

@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from spinepipe.studies.cohort_stiffness.motion_size import implausible, unit_of
+from spinepipe.cohort.motion_size import implausible, unit_of
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])

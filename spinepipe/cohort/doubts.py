@@ -1,0 +1,235 @@
+"""What a sound cohort most likely has wrong: units and signs that no cell gives away.
+
+Each joint's motion is held against what its load gives with published stiffness, without a fit:
+a mistake is told before anything runs, and where no fit would find a pose. Doubts are told and
+nothing is refused: a joint may be fused, a specimen no spine of a person.
+
+Not told: units that leave the motion within a factor of five (lbf for N, kgf for N), joints whose
+moment is made by a force with a lever arm of less than a centimetre, and tests with supports,
+whose loads a rig shares.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import log, sqrt
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.anatomy.stiffness_range import plausible, range_of_level
+from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads, of_specimens, typical
+from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.doubtful_places import doubtful_places, file_of, first_line
+from spinepipe.cohort.load_tests import DRIVEN, PUSHED
+from spinepipe.cohort.measured import measured_specimen
+from spinepipe.cohort.motion_size import PLAUSIBLE, Unit, geometric_mean, is_plausible, unit_like
+from spinepipe.problems import Problem
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, to_si
+
+AGAINST = -0.9
+"""Correlation of motion and load below which a joint moves against its load."""
+
+CLEAR = 5.0
+"""SDs of one reading that motion must exceed to tell a sign."""
+
+USUAL_SD = 0.1
+"""SD of one reading, deg and mm, of a cohort that does not tell its own."""
+
+LOAD_COLUMNS = {
+    **{name: f"m{axis}_nm" for name, axis in zip(DRIVEN, "xyz", strict=True)},
+    **{name: f"f{axis}_n" for name, axis in zip(PUSHED, "xyz", strict=True)},
+}
+"""Column of loads.csv that drives each coordinate where joints are upright."""
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A joint's answer to its load as the doubts see it.
+
+    Attributes
+    ----------
+    ratio : measured motion over that with the middle of the published stiffness of the level;
+        below 0 where it goes against its load.
+    """
+
+    answer: Answer
+    joint: str
+    ratio: float
+
+    @property
+    def beyond(self) -> float:
+        """Size of the motion over that with the nearest published stiffness; 1 within the range."""
+        low, high = range_of_level(self.joint, self.answer.coordinate)
+        reach = sqrt(high / low)
+        return max(abs(self.ratio) / reach, 1.0) * min(abs(self.ratio) * reach, 1.0)
+
+    @property
+    def place(self) -> tuple[str, str, str]:
+        """Specimen, test and coordinate."""
+        return self.answer.specimen, self.answer.test, self.answer.coordinate
+
+
+def doubts(cohort: Cohort) -> tuple[Problem, ...]:
+    """What is most likely wrong with a validated cohort, one for each test or column.
+
+    Empty for cohorts without measured motion under loads, but for what is told of places.
+    """
+    told = list(_told(cohort))
+    return (*doubtful_places(cohort), *_sizes(cohort, told), *_signs(cohort, told))
+
+
+def _told(cohort: Cohort) -> Iterator[_Told]:
+    """Every joint that a test drives, cycle by cycle."""
+    if cohort.loads is None or cohort.motion is None or not cohort.has_frames:
+        return
+    for specimen in cohort.specimen_names:
+        one = measured_specimen(cohort, specimen, cohort.tests)
+        for cycle in one.tested:
+            if cycle.case.steps and cycle.case.steps[0].supports:
+                continue
+            loads = joint_loads(one.frames, cycle.case)
+            read = np.isfinite(cycle.readings).any(axis=(1, 2)).sum()
+            from_start = cohort.zeroed_at_step_0 or read == 1  # one counts from the neutral pose
+            of_test = (specimen, cycle.case.test, loads, cycle.readings, from_start)
+            for answer in answers_of_test(*of_test):
+                joint = cohort.joint_names[answer.joint]
+                ratio = answer.slope * plausible(joint, answer.coordinate)
+                if ratio != 0.0:
+                    yield _Told(answer, joint, ratio)
+
+
+def _sizes(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
+    """Motion that is too large or too small for its load, grouped by what may be behind it."""
+    found: dict[tuple[str, str, Unit | None], list[tuple[str, str, float]]] = defaultdict(list)
+    for specimen in cohort.specimen_names:
+        own = [one for one in told if one.answer.specimen == specimen]
+        for (_, test, coordinate), ratio, unit in _of_specimen(own):
+            stem = "loads" if unit is not None and unit.of_loads else "motion"
+            found[stem, coordinate, unit].append((specimen, test, ratio))
+    for (stem, coordinate, unit), places in found.items():
+        yield _size(cohort, stem, coordinate, unit, places)
+
+
+def _of_specimen(
+    told: Sequence[_Told],
+) -> Iterator[tuple[tuple[str, str, str], float, Unit | None]]:
+    """Tests and coordinates of a specimen whose joints move too far or too little in the median.
+
+    A unit of loads or angles is mostly of all tests: where it explains all of them better, those
+    that are just inside of what is plausible are told too. Not so of translations, whose published
+    stiffness spans a factor of thirty.
+    """
+    for rotations in (False, True):  # translations have no unit in common with rotations
+        of_place: dict[tuple[str, str, str], list[_Told]] = defaultdict(list)
+        for one in told:
+            if (one.answer.coordinate in ROTATIONS) == rotations:
+                of_place[one.place].append(one)
+        sizes = {place: typical([o.ratio for o in ones]) for place, ones in of_place.items()}
+        together = geometric_mean(list(sizes.values())) if sizes else 1.0
+        shared = _shared(together, sizes) if rotations else None
+        for place, ones in of_place.items():
+            beyond = typical([one.beyond for one in ones])
+            if shared is not None:
+                yield place, together, shared
+            elif not is_plausible(beyond):
+                yield place, beyond, unit_like(sizes[place], place[2])
+
+
+def _shared(together: float, of_place: Mapping[tuple[str, str, str], float]) -> Unit | None:
+    """The unit that all tests of a specimen have wrong; None where some are better without it."""
+    if is_plausible(together):
+        return None
+    sizes, coordinate = list(of_place.values()), next(iter(of_place))[2]
+    unit = unit_like(together, coordinate)
+    if unit is None or any(abs(log(size / unit.factor)) > abs(log(size)) for size in sizes):
+        return None
+    return unit
+
+
+def _size(
+    cohort: Cohort,
+    stem: str,
+    coordinate: str,
+    unit: Unit | None,
+    places: Sequence[tuple[str, str, float]],
+) -> Problem:
+    ratio = geometric_mean([ratio for _, _, ratio in places])
+    column = LOAD_COLUMNS[coordinate] if stem == "loads" else _motion_column(coordinate)
+    found = (
+        f"{_motion_column(coordinate)} {ratio:.3g} times as large as the load gives with published "
+        f"stiffness nearest to it ({_whose(cohort, [(name, test) for name, test, _ in places])})"
+    )
+    allowed = f"1/{PLAUSIBLE:g} to {PLAUSIBLE:g} times, as joints were seen to have"
+    remedy = (
+        f"suspected: {unit}; convert the column"
+        if unit is not None
+        else "look for a wrong unit of motion or loads, and for joints that are fused or cut"
+    )
+    line = _first_line(cohort, stem, places[0][0], places[0][1], column)
+    return Problem(file_of(cohort, stem), line, column, found, allowed, remedy)
+
+
+def _signs(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
+    """Motion against its load: of single joints, and of all joints of a test."""
+    driven: Mapping[tuple[str, str, str], set[str]] = defaultdict(set)
+    against: Mapping[tuple[str, str, str], set[str]] = defaultdict(set)
+    for one in told:
+        driven[one.place].add(one.joint)
+        if _is_against(cohort, one):
+            against[one.place].add(one.joint)
+    found: dict[tuple[str, str, tuple[str, ...]], list[str]] = defaultdict(list)
+    for (specimen, test, coordinate), joints in against.items():
+        whole = joints == driven[specimen, test, coordinate]
+        key = () if whole else tuple(name for name in cohort.joint_names if name in joints)
+        found[test, coordinate, key].append(specimen)
+    for (test, coordinate, named), specimens in found.items():
+        yield _sign(cohort, test, coordinate, named, specimens)
+
+
+def _is_against(cohort: Cohort, one: _Told) -> bool:
+    """Whether a joint moves against its load, clear of the noise, as far as joints move."""
+    sd = cohort.measurement_sd
+    size = (USUAL_SD, USUAL_SD) if sd is None else (sd.translation_mm, sd.rotation_deg)
+    noise = to_si(np.repeat(size, 3))[COORDINATES.index(one.answer.coordinate)]
+    far = abs(one.ratio) >= 1.0 / PLAUSIBLE
+    return far and one.answer.correlation < AGAINST and one.answer.rms > CLEAR * noise
+
+
+def _sign(
+    cohort: Cohort, test: str, coordinate: str, joints: Sequence[str], specimens: Sequence[str]
+) -> Problem:
+    column = _motion_column(coordinate)
+    which = f"of {', '.join(joints)}" if joints else "of all joints"
+    found = f"{column} {which} against the load ({_whose(cohort, [(s, test) for s in specimens])})"
+    allowed = "motion with the load that drives it"
+    driving = f"{LOAD_COLUMNS[coordinate]} in {file_of(cohort, 'loads')}"
+    remedy = f"suspected: the sign of {column}" + (
+        ", or vertebrae exchanged; turn it" if joints else f", or of {driving}; turn one of them"
+    )
+    line = _first_line(cohort, "motion", specimens[0], test, column, joints[0] if joints else None)
+    return Problem(file_of(cohort, "motion"), line, column, found, allowed, remedy)
+
+
+def _whose(cohort: Cohort, places: Sequence[tuple[str, str]]) -> str:
+    """Tests and specimens in words."""
+    tests = list(dict.fromkeys(test for _, test in places))
+    whose = of_specimens(dict.fromkeys(name for name, _ in places), cohort.specimen_names)
+    return f"{whose}, test{'s' if len(tests) > 1 else ''} {', '.join(tests)}"
+
+
+def _motion_column(coordinate: str) -> str:
+    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
+
+
+def _first_line(
+    cohort: Cohort, stem: str, specimen: str, test: str, column: str, joint: str | None = None
+) -> int | None:
+    """Line, as an editor shows it, of the first row in question whose cell is not empty or 0."""
+    table: pd.DataFrame = getattr(cohort, stem)
+    rows = table["specimen"].isin([specimen, "*"]) & (table["test"] == test)
+    if joint is not None:
+        rows &= table["joint"] == joint
+    filled = rows & table[column].notna() & (table[column] != 0.0)
+    chosen = np.flatnonzero(filled if filled.any() else rows)
+    return first_line(cohort, stem, int(chosen[0])) if len(chosen) else None
