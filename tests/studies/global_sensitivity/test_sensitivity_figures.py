@@ -18,7 +18,6 @@ from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.global_sensitivity.figures.panels import (
     leading,
-    loaded,
     measures_of,
     outputs,
     pooled,
@@ -34,6 +33,7 @@ from spinepipe.studies.global_sensitivity.findings import (
     settled,
 )
 from spinepipe.studies.global_sensitivity.kind import KIND
+from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES

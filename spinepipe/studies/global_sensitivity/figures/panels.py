@@ -4,21 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.load_tests import DRIVEN
-from spinepipe.cohort.specimen import joint_frames
-from spinepipe.report.marks import Array
 from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
+from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.settings import DUMMY
 from spinepipe.studies.global_sensitivity.tables import EVERY
-from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
 
 @dataclass(frozen=True)
@@ -137,36 +134,6 @@ def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: s
 def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
     there = [name for name in COORDINATES if name in set(rows["coordinate"])]
     return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
-
-
-def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
-    """Coordinate and step of a test's largest moment about the most cranial joint.
-
-    None where the cohort has no such test, or nothing turns that joint.
-    """
-    if cohort.loads is None or test not in cohort.tests:
-        return None
-    rows = cohort.loads[cohort.loads["test"] == test]
-    specimen = cohort.specimen_names[0]
-    own = rows[rows["specimen"].isin([specimen, "*"])]
-    rows = own if len(own) else rows
-    rows = rows[rows["cycle"].isna() | (rows["cycle"] == rows["cycle"].min())]
-    turning = _moments(rows, joint_frames(cohort, specimen)[-1].origin)
-    by_step = pd.DataFrame(turning).groupby(rows["step"].to_numpy()).sum()
-    size = np.linalg.norm(by_step, axis=1)
-    if not size.any():
-        return None
-    peak = int(size.argmax())
-    return DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
-
-
-def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
-    """(n, 3) N m, ground: each row's moment and that of its force about a point."""
-    forces, moments, points_mm = (
-        loads[[f"{letter}{axis}_{unit}" for axis in "xyz"]].fillna(0.0).to_numpy(float)
-        for letter, unit in (("f", "n"), ("m", "nm"), ("p", "mm"))
-    )
-    return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
 
 
 def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
