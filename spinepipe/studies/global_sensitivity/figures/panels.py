@@ -91,6 +91,12 @@ OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrat
 
 _LONGEST = 34
 
+SEEN = 0.002
+"""Part of a panel's largest index from which on a noise floor can be seen."""
+
+FAILED = "\u2020"
+"""Mark of panels whose indices lack runs that failed."""
+
 
 def measures_of(indices: pd.DataFrame) -> Measures | None:
     """The measures of a study's indices; None where none of them is known."""
@@ -189,6 +195,26 @@ def above_floor(rows: pd.DataFrame) -> set[str]:
     return set(rows.loc[rows["above_floor"].eq(True), "factor"])
 
 
+def floor_seen(rows: pd.DataFrame) -> bool:
+    """Whether the noise floor is large enough to be drawn beside the indices."""
+    return bool(rows["noise_floor"].max() > SEEN * rows["estimate"].abs().max())
+
+
+def screened(rows: pd.DataFrame) -> bool:
+    """Whether factors were asked whether they are negligible."""
+    return bool(rows["negligible"].notna().any())
+
+
+def not_negligible(rows: pd.DataFrame) -> set[str]:
+    """Factors that matter, or may, at any place."""
+    return set(rows.loc[rows["negligible"].eq(False), "factor"])
+
+
+def failures(rows: pd.DataFrame) -> bool:
+    """Whether runs failed, so that these indices speak of the others only."""
+    return bool(rows["failed"].max() > 0)
+
+
 def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
     """Factors from the largest mean of the main index over panels down; ties as in the study.
 
@@ -205,7 +231,7 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
 
 def title(index: int, panel: Panel) -> str:
     """Letter, test and joint, and below them the output."""
-    first = where(panel.test, panel.joint)
+    first = where(panel.test, panel.joint) + f" {FAILED}" * failures(panel.rows)
     second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
     return lettered(index, "\n".join(part for part in (first, second) if part))
 
@@ -276,7 +302,9 @@ def _runs(rows: pd.DataFrame) -> str:
     least, most = int(rows["runs"].min()), int(rows["runs"].max())
     runs = count(most, "run") if least == most else f"{whole(least)} to {count(most, 'run')}"
     failed = int(rows["failed"].max())
-    lost = f", at most {failed} failed" if failed else ", none failed"
+    lost = ", none failed"
+    if failed:
+        lost = f", at most {whole(failed)} failed; {FAILED}: indices of inputs at which runs stand"
     several = rows["specimen"].nunique() > 1
     return f"{runs}{' of each specimen' if several else ''}{lost}"
 
@@ -295,9 +323,9 @@ def _together(kept: Sequence[Panel]) -> str:
 def _dummy(rows: pd.DataFrame) -> str:
     if DUMMY not in set(rows["factor"]):
         return "no dummy, so no noise floor"
-    if rows["noise_floor"].fillna(0.0).max() <= 0.0:
-        return "the dummy's index is exactly 0 in this design"
-    return "grey names: above the noise floor in no panel"
+    quiet = "" if floor_seen(rows) else "the noise floor is too low to be seen; "
+    grey = "negligible in every panel" if screened(rows) else "above the noise floor in no panel"
+    return f"{quiet}grey names: {grey}"
 
 
 def _more(kept: Sequence[Panel], found: Sequence[Panel]) -> str:
