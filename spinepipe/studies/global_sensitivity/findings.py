@@ -43,7 +43,7 @@ LEFT_OUT = {
 """What is done with failed runs, by design."""
 
 MOST_OUTPUTS = 12
-MOST_NAMED, MOST_JOINTS = 3, 6
+MOST_NAMED, MOST_JOINTS, MOST_NEGLIGIBLE = 3, 6, 8
 
 WORTH_NAMING = 0.1
 """Part of the first factor's index from which on another is named beside it."""
@@ -239,7 +239,7 @@ def _screened(panel: Panel, own: Sequence[Record], measures: Measures) -> Iterat
     fixable = [row for row in own if everywhere[row["factor"]]]
     if fixable:
         places = " at every joint" if panel.places > 1 else ""
-        names = listed([factor_name(row["factor"]) for row in fixable])
+        names = listed([factor_name(row["factor"]) for row in fixable], MOST_NEGLIGIBLE)
         yield f"Negligible (interval below 1 %{places}): {names}."
     small = [row for row in own if row["estimate"] < NEGLIGIBLE and row not in fixable]
     if small:

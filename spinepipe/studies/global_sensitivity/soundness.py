@@ -217,7 +217,9 @@ def _ends(times: Times) -> tuple[float, float]:
 
 def _failed(rows: pd.DataFrame) -> Iterator[str]:
     """How many runs failed in each test, where, and what that makes of the indices."""
-    lost = rows[rows["failed"] > 0] if len(rows) else rows
+    if rows.empty:
+        return
+    lost = rows[rows["failed"] > 0]
     for test, part in lost.groupby("test", sort=False):
         each = part.drop_duplicates("specimen")
         runs, failed = int(each["runs"].sum()), int(each["failed"].sum())
