@@ -39,7 +39,7 @@ from spinepipe.sensitivity.global_indices.given_data import (
 )
 from spinepipe.sensitivity.global_indices.indices import ROUNDING, kept, without_lost
 
-REPLICATES = 200
+REPLICATES = 100
 """Factors without effect."""
 
 SLOW_REPLICATES = 20
