@@ -118,7 +118,7 @@ def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Project) -> N
     assert not total.loc["dummy", "above_floor"]
     assert total.loc["dummy", "negligible"]
     assert not total.loc[list(NAMES), "negligible"].any()
-    assert (0.0 < total["noise_floor_low"]).all()
+    assert (total["noise_floor_low"] > 0.0).all()
     assert (total["noise_floor_low"] < total["noise_floor"]).all()
     assert (total["noise_floor"] < 1e-9).all(), "the solver's 1e-6 deg beside a variance of 14"
     assert total.loc[list(NAMES), "above_floor"].all()
