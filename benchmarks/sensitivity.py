@@ -147,7 +147,7 @@ def _handed_on(folder: str, specimen: str) -> dict[str, float]:
     study, cohort = check(Path(folder), STUDY)
     assert isinstance(study, GlobalSensitivity)
     values = values_of(design_of(study), spreads_of(study))[:FIRST_SAMPLES]
-    start = start_of_specimen(folder, STUDY, specimen, False, cohort.digest)
+    start = start_of_specimen(folder, STUDY, specimen, False, cohort.digest, ())
     varied = vary(start, study.changes, values)
     return {
         cases.like.test: float(solve_many(varied.spines, cases).by_engine.mean())

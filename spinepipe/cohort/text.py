@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -184,6 +184,10 @@ def _field_at(
         if name in forms:
             owner, field = forms[str(name)], None
             continue
+        tagged = _tagged(field)
+        if name in tagged:
+            owner = tagged[str(name)] or owner
+            continue
         keys.append(name)
         inner = _inner_model(field)
         if inner is not None:
@@ -206,14 +210,26 @@ def _forms(field: FieldInfo | None) -> dict[str, type[BaseModel]]:
     return {}
 
 
+def _tagged(field: FieldInfo | None) -> dict[str, type[BaseModel] | None]:
+    """Models, and None for words, of a value with one of several forms, by what says which."""
+    return {
+        told.tag: _model(item.__origin__)
+        for item in (get_args(field.annotation) if field is not None else ())
+        for told in getattr(item, "__metadata__", ())
+        if isinstance(told, Tag)
+    }
+
+
+def _model(candidate: Any) -> type[BaseModel] | None:
+    is_model = isinstance(candidate, type) and issubclass(candidate, BaseModel)
+    return candidate if is_model else None
+
+
 def _inner_model(field: FieldInfo | None) -> type[BaseModel] | None:
     if field is None:
         return None
     candidates: list[Any] = [field.annotation, *get_args(field.annotation)]
-    for candidate in candidates:
-        if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-            return candidate
-    return None
+    return next((model for one in candidates if (model := _model(one)) is not None), None)
 
 
 def _allowed(detail: ErrorDetails) -> str:

@@ -177,11 +177,12 @@ def _rows(whole: Schema, part: Schema, prefix: str) -> Iterator[tuple[str, ...]]
         key = f"{prefix}{name}"
         inner = _resolved(whole, field.get("items", {}))
         if "properties" in field:
+            words = [choice for choice in _choices(given) if "const" in choice]
             yield (
                 code(key),
-                "mapping",
+                " or ".join(["mapping", *(_type(whole, word) for word in words)]),
                 _default(given, name in required),
-                "the keys below",
+                "; ".join(["the keys below", *(_allowed(whole, word) for word in words)]),
                 field["told"],
             )
             yield from _rows(whole, field, f"{key}.")
@@ -215,7 +216,7 @@ def _resolved(whole: Schema, given: Schema) -> dict[str, Any]:
     """A schema with its reference followed; ``told`` is what is said where it is used."""
     told = given.get("description", "")
     reference = given.get("$ref")
-    for choice in given.get("anyOf", ()):
+    for choice in _choices(given):
         reference = reference or choice.get("$ref")
     if reference is None:
         return {**given, "told": told}
@@ -224,7 +225,8 @@ def _resolved(whole: Schema, given: Schema) -> dict[str, Any]:
 
 
 def _choices(field: Schema) -> list[Schema]:
-    return list(field.get("anyOf", [field]))
+    forms = () if "discriminator" in field else field.get("oneOf", ())
+    return list(field.get("anyOf", forms) or [field])
 
 
 def _type(whole: Schema, field: Schema) -> str:

@@ -7,9 +7,9 @@ from SALib.analyze import delta, fast, morris, pawn, rbd_fast, sobol
 from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
 
-from spinepipe.sensitivity.global_indices.design import DUMMY, Design, draw
+from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.sensitivity.global_indices.estimates import Index, Known, Settings
-from spinepipe.sensitivity.global_indices.indices import above_floor, indices, noise_floor
+from spinepipe.sensitivity.global_indices.indices import indices
 
 G = FUNCTIONS["g"]
 QUICK = Settings(bootstraps=20, delta_bootstraps=5)
@@ -274,33 +274,3 @@ def test_outputs_that_do_not_fit_are_refused() -> None:
         indices(design, outputs)
     with pytest.raises(ValueError, match="no index S3"):
         Settings(wanted=("S3",))
-
-
-@pytest.mark.parametrize(
-    ("method", "samples", "quiet"),
-    [("sobol", 64, ("S1", "ST")), ("morris", 20, ("mu", "mu_star", "sigma"))],
-)
-def test_a_dummy_that_only_repeats_runs_has_a_floor_of_zero(
-    method: str, samples: int, quiet: tuple[str, ...]
-) -> None:
-    design = draw(method, G.factors, samples, 5, dummy=True)
-    found = indices(design, two_outputs(design), settings=QUICK)
-    floors = noise_floor(found)
-    assert {kind: floors[kind].tolist() for kind in quiet} == {kind: [0.0, 0.0] for kind in quiet}
-    if method == "sobol":
-        pairs = [index.high for index in found if DUMMY in (index.factor, index.other)]
-        assert floors["S2"].tolist() == np.max(pairs, axis=0).tolist()
-        assert min(floors["S2"].tolist()) > 0.0
-
-
-def test_a_dummy_is_the_floor_of_distances() -> None:
-    design = draw("latin_hypercube", G.factors, 500, 5, dummy=True)
-    settings = Settings(bootstraps=200, wanted=("PAWN", "KS_high"))
-    found = indices(design, two_outputs(design), settings=settings)
-    floors = noise_floor(found)
-    table = by_name(found)
-    assert floors["PAWN"].tolist() == table["PAWN", DUMMY, ""].high.tolist()
-    assert min(floors["PAWN"].tolist()) > 0.05
-    assert above_floor(table["PAWN", "x1", ""], floors) == (True, True)
-    assert above_floor(table["PAWN", "x6", ""], floors) == (False, False)
-    assert above_floor(table["PAWN", "x1", ""], {}) == (None, None)

@@ -260,7 +260,7 @@ def test_a_digest_hangs_on_its_own_kind_alone(kind: str, module: str) -> None:
 SOLVING = {
     "cohort_stiffness": {"fit", "literature", "left_out", "pool"},
     "discrepancy": {"search"},
-    "global_sensitivity": {"respond", "calibrate"},
+    "global_sensitivity": {"base", "respond", "calibrate"},
     "joint_pose_sensitivity": {
         *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
     },

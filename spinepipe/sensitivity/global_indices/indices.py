@@ -1,10 +1,8 @@
-"""All indices of a design's outputs, with status, message and noise floor.
+"""All indices of a design's outputs, with status and message.
 
-Where runs failed, what is left is told block by block. The noise floor is what an index says of a
-factor that changes nothing.
+Where runs failed, what is left is told block by block.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -13,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import DUMMY, Design, Method
+from spinepipe.sensitivity.global_indices.design import Design, Method
 from spinepipe.sensitivity.global_indices.estimates import (
     INDICES,
     NOTHING,
@@ -256,45 +254,3 @@ def _found(design: Design, values: Array, left: Kept, settings: Settings) -> Est
         Method.LATIN_HYPERCUBE: given_data_indices,
     }[design.method]
     return analyse(without_lost(design, left), values[left.rows], settings)
-
-
-def noise_floor(found: Sequence[Index]) -> dict[str, Masked]:
-    """(K,) upper interval end of the dummy, by name of index; empty without a dummy.
-
-    Of S2 it is the highest end among the dummy's pairs, of an index that may be negative (mu) the
-    end farther from 0. An index without intervals (FAST) has the dummy's estimate as its floor.
-
-    In Sobol and Morris designs the runs that a dummy changes are repetitions, so that its S1, ST,
-    mu and sigma are 0 but for the model's own scatter: these estimators have no noise floor, and a
-    factor above it is one whose interval leaves 0 out. In S2, FAST and given-data indices the
-    floor is the method's noise.
-    """
-    floors: dict[str, Masked] = {}
-    for index in found:
-        if DUMMY in (index.factor, index.other):
-            top = _farthest(index)
-            floors[index.index] = np.ma.maximum(floors.get(index.index, top), top)
-    return floors
-
-
-def above_floor(index: Index, floors: dict[str, Masked]) -> tuple[bool | None, ...]:
-    """(K,) whether the whole interval lies above the floor; None where one of both is missing."""
-    if index.index not in floors:
-        return (None,) * len(index.status)
-    return tuple((_nearest(index) > floors[index.index]).tolist())
-
-
-def _farthest(index: Index) -> Masked:
-    low, high = _ends(index)
-    return np.ma.maximum(high, -low) + 0.0 if index.index == "mu" else high
-
-
-def _nearest(index: Index) -> Masked:
-    low, high = _ends(index)
-    return np.ma.maximum(low, -high) if index.index == "mu" else low
-
-
-def _ends(index: Index) -> tuple[Masked, Masked]:
-    if np.ma.getmaskarray(index.low).all():
-        return index.estimate, index.estimate
-    return index.low, index.high

@@ -15,14 +15,22 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.estimates import Index, Settings
-from spinepipe.sensitivity.global_indices.indices import above_floor, indices, noise_floor
+from spinepipe.sensitivity.global_indices.floor import (
+    Floor,
+    above_floor,
+    negligible,
+    noise_floor,
+)
+from spinepipe.sensitivity.global_indices.indices import indices
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.drawn import design_of
+from spinepipe.studies.global_sensitivity.drawn import design_of, drawn_values
+from spinepipe.studies.global_sensitivity.failed import failed_rows
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import (
     CALIBRATED,
     CONVERGENCE,
     EVERY,
+    FAILED_RUNS,
     INDICES,
     RESPONSES,
 )
@@ -76,8 +84,9 @@ def run(
     specimen: str,
     indices: str,
     convergence: str,
+    failed_runs: str,
 ) -> None:
-    """Write the indices, and the convergence, of one specimen from the blocks of its samples."""
+    """Write what the blocks of one specimen's samples say: indices, how they settle, who failed."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     outputs = [
         *response_outputs(responses, settings),
@@ -89,6 +98,10 @@ def run(
         (CONVERGENCE, _convergence_rows, convergence),
     ):
         _write(table, [row for one in outputs for row in rows(settings, one)], path, made_by)
+    drawn = design_of(settings)
+    values = drawn_values(design, settings, slice(None)) * np.array(settings.per_si)
+    failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
+    _write(FAILED_RUNS, failed, failed_runs, made_by)
 
 
 def _write(table: Table, rows: Rows, path: str, made_by: dict[str, str]) -> None:
@@ -108,18 +121,17 @@ def _asked(settings: GlobalSensitivity) -> Settings:
 
 
 def _index_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, Any]]:
-    found = indices(design_of(settings), one.values, one.ok, _asked(settings), one.resolution)
-    floors = noise_floor(found)
+    design, asked = design_of(settings), _asked(settings)
+    found = indices(design, one.values, one.ok, asked, one.resolution)
+    floors = noise_floor(design, one.values, found, one.ok, asked, one.resolution)
     means, sds = _sizes(one)
     for index in found:
-        above = above_floor(index, floors)
-        nothing = [None] * len(one.where)
-        floor = floors[index.index].tolist() if index.index in floors else nothing
         columns = zip(
-            *(one.where, _numbers(index), means, sds, floor, above, index.status, index.message),
+            *(one.where, _numbers(index), means, sds, _screened(index, floors)),
+            *(index.status, index.message),
             strict=True,
         )
-        for where, numbers, mean, sd, top, is_above, status, message in columns:
+        for where, numbers, mean, sd, screened, status, message in columns:
             yield {
                 **dict(zip(WHERE, where, strict=True)),
                 "index": index.index,
@@ -128,13 +140,31 @@ def _index_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, 
                 **numbers,
                 "mean": mean,
                 "sd": sd,
-                "noise_floor": top,
-                "above_floor": is_above,
+                **screened,
                 "runs": index.runs,
                 "failed": index.failed,
+                "conditional": index.failed > 0,
                 "status": status.value,
                 "message": message,
             }
+
+
+def _screened(index: Index, floors: dict[str, Floor]) -> Sequence[dict[str, Any]]:
+    """What tells an index from noise, and a factor from one that may be fixed."""
+    count = len(index.status)
+    floor = floors.get(index.index)
+    ends = ([None] * count,) * 2 if floor is None else (floor.low.tolist(), floor.high.tolist())
+    columns = zip(*ends, above_floor(index, floors), negligible(index), strict=True)
+    return [
+        {
+            "noise_floor_low": low,
+            "noise_floor": high,
+            "above_floor": above,
+            "floor_replicates": 0 if floor is None else floor.replicates,
+            "negligible": little,
+        }
+        for low, high, above, little in columns
+    ]
 
 
 def _convergence_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, Any]]:

@@ -1,17 +1,24 @@
 """One batch of samples of a specimen: spines and loads made from the drawn values of factors."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.files import Stamp, stamp
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import read_mark
 from spinepipe.studies.global_sensitivity.drawn import drawn_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import Start, start_of
+from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.studies.global_sensitivity.vary import Varied, vary
 from spinepipe.studies.parts import stiffness_of_joints
+from spinepipe.tables import read_frame
+from spinepipe.units import COORDINATES
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +36,7 @@ def batch_of(
     study: GlobalSensitivity,
     cohort: Cohort,
     design: str,
+    base: Sequence[str],
     specimen: str,
     number: int,
     all_steps: bool,
@@ -37,24 +45,42 @@ def batch_of(
 
     Parameters
     ----------
-    design : the design's file. all_steps : of the tests, or those that the study asks for.
+    design : the design's file. base : that of the specimen's fitted stiffness, or none.
+    all_steps : of the tests, or those that the study asks for.
     """
     size = study.batch_size(len(study.chosen_specimens(cohort)))
     first = number * size
     values = drawn_values(design, study, slice(first, first + size))
-    start = start_of_specimen(root, study.study, specimen, all_steps, cohort.digest)
+    fitted = tuple(stamp(path) for path in base)
+    start = start_of_specimen(root, study.study, specimen, all_steps, cohort.digest, fitted)
     return Batch(first, len(values), start, vary(start, study.changes, values))
 
 
 @lru_cache(maxsize=16)
-def start_of_specimen(root: str, study: str, specimen: str, all_steps: bool, _digest: str) -> Start:
-    """The specimen as the cohort has it; ``_digest`` is that of its cohort."""
+def start_of_specimen(
+    root: str, study: str, specimen: str, all_steps: bool, _digest: str, fitted: tuple[Stamp, ...]
+) -> Start:
+    """The specimen before factors change it; ``_digest`` is that of its cohort."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    given = stiffness_of_joints(cohort, settings.start_stiffness, settings.level_stiffness)
     return start_of(
         cohort,
         specimen,
-        stiffness_of_joints(cohort, settings.stiffness, settings.level_stiffness),
+        base_stiffness(fitted[0][0]) if fitted else given,
         np.array(settings.damping.in_order()),
         settings.chosen_tests(cohort),
         all_steps,
     )
+
+
+def base_stiffness(path: str) -> Array:
+    """(6,) N/m and N m/rad of all joints, from the job's file of ``base_stiffness``."""
+    rows = read_frame(path)
+    found = rows[rows["joint"] == EVERY].set_index("coordinate")["stiffness"]
+    values: Array = found[list(COORDINATES)].to_numpy(float)
+    return values
+
+
+def marks_of_base(base: Sequence[str]) -> list[str]:
+    """The mark of the file of fitted stiffness: what is computed hangs on it."""
+    return [read_mark(path) for path in base]

@@ -1,25 +1,21 @@
 """Job: stiffness of one specimen calibrated to its measured motion, in one batch of samples."""
 
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.measured import measured_cycles
-from spinepipe.cohort.specimen import joint_frames
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
-from spinepipe.statics import free_parameters, moved
+from spinepipe.statics import moved
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, marks_of_base
+from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED
 from spinepipe.tables import to_arrow, write
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import STIFFNESS_COLUMNS
 
 TABLE = CALIBRATED.without("specimen")
 """A job file: the specimen is in its folder's name."""
@@ -27,17 +23,24 @@ TABLE = CALIBRATED.without("specimen")
 STARTS = 1
 
 
-def run(root: str, study: str, design: str, specimen: str, batch: str, output: str) -> None:
-    """Write one row per sample: stiffness that all joints share."""
+def run(
+    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+) -> None:
+    """Write one row per sample: stiffness that all joints share.
+
+    Parameters
+    ----------
+    base : file of the specimen's fitted stiffness, where factors start from it.
+    """
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
-    one = batch_of(root, settings, cohort, design, specimen, int(batch), all_steps=True)
+    one = batch_of(root, settings, cohort, design, base, specimen, int(batch), all_steps=True)
     rows = [_refused(one.first + sample, why) for sample, why in one.varied.refused.items()]
     for place, sample in enumerate(one.varied.kept.tolist()):
         rows.append(_fitted(settings, cohort, specimen, one, place, one.first + sample))
     rows.sort(key=lambda row: int(row["sample"]))
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("calibrate", settings, cohort, [specimen], size)
+    made_by = provenance("calibrate", settings, cohort, [specimen], size + marks_of_base(base))
     write(to_arrow(TABLE, columns), output, made_by)
 
 
@@ -50,7 +53,7 @@ def _fitted(
     sample: int,
 ) -> dict[str, Any]:
     try:
-        problem = _problem(settings, cohort, specimen, batch, place)
+        problem = _problem(settings, cohort, batch, place)
         seed = specimen_seed(settings.seed, f"{specimen}/{sample}")
         found = fit(problem, STARTS, seed, settings.calibration.identifiable_below)
     except RefusedModel as error:
@@ -58,23 +61,12 @@ def _fitted(
     return _row(sample, problem, found)
 
 
-def _problem(
-    settings: GlobalSensitivity, cohort: Cohort, specimen: str, batch: Batch, place: int
-) -> Problem:
+def _problem(settings: GlobalSensitivity, cohort: Cohort, batch: Batch, place: int) -> Problem:
     """The sample's spine and loads, and the readings in the frames that it has."""
     model = batch.varied.spines.model(place)
+    cases = [varied.case(place) for varied in batch.varied.cases]
     options = settings.calibration
-    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in options.free]
-    free = free_parameters(model, 0, names, "per_specimen")
-    reach = np.full(len(free), np.log(options.bound_factor))
-    nominal = joint_frames(cohort, specimen)
-    tested = measured_cycles(cohort, specimen, [test.case for test in batch.start.tests])
-    cases = tuple(
-        replace(one.in_frames(nominal, model.frames), case=varied.case(place))
-        for varied, one in zip(batch.varied.cases, tested, strict=True)
-    )
-    weights = np.array(options.weights.in_order(), dtype=float)
-    return Problem(model, cases, free, weights, -reach, reach)
+    return problem_of(options, cohort, batch.start, model, cases, options.free)
 
 
 def _row(sample: int, problem: Problem, found: Fit) -> dict[str, Any]:

@@ -143,25 +143,44 @@ def _tests(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iter
 
 
 def _motion(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
-    """Stiffness is calibrated to measured motion, which every specimen must have."""
-    if not study.outputs.stiffness:
-        return
-    place = at(document, "outputs.stiffness")
-    remedy = "set outputs.stiffness: false, or choose other specimens and tests"
-    allowed = "true with measured motion of every chosen specimen in one chosen test at least"
+    """Stiffness is fitted to measured motion, which every specimen must have."""
+    asked = (
+        ("stiffness", "fitted", "give `stiffness` as a mapping", study.is_fitted),
+        ("outputs.stiffness", "true", "set outputs.stiffness: false", study.outputs.stiffness),
+    )
+    for key, word, otherwise, wanted in asked:
+        if wanted:
+            missing = _without_motion(study, cohort)
+            if missing:
+                remedy = f"{otherwise}, or choose other specimens and tests"
+                allowed = f"{word} with {_WITH_MOTION}"
+                yield Problem(*at(document, key), f"{word}, and {missing}", allowed, remedy)
+    if study.is_fitted and study.level_stiffness:
+        found = "levels of their own with stiffness: fitted, which all joints of a specimen share"
+        yield Problem(*at(document, "level_stiffness"), found, "none of them", "delete it")
+    if study.is_fitted or study.outputs.stiffness:
+        yield from _weights(document, study, cohort)
+
+
+_WITH_MOTION = "measured motion of every chosen specimen in one chosen test at least"
+
+
+def _without_motion(study: GlobalSensitivity, cohort: Cohort) -> str:
+    """Whose motion there is not; empty where there is everybody's."""
     if cohort.motion is None:
-        found = f"true, and cohort '{cohort.name}' has no motion.csv"
-        yield Problem(*place, found, allowed, remedy)
+        return f"cohort '{cohort.name}' has no motion.csv"
+    measured = set(readings(cohort, study.chosen_tests(cohort), None)["specimen"])
+    known = set(cohort.specimen_names)
+    chosen = [name for name in study.chosen_specimens(cohort) if name in known]
+    names = [name for name in chosen if name not in measured]
+    return f"no motion of {', '.join(names)}" if names else ""
+
+
+def _weights(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
+    """Something that was measured must count."""
+    if cohort.motion is None:
         return
     read = readings(cohort, study.chosen_tests(cohort), None)
-    measured = set(read["specimen"])
-    missing = [
-        name
-        for name in study.chosen_specimens(cohort)
-        if name in cohort.specimen_names and name not in measured
-    ]
-    if missing:
-        yield Problem(*place, f"true, and no motion of {', '.join(missing)}", allowed, remedy)
     if AUTO in study.calibration.free:
         found = "auto, and no coordinate was both loaded and measured"
         place = at(document, "calibration.free")

@@ -9,6 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.report.words import capital, count, fixed, listed, number
+from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,
@@ -29,6 +30,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     with_results,
 )
 from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.soundness import doubts, grounds
 
 Record = dict[str, Any]
 
@@ -41,19 +43,19 @@ LEFT_OUT = {
 """What is done with failed runs, by design."""
 
 MOST_OUTPUTS = 12
-MOST_NAMED, MOST_JOINTS = 3, 6
+MOST_NAMED, MOST_JOINTS, MOST_NEGLIGIBLE = 3, 6, 8
 
 WORTH_NAMING = 0.1
 """Part of the first factor's index from which on another is named beside it."""
-
-LITTLE = 0.01
-"""Share of the variance below which a factor counts for little."""
 
 HARDLY = 0.95
 """Sum of first-order indices from which on there is hardly any interaction."""
 
 DOUBTFUL = ("too_many_failed", "too_few")
 """Why an output has no index, where that casts doubt on the study."""
+
+RESTS_ON = ("base_stiffness", "base_motion", "failed_runs")
+"""Tables of what the indices rest on."""
 
 _PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
 _LEADING = 3
@@ -72,11 +74,12 @@ _MEANING = {
 }
 
 _EXACT = {
-    "sobol": "In a sobol design S1 and ST of the dummy, and of every factor without any effect, "
-    "are exactly 0: there the intervals show the noise, and a factor is above the dummy where its "
-    "interval is above 0.",
-    "morris": "In a morris design the indices of the dummy, and of every factor without any "
-    "effect, are exactly 0: there the intervals show the noise.",
+    "sobol": "In a sobol design runs that differ in the dummy alone are equal: S1 and ST of a "
+    "factor without any effect are 0, and their floor is what the solver leaves open. A factor may "
+    "still be negligible (interval of ST below 1 %).",
+    "morris": "In a morris design runs that differ in the dummy alone are equal: its indices are "
+    "0, and their floor is what the solver leaves open.",
+    "fast": "FAST has no intervals, so no factor is called negligible.",
 }
 """What the dummy can say in these designs."""
 
@@ -92,9 +95,10 @@ def opening(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Headl
         sure.append(settled(grown, found, measures, cohort.joint_names))
         if indices["ci_low"].notna().any():
             sure.append(f"In brackets: {100.0 * study.confidence:g} % confidence intervals.")
-    doubts = tuple(words for status, words in without(indices) if status in DOUBTFUL)
+    warned = [words for status, words in without(indices) if status in DOUBTFUL]
+    warned += doubts(study, *(results.table(name) for name in RESTS_ON))
     return Headline(
-        words or "No output has an index.", " ".join(part for part in sure if part), doubts
+        words or "No output has an index.", " ".join(part for part in sure if part), tuple(warned)
     )
 
 
@@ -104,6 +108,7 @@ def findings(study: GlobalSensitivity, cohort: Cohort, results: Results) -> list
     found, measures = _outputs(cohort, results)
     shown = found[:MOST_OUTPUTS] if measures else []
     told = [driver(panel, measures, cohort.joint_names) for panel in shown if measures]
+    told += grounds(study, *(results.table(name) for name in RESTS_ON[:2]))
     if len(found) > MOST_OUTPUTS:
         told.append(f"{count(len(found) - MOST_OUTPUTS, 'more output')}: see the tables.")
     told.append(pairs(indices, found))
@@ -223,13 +228,23 @@ def _nothing(panel: Panel, own: Sequence[Record], measures: Measures) -> Iterato
     hidden = [factor_name(row["factor"]) for row in own if row["factor"] not in seen]
     if hidden:
         yield f"Not above the dummy: {listed(hidden)}."
-    little = [
-        factor_name(row["factor"])
-        for row in own
-        if measures.of_variance and row["estimate"] < LITTLE and row["factor"] in seen
-    ]
-    if little:
-        yield f"{'Above it, but below' if hidden else 'Below'} 1 %: {listed(little)}."
+    if measures.of_variance and _main(panel, measures)["negligible"].notna().any():
+        yield from _screened(panel, own, measures)
+
+
+def _screened(panel: Panel, own: Sequence[Record], measures: Measures) -> Iterator[str]:
+    """Factors that may be fixed, and small ones of which that is not shown."""
+    main = _main(panel, measures)
+    everywhere = main.groupby("factor", sort=False)["negligible"].all()
+    fixable = [row for row in own if everywhere[row["factor"]]]
+    if fixable:
+        places = " at every joint" if panel.places > 1 else ""
+        names = listed([factor_name(row["factor"]) for row in fixable], MOST_NEGLIGIBLE)
+        yield f"Negligible (interval below 1 %{places}): {names}."
+    small = [row for row in own if row["estimate"] < NEGLIGIBLE and row not in fixable]
+    if small:
+        names = listed([factor_name(row["factor"]) for row in small])
+        yield f"Small, but not shown to be negligible: {names}."
 
 
 def value(size: float, panel: Panel, measures: Measures) -> str:

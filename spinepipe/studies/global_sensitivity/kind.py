@@ -10,26 +10,35 @@ from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
 from spinepipe.studies.global_sensitivity.tables import (
+    BASE_MOTION,
+    BASE_STIFFNESS,
     CALIBRATED,
     CONVERGENCE,
     DESIGN,
+    FAILED_RUNS,
     INDICES,
     RESPONSES,
 )
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
-OF_JOBS = ("responses", "calibrated", "indices", "convergence")
-"""Tables joined from job files: of batches of samples, the last two of whole specimens."""
+_OF_BASE = ("base_stiffness", "base_motion")
+_OF_INDICES = ("indices", "convergence", "failed_runs")
+_BY_SPECIMEN = (*_OF_BASE, *_OF_INDICES)
 
-_BY_SPECIMEN = ("indices", "convergence")
+OF_JOBS = (*_OF_BASE, "responses", "calibrated", *_OF_INDICES)
+"""Tables joined from job files: of whole specimens, but for those of batches of samples."""
 
 _MADE_BY = {
+    **dict.fromkeys(_OF_BASE, "base"),
     "responses": "respond",
     "calibrated": "calibrate",
-    **dict.fromkeys(_BY_SPECIMEN, "analyse"),
+    **dict.fromkeys(_OF_INDICES, "analyse"),
 }
 """The job that writes the files of each of them."""
+
+_FOLDER = {**dict.fromkeys(_OF_BASE, "base"), **dict.fromkeys(_OF_INDICES, "analysis")}
+"""Where files of whole specimens are."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +82,7 @@ class SensitivityFiles(StudyFiles):
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
         calibrated = ("calibrated",) if self.study.outputs.stiffness else ()
-        return ("design", "responses", *calibrated, "indices", "convergence")
+        return ("design", *_OF_BASE, "responses", *calibrated, *_OF_INDICES)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -91,7 +100,7 @@ class SensitivityFiles(StudyFiles):
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         if table in _BY_SPECIMEN:
-            return [f"{self.folder}/analysis/specimen={specimen}/{table}.parquet"]
+            return [f"{self.folder}/{_FOLDER[table]}/specimen={specimen}/{table}.parquet"]
         numbers = files_of_block(block, self.n_batches)
         return [self._batch_file(table, specimen, number) for number in numbers]
 
@@ -99,6 +108,10 @@ class SensitivityFiles(StudyFiles):
         """The blocks of a table that hold a specimen; none where there is no such table."""
         blocks = [block for block in self.blocks(table) if block[0] == specimen]
         return [self.block_file(table, *one) for one in blocks] if table in self.tables else []
+
+    def base_of(self, specimen: str) -> list[str]:
+        """The file of a specimen's fitted stiffness; none where the study gives the stiffness."""
+        return self.job_files("base_stiffness", specimen, "000") if self.study.is_fitted else []
 
     @property
     def n_batches(self) -> int:
@@ -109,11 +122,14 @@ class SensitivityFiles(StudyFiles):
         return f"{self.folder}/jobs/{table}/specimen={specimen}/batch={number:05d}.parquet"
 
 
-def _size_of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:
-    """How many samples one file holds hangs on the number of specimens."""
-    return [str(expected.study.batch_size(len(expected.files.specimens)))]
+def _of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """How many samples one file holds, by the number of specimens, and the mark of the fit."""
+    size = str(expected.study.batch_size(len(expected.files.specimens)))
+    base = expected.of_job("base", place) if expected.study.is_fitted else None
+    return [size] if base is None else [size, base]
 
 
+_DRAWING = ("factors", "design", "dummy", "samples_per_target")
 _RESPONDING = (
     *("specimens", "tests", "steps", "stiffness", "level_stiffness", "damping", "loading"),
 )
@@ -126,16 +142,26 @@ KIND = Kind(
     checks=(check_global_sensitivity,),
     checks_at_start=(check_size_of_design,),
     settled=calibration_settled,
-    tables=(DESIGN, RESPONSES, CALIBRATED, INDICES, CONVERGENCE),
+    tables=(
+        DESIGN,
+        BASE_STIFFNESS,
+        BASE_MOTION,
+        RESPONSES,
+        CALIBRATED,
+        INDICES,
+        CONVERGENCE,
+        FAILED_RUNS,
+    ),
     jobs=(
         Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),
+        Job("base", ignores=ignoring(*_DRAWING, *_ANALYSING, "steps")),
         Job(
             "respond",
             many=True,
             ignores=ignoring(*_ANALYSING, "calibration", "seed"),
-            also=_size_of_batch,
+            also=_of_batch,
         ),
-        Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_size_of_batch),
+        Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_of_batch),
         Job("analyse"),
     ),
 )

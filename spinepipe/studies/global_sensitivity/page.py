@@ -17,9 +17,14 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     measures_of,
     outputs,
 )
-from spinepipe.studies.global_sensitivity.findings import findings, opening
+from spinepipe.studies.global_sensitivity.findings import RESTS_ON, findings, opening
 from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
-from spinepipe.studies.global_sensitivity.tables import INDICES
+from spinepipe.studies.global_sensitivity.tables import (
+    BASE_MOTION,
+    BASE_STIFFNESS,
+    FAILED_RUNS,
+    INDICES,
+)
 from spinepipe.tables.schema import Column
 
 QUESTION = (
@@ -27,7 +32,7 @@ QUESTION = (
     "which inputs need not be known better?"
 )
 
-READ = ("indices", "convergence")
+READ = ("indices", "convergence", *RESTS_ON)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _PLACE = ("specimen", "output", "test", "step", "joint", "coordinate")
@@ -68,10 +73,29 @@ def shown_tables(cohort: Cohort, results: Results) -> list[Sortable]:
     """Leading factors of every output, interactions, and the indices of what is drawn."""
     indices = results.table("indices")
     measures = measures_of(indices) if len(indices) else None
-    if measures is None:
-        return []
-    every = [_ranking(indices, measures), *_pairs(indices), _drawn(cohort, indices, measures)]
+    every = list(_rests_on(results))
+    if measures is not None:
+        every = [
+            *(_ranking(indices, measures), *_pairs(indices)),
+            *(*every, _drawn(cohort, indices, measures)),
+        ]
     return [table for table in every if table.rows]
+
+
+def _rests_on(results: Results) -> Iterator[Sortable]:
+    """The spine that the indices were taken at, and the runs that they lack."""
+    for title, shape in (
+        ("Stiffness from which the factors start", BASE_STIFFNESS),
+        ("Motion of the base beside what was measured", BASE_MOTION),
+        ("Where runs failed", FAILED_RUNS),
+    ):
+        rows = results.table(shape.name)
+        if shape is BASE_MOTION and len(rows):
+            rows = rows[rows["verdict"] != "not_measured"]
+        if shape is FAILED_RUNS and len(rows):
+            rows = rows[rows["failed"] > 0]
+        if len(rows):
+            yield sortable(shape.name, title, shape.about, rows, shape.columns)
 
 
 def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
@@ -88,6 +112,9 @@ def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
             for name in _RANKS
         ),
         Column("not above the dummy", "integer", "factors whose index is not above the floor"),
+        Column(
+            "negligible", "integer", "factors whose ST has its interval below 1 %", null="no ST"
+        ),
     ]
     about = f"By {NAME[measures.main]}; one row for each output."
     return sortable(
@@ -102,7 +129,9 @@ def _first(part: pd.DataFrame) -> dict[str, object]:
         name: _told(row) for name, row in zip(_RANKS, ordered, strict=False)
     }
     below = sum(row["above_floor"] is not None and not row["above_floor"] for row in ordered)
-    return {**told, "not above the dummy": below}
+    little = own["negligible"].dropna()
+    negligible = int(little.sum()) if len(little) else None
+    return {**told, "not above the dummy": below, "negligible": negligible}
 
 
 def _told(row: Mapping[Hashable, Any]) -> str:

@@ -11,7 +11,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.many import ManySolved, solve_many
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, marks_of_base
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
@@ -26,15 +26,23 @@ HANDED_OVER = "share_by_engine_of_record"
 LOADS = tuple(c.name for c in RESPONSES.columns if c.name.startswith("load_"))
 
 
-def run(root: str, study: str, design: str, specimen: str, batch: str, output: str) -> None:
-    """Write the rows of a batch: sample by sample, test by test, step by step, joint by joint."""
+def run(
+    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+) -> None:
+    """Write the rows of a batch: sample by sample, test by test, step by step, joint by joint.
+
+    Parameters
+    ----------
+    base : file of the specimen's fitted stiffness, where factors start from it.
+    """
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
-    one = batch_of(root, settings, cohort, design, specimen, int(batch), settings.steps == "all")
+    every = settings.steps == "all"
+    one = batch_of(root, settings, cohort, design, base, specimen, int(batch), every)
     found = [solve_many(one.varied.spines, cases) for cases in one.varied.cases]
     solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
     columns = _columns(one, cohort.joint_names, solved)
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("respond", settings, cohort, [specimen], size)
+    made_by = provenance("respond", settings, cohort, [specimen], size + marks_of_base(base))
     by_engine = np.concatenate([many.by_engine for many in found])
     handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
     print(

@@ -1,9 +1,17 @@
 """What a study of global sensitivity asks: factors, design, outputs, fits of stiffness."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
 
 from spinepipe.cohort import Cohort
 from spinepipe.sensitivity.global_indices.spread import (
@@ -30,16 +38,24 @@ from spinepipe.studies.parts import (
 )
 from spinepipe.studies.study import Study
 
+FITTED = "fitted"
+"""In place of a stiffness: each specimen's own."""
+
 
 class SampleCalibration(BaseModel):
-    """One stiffness for all joints of a specimen, from one starting point: the sample's own."""
+    """One stiffness for all joints of a specimen, fitted to its measured motion."""
 
     model_config = FORM
 
     free: Free = Field(
         default=(AUTO,),
         description="coordinates whose stiffness is fitted, or auto: those that were loaded and "
-        "measured, each of which then counts in the cost; the others keep the sample's",
+        "measured, each of which then counts in the cost; the others keep the sample's, or that "
+        "of `start`",
+    )
+    start: PublishedStiffness = Field(
+        default_factory=PublishedStiffness,
+        description="where the fit of `stiffness: fitted` begins, and what it leaves alone",
     )
     weights: Weights = Field(default_factory=Weights, description="weights on mm and degrees")
     bound_factor: float = Field(
@@ -76,6 +92,17 @@ SLOW = ("delta",)
 
 IndexName = Literal[
     "S1", "ST", "S2", "mu", "mu_star", "sigma", "S1_RBD", "PAWN", "KS_low", "KS_high", "delta"
+]
+
+
+def _form(given: Any) -> str:
+    """What is a word may only be `fitted`."""
+    return FITTED if isinstance(given, str) else "given"
+
+
+_BaseStiffness = Annotated[
+    Annotated[PublishedStiffness, Tag("given")] | Annotated[Literal["fitted"], Tag(FITTED)],
+    Discriminator(_form),
 ]
 
 _Coordinates = Annotated[tuple[Coordinate, ...], Field(strict=False), AfterValidator(distinct)]
@@ -160,8 +187,10 @@ class GlobalSensitivity(Study):
         default="peak", description="load steps: that of the largest load, or all"
     )
     seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
-    stiffness: PublishedStiffness = Field(
-        default_factory=PublishedStiffness, description="stiffness of all joints before factors"
+    stiffness: _BaseStiffness = Field(
+        default_factory=PublishedStiffness,
+        description="stiffness of all joints before factors; `fitted`: each specimen's own, fitted "
+        "to its measured motion as `calibration` says",
     )
     level_stiffness: Mapping[str, LevelStiffness] = Field(
         default_factory=dict,
@@ -176,7 +205,7 @@ class GlobalSensitivity(Study):
     outputs: Outputs = Field(default_factory=Outputs, description="what the factors explain")
     calibration: SampleCalibration = Field(
         default_factory=SampleCalibration,
-        description="how stiffness is fitted, where it is an output",
+        description="how stiffness is fitted, where it is `fitted` or an output",
     )
     indices: EachOnce[IndexName] | None = Field(
         default=None,
@@ -197,6 +226,16 @@ class GlobalSensitivity(Study):
     most_failed: float = Field(
         default=0.2, ge=0, lt=1, description="share of failed runs above which no index is given"
     )
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether factors start from each specimen's own fit."""
+        return self.stiffness == FITTED
+
+    @property
+    def start_stiffness(self) -> PublishedStiffness:
+        """What all joints have before anything is fitted."""
+        return self.calibration.start if isinstance(self.stiffness, str) else self.stiffness
 
     @property
     def factor_names(self) -> tuple[str, ...]:

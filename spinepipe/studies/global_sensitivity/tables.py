@@ -62,6 +62,100 @@ DESIGN = Table(
 )
 
 
+SOURCES = ("given", "fitted", "not_free", "at_bound", "no_fit")
+"""Where a base stiffness comes from."""
+
+BASE_STIFFNESS = Table(
+    "base_stiffness",
+    "Stiffness from which the factors start: one row per specimen, joint and coordinate.",
+    ("specimen", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        Column("joint", "text", "joint, or * for all that have no row of their own"),
+        Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
+        Column("unit", "text", "unit of the numbers", allowed=("N/m", "N m/rad")),
+        Column(
+            "source",
+            "text",
+            "given: by the study file; fitted: to the measured motion; start, where there is a fit "
+            "that did not decide: not_free: not asked for, at_bound: ran to a bound, so the others "
+            "were fitted anew without it, no_fit: the fit failed",
+            allowed=SOURCES,
+        ),
+        Column("start", "number", "value before any fit", "see unit", low=0.0),
+        Column("stiffness", "number", "value from which the factors start", "see unit", low=0.0),
+        *(
+            Column(
+                name,
+                "number",
+                f"{which} end of its 95 % region, all others fitted anew",
+                "see unit",
+                "not fitted, or open: the data allow the bound",
+                low=0.0,
+            )
+            for name, which in (("low", "lower"), ("high", "upper"))
+        ),
+        *(
+            Column(name, "flag", f"whether the region reaches the {which} bound", null="not fitted")
+            for name, which in (("open_below", "lower"), ("open_above", "upper"))
+        ),
+        Column(
+            "identifiable",
+            "flag",
+            "whether the data hold it: both ends lie inside the bounds and its standard error is "
+            "small",
+            null="not fitted",
+        ),
+        status("fit"),
+        MESSAGE,
+    ),
+)
+
+VERDICTS = ("near", "far", "not_measured", "no_equilibrium")
+"""How the base moves beside what was measured."""
+
+BASE_MOTION = Table(
+    "base_motion",
+    "Motion of the base, before any factor changes it, beside what was measured: one row per "
+    "specimen, test, joint and coordinate, at the largest load. Joint * is the mean over the "
+    "joints that were measured.",
+    ("specimen", "test", "joint", "coordinate"),
+    (
+        SPECIMEN,
+        Column("test", "text", "test"),
+        Column("step", "integer", "load step", low=0),
+        Column("joint", "text", "joint, or * for the mean over the measured ones"),
+        Column("coordinate", "text", "coordinate of the joint", allowed=COORDINATES),
+        Column("unit", "text", "unit of the numbers", allowed=("mm", "deg")),
+        Column("loaded", "flag", "whether it is the coordinate that the test loads most"),
+        Column("predicted", "number", "motion of the base", "see unit", NO_EQUILIBRIUM),
+        Column("measured", "number", "motion that was measured", "see unit", "not measured"),
+        Column(
+            "noise",
+            "number",
+            "SD of the measured number by measurement_sd; 0 where the cohort states none",
+            "see unit",
+            low=0.0,
+        ),
+        Column(
+            "ratio",
+            "number",
+            "predicted over measured",
+            null="no pose, not measured, or measured within 2 noise of 0",
+        ),
+        Column(
+            "verdict",
+            "text",
+            "near: between half and twice the measured number, 2 noise more allowed on either "
+            "side; far: not",
+            allowed=VERDICTS,
+        ),
+        status("solve"),
+        MESSAGE,
+    ),
+)
+
+
 def _load(coordinate: str) -> Column:
     """Generalised load that a joint carries."""
     along = coordinate in TRANSLATIONS
@@ -172,7 +266,8 @@ INDICES = Table(
         Column(
             "noise_floor",
             "number",
-            "upper end of the interval of the same index of the factor that changes nothing",
+            "upper end of the interval of the same index over factors that change nothing; of mu "
+            "its size",
             "see index",
             "no such factor, index or interval",
         ),
@@ -186,6 +281,82 @@ INDICES = Table(
         Column("failed", "integer", "runs of the design that failed", low=0),
         Column("status", "text", "whether there is an index", allowed=INDEX_STATUS),
         MESSAGE,
+        Column(
+            "noise_floor_low",
+            "number",
+            "lower end of that interval",
+            "see index",
+            "no such factor, index or interval",
+        ),
+        Column("floor_replicates", "integer", "factors that change nothing, drawn for it", low=0),
+        Column(
+            "negligible",
+            "flag",
+            "whether the upper end of the total index' interval is below 0.01: the factor may be "
+            "fixed anywhere in its spread",
+            null="no total index, or no interval",
+        ),
+        Column(
+            "conditional",
+            "flag",
+            "whether runs failed: the index then speaks only of inputs at which the others stand",
+        ),
+    ),
+)
+
+PLACES = ("lowest_third", "highest_third", "nowhere")
+"""Where failed runs lie."""
+
+FAILED_RUNS = Table(
+    "failed_runs",
+    "Where in the space of factors runs failed: one row per specimen, test and factor.",
+    ("specimen", "test", "factor"),
+    (
+        SPECIMEN,
+        Column("test", "text", "test; * for fits of stiffness, which are to all of them"),
+        _FACTOR,
+        Column("unit", "text", "unit of the factor's values", allowed=("mm", "deg", "1")),
+        Column("runs", "integer", "runs of the design", low=0),
+        Column("failed", "integer", "runs that failed in some load step", low=0),
+        *(
+            Column(name, "integer", f"of these, runs that {how}", low=0)
+            for name, how in (
+                ("tipped", "have no stable equilibrium"),
+                ("not_converged", "did not converge"),
+                ("refused", "make no spine"),
+            )
+        ),
+        Column("left_out", "integer", "runs that no index rests on because of them", low=0),
+        *(
+            Column(f"{name}_third", "integer", f"failed runs in the {which} third", low=0)
+            for name, which in (
+                ("low", "lowest"),
+                ("middle", "middle"),
+                ("high", "highest"),
+            )
+        ),
+        *(
+            Column(
+                name, "number", f"{name} value of the factor at a failed run", "see unit", "none"
+            )
+            for name in ("lowest", "highest")
+        ),
+        Column(
+            "p",
+            "number",
+            "chance of as many failed runs in that third if failing had nothing to do with the "
+            "factor, times the number of thirds and factors looked at; of runs that stand or fall "
+            "together one counts",
+            null="no run failed",
+            low=0.0,
+            high=1.0,
+        ),
+        Column(
+            "mostly",
+            "text",
+            "third in which more than half of the failed runs lie with p below 0.05; else nowhere",
+            allowed=PLACES,
+        ),
     ),
 )
 

@@ -42,7 +42,7 @@ from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
 
 
-def run(root, study, design, specimen, batch, output):
+def run(root, study, design, base, specimen, batch, output):
     settings, cohort = study_of(root, study)
     size = settings.batch_size(1)
     values = pq.read_table(design).column("value").to_numpy().reshape(settings.n_runs, -1)
@@ -116,6 +116,11 @@ def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Project) -> N
     total = rows[rows["index"] == "ST"].set_index("factor")
     assert total.loc["dummy", "estimate"] == pytest.approx(0.0, abs=1e-12)
     assert not total.loc["dummy", "above_floor"]
+    assert total.loc["dummy", "negligible"]
+    assert not total.loc[list(NAMES), "negligible"].any()
+    assert (total["noise_floor_low"] > 0.0).all()
+    assert (total["noise_floor_low"] < total["noise_floor"]).all()
+    assert (total["noise_floor"] < 1e-9).all(), "the solver's 1e-6 deg beside a variance of 14"
     assert total.loc[list(NAMES), "above_floor"].all()
 
 

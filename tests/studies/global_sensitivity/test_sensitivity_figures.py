@@ -18,7 +18,6 @@ from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.global_sensitivity.figures.panels import (
     leading,
-    loaded,
     measures_of,
     outputs,
     pooled,
@@ -34,6 +33,7 @@ from spinepipe.studies.global_sensitivity.findings import (
     settled,
 )
 from spinepipe.studies.global_sensitivity.kind import KIND
+from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
@@ -54,7 +54,7 @@ INDEX = {
     "latin_hypercube": ("PAWN", "S1_RBD"),
     "fast": ("S1", "ST"),
 }
-FLOOR = {"PAWN": 0.1, "S1_RBD": 0.02}
+FLOOR = {"PAWN": 0.1, "S1_RBD": 0.02, **dict.fromkeys(("S1", "ST", "mu_star", "sigma"), 1e-12)}
 HALF = 0.03
 """Half width of all intervals."""
 
@@ -112,8 +112,12 @@ def indices(
                 "factor": factor,
                 "other": "",
                 "estimate": size,
+                "noise_floor_low": 0.5 * floor if "dummy" in factors else None,
                 "noise_floor": floor if "dummy" in factors else None,
+                "floor_replicates": 200 if "dummy" in factors else 0,
                 "above_floor": low > floor if "dummy" in factors else None,
+                "negligible": ends["ci_high"] < 0.01 if index == "ST" and ends else None,
+                "conditional": failed > 0,
                 "runs": 3072 - 12 * failed,
                 "failed": failed,
                 "status": "done",
@@ -273,14 +277,17 @@ def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> N
     (band,) = bands(axis)
     assert band.get_x() + band.get_width() == pytest.approx(FLOOR["PAWN"])
     dashed = [float(x_of(line)[0]) for line in axis.lines if line.get_linestyle() == "--"]
-    assert sorted(dashed) == sorted(FLOOR.values())
+    assert sorted(dashed) == sorted([FLOOR["PAWN"], FLOOR["S1_RBD"]])
+    assert band.get_x() == pytest.approx(0.5 * FLOOR["PAWN"])
     colors = [label.get_color() for label in axis.get_yticklabels()][::-1]
     assert colors[0] == "#000000"
     assert set(colors[2:]) == {"#767676"}
-    assert "noise floor of the dummy" in said(figure)
+    assert "noise floor, an interval" in said(figure)
+    assert "grey names: above the noise floor in no panel" in said(figure)
     sobol = drawn("factor_indices", cohort, indices=indices())
     assert not bands(sobol.axes[0])
-    assert "the dummy's index is exactly 0 in this design" in said(sobol)
+    assert "the noise floor is too low to be seen" in said(sobol)
+    assert "grey names: negligible in every panel" in said(sobol)
     bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1]))
     assert "no dummy, so no noise floor" in said(bare)
 

@@ -13,6 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import MOST_ACROSS, explain_marks
 from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
 from spinepipe.report.words import count, number
+from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     COLORS,
     NAME,
@@ -21,11 +22,14 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     Panel,
     above_floor,
     factor_name,
+    floor_seen,
     leading,
     measures_of,
     no_index,
+    not_negligible,
     outputs,
     pooled,
+    screened,
     sections_of,
     shown,
     title,
@@ -155,6 +159,8 @@ def _draw(axis: Axes, panel: Panel, order: Sequence[str], measures: Measures) ->
         color = COLORS[measures.shown.index(index)]
         _bars(axis, rows, order, at, 0.86 * height, color)
         _floor(axis, rows, color, index == measures.main)
+    if screened(panel.rows):
+        axis.axvline(NEGLIGIBLE, color=BLACK, lw=0.6, ls=(0, (1, 1.5)), zorder=5)
     axis.axvline(0.0, color=BLACK, lw=0.6, zorder=5)
     axis.set_ylim(-0.6, len(order) - 0.4)
     axis.spines["left"].set_visible(False)
@@ -190,12 +196,13 @@ def _bars(
 
 
 def _floor(axis: Axes, rows: pd.DataFrame, color: str, main: bool) -> None:
-    """The noise floor: a dashed line in the index's colour, and of the main one a band."""
-    floor = rows["noise_floor"].max()
-    if not np.isfinite(floor) or floor <= 0.0:
+    """The noise floor: its upper end dashed in the index's colour, of the main one its interval."""
+    if not floor_seen(rows):
         return
+    floor = rows["noise_floor"].max()
     if main:
-        axis.axvspan(0.0, floor, color=GREY, alpha=0.22, lw=0, zorder=1)
+        low = rows["noise_floor_low"].min()
+        axis.axvspan(min(max(low, 0.0), floor), floor, color=GREY, alpha=0.3, lw=0, zorder=1)
     axis.axvline(floor, color=INK[color], lw=0.8, ls=(0, (3, 2)), zorder=2)
 
 
@@ -217,11 +224,11 @@ def _axis(panel: Panel, measures: Measures) -> str:
 def _name(
     panels: Sequence[Axes], kept: Sequence[Panel], order: Sequence[str], measures: Measures
 ) -> None:
-    """Names of factors on the left; those that are above no floor are grey."""
+    """Names of factors on the left; grey are those that are negligible, or above no floor."""
     rows = pd.concat([panel.rows for panel in kept])
     main = rows[rows["index"] == measures.main]
-    above = above_floor(main)
-    known = bool(main["noise_floor"].notna().any())
+    above = not_negligible(main) if screened(main) else above_floor(main)
+    known = bool(main["noise_floor"].notna().any()) or screened(main)
     for axis in panels:
         axis.set_yticks(range(len(order)), [factor_name(name) for name in order[::-1]])
         place = axis.get_subplotspec()
@@ -254,13 +261,11 @@ def _handles(kept: Sequence[Panel], measures: Measures) -> list[Line2D | Patch]:
                 label="single joint",
             )
         )
-    if rows["noise_floor"].max() > 0.0:
+    if floor_seen(rows):
+        label = "noise floor, an interval; dashed: upper end, of each index"
+        handles.append(Patch(facecolor=GREY, alpha=0.3, lw=0, label=label))
+    if screened(rows):
         handles.append(
-            Patch(
-                facecolor=GREY,
-                alpha=0.3,
-                lw=0,
-                label="noise floor of the dummy; dashed: of each index",
-            )
+            Line2D([], [], color=BLACK, lw=0.6, ls=(0, (1, 1.5)), label="1 %: negligible below")
         )
     return handles

@@ -4,21 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.load_tests import DRIVEN
-from spinepipe.cohort.specimen import joint_frames
-from spinepipe.report.marks import Array
 from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
+from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.settings import DUMMY
 from spinepipe.studies.global_sensitivity.tables import EVERY
-from spinepipe.units import COORDINATES, MM_PER_M, TRANSLATIONS
+from spinepipe.units import COORDINATES, TRANSLATIONS
 
 
 @dataclass(frozen=True)
@@ -94,6 +91,12 @@ OUTPUT = {"motion": "motion", "joint_load": "joint load", "stiffness": "calibrat
 
 _LONGEST = 34
 
+SEEN = 0.002
+"""Part of a panel's largest index from which on a noise floor can be seen."""
+
+FAILED = "\u2020"
+"""Mark of panels whose indices lack runs that failed."""
+
 
 def measures_of(indices: pd.DataFrame) -> Measures | None:
     """The measures of a study's indices; None where none of them is known."""
@@ -137,36 +140,6 @@ def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: s
 def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
     there = [name for name in COORDINATES if name in set(rows["coordinate"])]
     return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
-
-
-def loaded(cohort: Cohort, test: str) -> tuple[str, int] | None:
-    """Coordinate and step of a test's largest moment about the most cranial joint.
-
-    None where the cohort has no such test, or nothing turns that joint.
-    """
-    if cohort.loads is None or test not in cohort.tests:
-        return None
-    rows = cohort.loads[cohort.loads["test"] == test]
-    specimen = cohort.specimen_names[0]
-    own = rows[rows["specimen"].isin([specimen, "*"])]
-    rows = own if len(own) else rows
-    rows = rows[rows["cycle"].isna() | (rows["cycle"] == rows["cycle"].min())]
-    turning = _moments(rows, joint_frames(cohort, specimen)[-1].origin)
-    by_step = pd.DataFrame(turning).groupby(rows["step"].to_numpy()).sum()
-    size = np.linalg.norm(by_step, axis=1)
-    if not size.any():
-        return None
-    peak = int(size.argmax())
-    return DRIVEN[int(np.abs(by_step.iloc[peak]).argmax())], int(by_step.index[peak])
-
-
-def _moments(loads: pd.DataFrame, about_m: Array) -> Array:
-    """(n, 3) N m, ground: each row's moment and that of its force about a point."""
-    forces, moments, points_mm = (
-        loads[[f"{letter}{axis}_{unit}" for axis in "xyz"]].fillna(0.0).to_numpy(float)
-        for letter, unit in (("f", "n"), ("m", "nm"), ("p", "mm"))
-    )
-    return moments + np.cross(points_mm / MM_PER_M - about_m, forces)
 
 
 def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
@@ -222,6 +195,26 @@ def above_floor(rows: pd.DataFrame) -> set[str]:
     return set(rows.loc[rows["above_floor"].eq(True), "factor"])
 
 
+def floor_seen(rows: pd.DataFrame) -> bool:
+    """Whether the noise floor is large enough to be drawn beside the indices."""
+    return bool(rows["noise_floor"].max() > SEEN * rows["estimate"].abs().max())
+
+
+def screened(rows: pd.DataFrame) -> bool:
+    """Whether factors were asked whether they are negligible."""
+    return bool(rows["negligible"].notna().any())
+
+
+def not_negligible(rows: pd.DataFrame) -> set[str]:
+    """Factors that matter, or may, at any place."""
+    return set(rows.loc[rows["negligible"].eq(False), "factor"])
+
+
+def failures(rows: pd.DataFrame) -> bool:
+    """Whether runs failed, so that these indices speak of the others only."""
+    return bool(rows["failed"].max() > 0)
+
+
 def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
     """Factors from the largest mean of the main index over panels down; ties as in the study.
 
@@ -238,7 +231,7 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
 
 def title(index: int, panel: Panel) -> str:
     """Letter, test and joint, and below them the output."""
-    first = where(panel.test, panel.joint)
+    first = where(panel.test, panel.joint) + f" {FAILED}" * failures(panel.rows)
     second = f"{capital(kind(panel.output, panel.coordinate))}, {AXIS[panel.coordinate].lower()}"
     return lettered(index, "\n".join(part for part in (first, second) if part))
 
@@ -309,7 +302,9 @@ def _runs(rows: pd.DataFrame) -> str:
     least, most = int(rows["runs"].min()), int(rows["runs"].max())
     runs = count(most, "run") if least == most else f"{whole(least)} to {count(most, 'run')}"
     failed = int(rows["failed"].max())
-    lost = f", at most {failed} failed" if failed else ", none failed"
+    lost = ", none failed"
+    if failed:
+        lost = f", at most {whole(failed)} failed; {FAILED}: indices of inputs at which runs stand"
     several = rows["specimen"].nunique() > 1
     return f"{runs}{' of each specimen' if several else ''}{lost}"
 
@@ -328,9 +323,9 @@ def _together(kept: Sequence[Panel]) -> str:
 def _dummy(rows: pd.DataFrame) -> str:
     if DUMMY not in set(rows["factor"]):
         return "no dummy, so no noise floor"
-    if rows["noise_floor"].fillna(0.0).max() <= 0.0:
-        return "the dummy's index is exactly 0 in this design"
-    return "grey names: above the noise floor in no panel"
+    quiet = "" if floor_seen(rows) else "the noise floor is too low to be seen; "
+    grey = "negligible in every panel" if screened(rows) else "above the noise floor in no panel"
+    return f"{quiet}grey names: {grey}"
 
 
 def _more(kept: Sequence[Panel], found: Sequence[Panel]) -> str:

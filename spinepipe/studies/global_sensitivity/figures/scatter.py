@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from matplotlib.patches import Patch
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
-from spinepipe.report.style import BLUE, GREY, blank, saying
+from spinepipe.report.style import BLUE, GREY, VERMILLION, blank, saying
 from spinepipe.report.words import capital, count, fixed, number
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.figures.panels import (
@@ -46,6 +47,7 @@ class Output:
     values : output by sample, in the unit of the tables.
     factors : its leading factors, of a group one member.
     index : rows of the main index of this output, by factor or group.
+    failed : samples without an equilibrium.
     """
 
     panel: Panel
@@ -54,6 +56,7 @@ class Output:
     values: pd.Series
     factors: tuple[str, ...]
     index: pd.DataFrame
+    failed: pd.Index
 
 
 def output_of(
@@ -70,12 +73,13 @@ def output_of(
     groups : group of each factor.
     """
     specimen = str(panel.rows["specimen"].iloc[0])
-    rows = responses[
+    every = responses[
         (responses["specimen"] == specimen)
         & (responses["test"] == panel.test)
         & (responses["step"] == panel.step)
-        & (responses["status"] == Status.CONVERGED.value)
     ]
+    stands = every["status"] == Status.CONVERGED.value
+    rows = every[stands]
     if rows.empty:
         return None
     column = column_of(panel.output, panel.coordinate, responses)
@@ -88,7 +92,8 @@ def output_of(
     ].set_index("factor")
     order = index["estimate"].drop(DUMMY, errors="ignore").sort_values(ascending=False)
     leading = _drawn(list(order.index), values, drawn, groups)
-    return Output(panel, specimen, joint, values, leading, index)
+    failed = pd.Index(every.loc[~stands, "sample"].unique())
+    return Output(panel, specimen, joint, values, leading, index, failed)
 
 
 def _drawn(
@@ -132,6 +137,10 @@ def running(x: Array, y: Array, few: int = 12) -> tuple[Array, Array]:
 
 MOST_OUTPUTS, MOST_DOTS = 3, 1000
 _PANEL_MM, _KEY_MM = 56.0, 17.0
+_CROSS: Mapping[str, Any] = {"color": VERMILLION, "marker": "x", "ms": 3.5, "mew": 0.8, "lw": 0}
+_BOTTOM = 0.02
+"""Where failed runs are marked, as a part of the panel's height."""
+
 _UNITS = {"deg": "°", "1": "times"}
 
 
@@ -156,7 +165,8 @@ def scatter_figure(
     axes = lines_of(figure, len(lines) * TOP, TOP, sharey="row")
     for number_, (line, one) in enumerate(zip(axes, lines, strict=True)):
         _line(line, one, values, units, measures, number_ * TOP)
-    explain_marks(figure, _handles(), _words(lines, cohort), 3)
+    handles = _handles(any(len(one.failed) for one in lines))
+    explain_marks(figure, handles, _words(lines, cohort), len(handles))
     return figure
 
 
@@ -182,7 +192,8 @@ def _line(
         name = one.factors[place]
         unit = units[name]
         x = np.asarray(values[name].reindex(one.values.index), dtype=np.float64)
-        _cloud(axis, x, np.asarray(one.values, dtype=np.float64), unit)
+        lost = np.asarray(values[name].reindex(one.failed), dtype=np.float64)
+        _cloud(axis, x, np.asarray(one.values, dtype=np.float64), unit, lost)
         axis.set_xlabel(f"{factor_name(name, 40)} ({_UNITS.get(unit, unit)})")
         head(axis, letter + place, _index(one, name, measures))
         axis.tick_params(axis="y", length=2.5)
@@ -192,8 +203,13 @@ def _line(
     axes[0].set_ylabel(words)
 
 
-def _cloud(axis: Axes, x: Array, y: Array, unit: str) -> None:
-    """Runs as dots, at most so many of them; the middle 90 % and the median of all."""
+def _cloud(axis: Axes, x: Array, y: Array, unit: str, lost: Array) -> None:
+    """Runs as dots, at most so many of them; the middle 90 % and the median of all.
+
+    Parameters
+    ----------
+    lost : values of the factor at runs that failed and have no output: crosses at the bottom.
+    """
     kept = np.random.default_rng(0).permutation(len(x))[:MOST_DOTS]
     axis.plot(
         x[kept], y[kept], "o", color=GREY, ms=1.6, mew=0.0, alpha=0.45, zorder=2, rasterized=True
@@ -201,9 +217,13 @@ def _cloud(axis: Axes, x: Array, y: Array, unit: str) -> None:
     at, (low, middle, high) = running(x, y)
     axis.fill_between(at, low, high, color=BLUE, alpha=0.15, lw=0, zorder=1)
     axis.plot(at, middle, color=BLUE, lw=1.6, zorder=4)
+    if len(lost):
+        bottom = np.full(len(lost), _BOTTOM)
+        axis.plot(lost, bottom, transform=axis.get_xaxis_transform(), zorder=5, **_CROSS)
     if unit == "1" and x.min() > 0.0:
         axis.set_xscale("log")
-        log_ticks(axis.xaxis, float(x.min()), float(x.max()))
+        ends = np.concatenate([x, lost])
+        log_ticks(axis.xaxis, float(ends.min()), float(ends.max()))
 
 
 def _index(one: Output, factor: str, measures: Measures) -> str:
@@ -217,11 +237,12 @@ def _index(one: Output, factor: str, measures: Measures) -> str:
     return f"{told} ({say(low)} to {say(high)})" if np.isfinite([low, high]).all() else told
 
 
-def _handles() -> list[Line2D | Patch]:
+def _handles(failed: bool) -> list[Line2D | Patch]:
     return [
         Line2D([], [], color=GREY, marker="o", ms=3.0, mew=0.0, lw=0, label="run"),
         Line2D([], [], color=BLUE, lw=1.6, label="running median"),
         Patch(facecolor=BLUE, alpha=0.15, lw=0, label="middle 90 % of the runs there"),
+        *([Line2D([], [], label="failed run, at its value", **_CROSS)] if failed else []),
     ]
 
 
@@ -232,6 +253,9 @@ def _words(lines: Sequence[Output], cohort: Cohort) -> str:
         parts.append(f"specimen {lines[0].specimen}")
     dots = f", {MOST_DOTS} of them drawn" if runs > MOST_DOTS else ""
     parts.append(f"{count(runs, 'run')} with an equilibrium{dots}")
+    lost = max(len(one.failed) for one in lines)
+    if lost:
+        parts.append(f"{count(lost, 'run')} without")
     if any(name not in one.index.index for one in lines for name in one.factors):
         parts.append("of a group the factor that the output follows most")
     return capital("; ".join(parts)) + "."

@@ -1,0 +1,128 @@
+"""How many runs failed, and where in the space of factors they lie.
+
+Indices leave out what failed and what cannot be used without it. If one end of a factor makes the
+spine tip, what is left says too little of it: so it is told where that end is.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from spinepipe.effects.contract import Array
+from spinepipe.sensitivity.global_indices.design import Design
+from spinepipe.sensitivity.global_indices.indices import kept
+from spinepipe.status import USABLE, Status
+from spinepipe.studies.global_sensitivity.tables import EVERY
+
+THIRDS = ("low", "middle", "high")
+ENDS = {"low": "lowest_third", "high": "highest_third"}
+
+SURE = 0.05
+"""Chance below which failed runs are said to lie in one third."""
+
+MOSTLY = 0.5
+
+_AS = {
+    Status.UNSTABLE.value: "tipped",
+    Status.NOT_CONVERGED.value: "not_converged",
+    Status.REFUSED.value: "refused",
+}
+"""How a run failed."""
+
+Ends = NDArray[np.object_]
+
+
+def failed_rows(
+    design: Design,
+    values: Array,
+    units: Sequence[str],
+    responses: Sequence[str],
+    calibrated: Sequence[str],
+) -> Iterator[dict[str, Any]]:
+    """Rows of ``failed_runs`` of one specimen.
+
+    Parameters
+    ----------
+    values : (n, D) of the factors, in these units.
+    responses, calibrated : blocks of the specimen's rows, in the order of the samples.
+    """
+    ended = dict(of_runs(responses))
+    if calibrated:
+        ended[EVERY] = _read(calibrated, ["status"])["status"].to_numpy(zero_copy_only=False)
+    for test, how in ended.items():
+        for row in rows_of(design, values, units, how):
+            yield {"test": test, **row}
+
+
+def of_runs(blocks: Sequence[str]) -> Mapping[str, Ends]:
+    """How each sample ended in each test: the first load step that failed, else the last."""
+    rows = _read(blocks, ["sample", "test", "status"])
+    samples, tests = rows["sample"].to_numpy(), rows["test"].to_numpy(zero_copy_only=False)
+    status = rows["status"].to_numpy(zero_copy_only=False)
+    first = tests[samples == samples[0]]
+    found = {}
+    for test in dict.fromkeys(first.tolist()):
+        each = status[tests == test].reshape(-1, int((first == test).sum()))
+        bad = ~np.isin(each, USABLE)
+        found[test] = each[np.arange(len(each)), np.where(bad.any(1), bad.argmax(1), -1)]
+    return found
+
+
+def rows_of(
+    design: Design, values: Array, units: Sequence[str], ended: Ends
+) -> Iterator[dict[str, Any]]:
+    """One row for each factor.
+
+    Parameters
+    ----------
+    values : (n, D). ended : (n,) status of each run.
+    """
+    failed = ~np.isin(ended, USABLE)
+    counts = {name: int((ended == status).sum()) for status, name in _AS.items()}
+    out = int((~kept(design, ~failed).rows).sum())
+    common = {"runs": design.n, "failed": int(failed.sum()), **counts, "left_out": out}
+    for column, factor in enumerate(design.factors):
+        own = values[failed, column]
+        ends = {"lowest": own.min(), "highest": own.max()} if len(own) else {}
+        yield {
+            "factor": factor,
+            "unit": units[column],
+            **common,
+            **dict.fromkeys(("lowest", "highest")),
+            **{name: float(end) for name, end in ends.items()},
+            **_thirds(design, column, failed),
+        }
+
+
+def _thirds(design: Design, column: int, failed: NDArray[np.bool_]) -> dict[str, Any]:
+    """Failed runs in each third of a factor's distribution, and whether most lie at one end.
+
+    Runs of a block share values: of each block with a failure its first one counts as a draw.
+    """
+    third = np.minimum((3.0 * design.unit[:, column]).astype(int), 2)
+    counts = [int((third[failed] == part).sum()) for part in range(3)]
+    row: dict[str, Any] = {f"{name}_third": n for name, n in zip(THIRDS, counts, strict=True)}
+    if not failed.any():
+        return {**row, "p": None, "mostly": "nowhere"}
+    blocks = failed.reshape(-1, design.block)
+    spoiled = np.flatnonzero(blocks.any(axis=1))
+    drawn = third[spoiled * design.block + blocks[spoiled].argmax(axis=1)]
+    looked_at = len(ENDS) * len(design.factors)
+    chances = {}
+    for place, name in enumerate(THIRDS):
+        if name in ENDS:
+            n, share = int((drawn == place).sum()), float((third == place).mean())
+            chances[name] = min(1.0, looked_at * float(binom.sf(n - 1, len(drawn), share)))
+    best = min(chances, key=lambda name: chances[name])
+    most = counts[THIRDS.index(best)] > MOSTLY * sum(counts)
+    sure = most and chances[best] < SURE
+    return {**row, "p": chances[best], "mostly": ENDS[best] if sure else "nowhere"}
+
+
+def _read(blocks: Sequence[str], columns: list[str]) -> pa.Table:
+    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])
