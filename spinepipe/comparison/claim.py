@@ -69,13 +69,49 @@ class Run:
         return float(row[column])
 
 
+class Limit(StrEnum):
+    """What it takes to lie inside a range, from the strongest to the weakest."""
+
+    TWO_SIDED = "two_sided"
+    CHOSEN = "chosen"
+    WIDE = "wide"
+    ONE_SIDED = "one_sided"
+    BINARY = "binary"
+    NONE = "none"
+
+
+WIDE_FROM = 4.0
+"""Ends that differ by this factor are wide: half to twice a value spans it."""
+
+
 @dataclass(frozen=True)
 class Range:
-    """A closed range, None for an open end, and what it is in words."""
+    """A closed range, None for an open end, and what it is in words.
+
+    An end that a value cannot pass anyway (an error below 0, a correlation above 1) is no end: it
+    is None.
+
+    Attributes
+    ----------
+    chosen : whether the width was chosen here, not taken from what the paper prints.
+    """
 
     low: float | None
     high: float | None
     what: str
+    chosen: bool = False
+
+    @property
+    def limit(self) -> Limit:
+        """What being inside says, by the ends alone and by who chose the width."""
+        if self.low is None or self.high is None:
+            return Limit.NONE if self.low is self.high else Limit.ONE_SIDED
+        if self.low == self.high:
+            return Limit.BINARY
+        near, far = sorted((abs(self.low), abs(self.high)))
+        if self.low * self.high >= 0.0 and far >= WIDE_FROM * near:
+            return Limit.WIDE
+        return Limit.CHOSEN if self.chosen else Limit.TWO_SIDED
 
     def holds(self, value: float) -> bool:
         """Whether a value lies in it, ends included."""
@@ -118,6 +154,8 @@ class Claim:
     outside : what is known of the reason, told only when ours is outside.
     note : what a reader must know in any case.
     contradicted : how the paper's own numbers exclude each other; empty where they do not.
+    also : ranges of what else the paper prints of a contradicted quantity that a run has. A value
+        of ours outside all of them disagrees with the paper whichever number is right.
     evidence : what it is called when ours is inside: `CIRCULAR` where the cohort was built to have
         the number, `RECOMPUTED` where it follows from the paper's other numbers alone.
     """
@@ -133,6 +171,7 @@ class Claim:
     note: str = ""
     contradicted: str = ""
     evidence: Verdict = Verdict.INSIDE
+    also: tuple[Range, ...] = ()
 
 
 def judged(claims: tuple[Claim, ...], run: Run) -> list[Mapping[str, Any]]:
@@ -155,6 +194,7 @@ def judge(claim: Claim, run: Run) -> dict[str, Any]:
         "ours": None if ours is None else ours.value,
         "ours_low": None if ours is None else ours.low,
         "ours_high": None if ours is None else ours.high,
+        "limit": claim.range.limit.value,
         "verdict": verdict.value,
         "reason": _reason(claim, verdict, ours, missing),
     }
@@ -169,23 +209,34 @@ def _ours(claim: Claim, run: Run) -> tuple[Ours | None, str]:
 
 
 def _verdict(claim: Claim, ours: Ours | None) -> Verdict:
-    if claim.contradicted:
+    if claim.contradicted and not _outside_all(claim, ours):
         return Verdict.CONTRADICTED
     if ours is None:
         return Verdict.NOT_COMPUTED
     return claim.evidence if claim.range.holds(ours.value) else Verdict.OUTSIDE
 
 
+def _outside_all(claim: Claim, ours: Ours | None) -> bool:
+    """Whether ours is none of several numbers that the paper prints of the same quantity."""
+    printed = (claim.range, *claim.also) if claim.also else ()
+    return ours is not None and bool(printed) and not any(r.holds(ours.value) for r in printed)
+
+
 def _reason(claim: Claim, verdict: Verdict, ours: Ours | None, missing: str) -> str:
     """What the range is, why ours is outside it or absent, and the notes."""
     told = {
-        Verdict.OUTSIDE: [_factor(claim, ours), claim.outside],
+        Verdict.OUTSIDE: [_factor(claim, ours), _either(claim), claim.outside],
         Verdict.CONTRADICTED: [f"not compared: {claim.contradicted}", missing],
         Verdict.NOT_COMPUTED: [missing],
     }.get(verdict, [])
     compared = "" if verdict is Verdict.CONTRADICTED else f"range: {claim.range.what}"
     parts = [compared, *told, claim.note, ours.note if ours else ""]
     return "; ".join(part for part in parts if part)
+
+
+def _either(claim: Claim) -> str:
+    """That the paper contradicts itself, and that ours agrees with neither number."""
+    return claim.contradicted and f"outside of all that the paper prints ({claim.contradicted})"
 
 
 def _factor(claim: Claim, ours: Ours | None) -> str:
@@ -213,19 +264,19 @@ def exactly(value: float) -> Range:
 
 
 def at_most(bound: float) -> Range:
-    """Zero to a bound that the paper states."""
-    return Range(0.0, bound, "below the paper's bound")
+    """Up to a bound that the paper states."""
+    return Range(None, bound, "below the paper's bound")
 
 
 def no_larger(value: float) -> Range:
-    """Zero to twice the error of one model, printed without any spread."""
-    return Range(0.0, 2.0 * value, "up to twice the paper's value: a smaller error agrees")
+    """Up to twice the error of one model, printed without any spread."""
+    return Range(None, 2.0 * value, "up to twice the paper's value: a smaller error agrees")
 
 
 def factor_of_two(value: float) -> Range:
     """Half to twice a value that is printed without any spread."""
     what = "half to twice the paper's value, chosen here: no uncertainty of it is printed"
-    return Range(value / 2.0, value * 2.0, what)
+    return Range(value / 2.0, value * 2.0, what, chosen=True)
 
 
 def within_width(value: float, width: float, name: str) -> Range:
@@ -235,6 +286,11 @@ def within_width(value: float, width: float, name: str) -> Range:
         "but lie no farther from the median than this width"
     )
     return Range(max(value - width, 0.0), value + width, what)
+
+
+def of_sign(value: float, what: str) -> Range:
+    """The sign of a printed number, which alone is compared."""
+    return Range(0.0, None, what) if value > 0.0 else Range(None, 0.0, what)
 
 
 def half_width(value: float, iqr: float) -> Range:

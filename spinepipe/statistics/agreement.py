@@ -11,6 +11,8 @@ from spinepipe.statistics.outcome import Array, Ended, Outcome, constant, finite
 
 FEWEST = 3
 LIMIT_SDS = 1.96
+COMPARABLE = 2.0
+"""SDs of predicted and measured values within this factor of each other are comparable."""
 TAILS = (0.025, 0.975)
 
 
@@ -25,7 +27,11 @@ class Agreement:
     lower_limit, upper_limit : limits of agreement, bias -+ 1.96 SD.
     lower_limit_low ... upper_limit_high : 95 % intervals of the limits.
     proportional : Spearman correlation of difference and mean of each pair; a bias that grows
-        with the size of the values shows here.
+        with the size of the values shows here, if ``comparable``.
+    measured_sd, predicted_sd : of the values themselves; None of fewer than two.
+    comparable : whether one of these is at most `COMPARABLE` times the other. If not, the values
+        that vary more make both the difference and the mean, which correlate whatever the bias:
+        the covariance of difference and mean is half the difference of the variances.
 
     Numbers that the values do not give are None: all but ``n`` when they are too few, the
     intervals when the difference is the same everywhere.
@@ -34,6 +40,9 @@ class Agreement:
     n: int
     proportional: Outcome
     status: Ended
+    comparable: bool
+    measured_sd: float | None
+    predicted_sd: float | None
     message: str = ""
     bias: float | None = None
     bias_low: float | None = None
@@ -58,29 +67,41 @@ def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
     first, second = finite_pairs(measured, predicted)
     proportional = spearman(0.5 * (first + second), second - first)
     difference, n = second - first, len(first)
+    sds = _sds(first, second)
     if n < FEWEST:
         message = f"{n} pairs; at least {FEWEST} are needed"
-        return Agreement(n, proportional, Ended.TOO_FEW, message)
+        return Agreement(n, proportional, Ended.TOO_FEW, *sds, message=message)
     if constant(difference):
         same = float(difference[0])
         message = "the difference is the same in all pairs"
         return Agreement(
-            *(n, proportional, Ended.CONSTANT, message),
+            *(n, proportional, Ended.CONSTANT, *sds),
+            message=message,
             bias=same,
             sd=0.0,
             lower_limit=same,
             upper_limit=same,
         )
-    return _agreement(difference, proportional)
+    return _agreement(difference, proportional, sds)
 
 
-def _agreement(difference: Array, proportional: Outcome) -> Agreement:
+def _sds(first: Array, second: Array) -> tuple[bool, float | None, float | None]:
+    """Whether the spreads of two values (n,) are comparable, then these."""
+    if len(first) < 2:
+        return False, None, None
+    one, other = float(first.std(ddof=1)), float(second.std(ddof=1))
+    return max(one, other) <= COMPARABLE * min(one, other), one, other
+
+
+def _agreement(
+    difference: Array, proportional: Outcome, sds: tuple[bool, float | None, float | None]
+) -> Agreement:
     """Bias, limits and their intervals from differences (n,) that are not all the same."""
     n, bias, sd = len(difference), float(difference.mean()), float(difference.std(ddof=1))
     mean = sd * stats.t.ppf(TAILS, n - 1) / np.sqrt(n)
     limit = sd * stats.nct.ppf(TAILS, n - 1, LIMIT_SDS * np.sqrt(n)) / np.sqrt(n)
     return Agreement(
-        *(n, proportional, Ended.DONE),
+        *(n, proportional, Ended.DONE, *sds),
         bias=bias,
         bias_low=float(bias + mean[0]),
         bias_high=float(bias + mean[1]),

@@ -67,6 +67,10 @@ FRAME_COLUMNS = (
 )
 
 
+LIMITS = ("two_sided", "chosen", "wide", "one_sided", "binary", "none")
+"""What being inside a range takes, from the most to nothing; see `spinepipe.comparison.claim`."""
+
+
 def against_paper(name: str) -> Table:
     """The table of a paper's numbers beside ours."""
     about = "The paper's numbers beside ours: one row per published quantity."
@@ -87,12 +91,22 @@ def against_paper(name: str) -> Table:
             )
         ),
         Column(
+            "limit",
+            "text",
+            "what being inside the range takes; two_sided: two ends, their distance from the paper "
+            "(a quartile, a binomial or correlation interval, a printed tolerance); chosen: two "
+            "ends, their distance chosen here; wide: ends that differ by a factor of four or more, "
+            "such as half to twice, so inside is no agreement; one_sided: one end, an order or a "
+            "sign; binary: a yes or no or a count, the same or not; none: nothing is compared",
+            allowed=LIMITS,
+        ),
+        Column(
             "verdict",
             "text",
             "inside, outside: our value and the paper's range; circular: inside, but the cohort "
             "was built to have it; recomputed: the paper's number from its other numbers; "
-            "contradicted: the paper's own numbers exclude each other; not_computed: this run "
-            "has no such value",
+            "contradicted: the paper's own numbers exclude each other, and ours is not outside "
+            "all of them; not_computed: this run has no such value",
             allowed=("inside", "outside", "circular", "recomputed", "contradicted", "not_computed"),
         ),
         Column("reason", "text", "what the range is, and why ours is outside it"),
@@ -102,7 +116,7 @@ def against_paper(name: str) -> Table:
 
 _AGAINST_ORDER = (
     *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
-    *("verdict", "reason", "where"),
+    *("limit", "verdict", "reason", "where"),
 )
 
 

@@ -236,10 +236,14 @@ def _agreement(size: Size, rng: np.random.Generator) -> Iterator[Row]:
         "upper_limit_high": 0.26,
         "proportional_rho": 0.1,
         "proportional_p": 0.5,
+        "measured_sd": 0.2,
+        "predicted_sd": 0.15,
+        "proportional": "told",
     }
     for cell in _cells(size):
         unit = "mm" if cell["coordinate"] in TRANSLATIONS else "deg"
         row = {**cell, "dataset": "reduced", "unit": unit, "n": 12, **_ended(size)}
+        row["proportional"] = "no_result"
         yield row | (numbers if size.solved else {})
 
 

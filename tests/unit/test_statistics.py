@@ -374,6 +374,29 @@ def test_a_bias_that_grows_with_size_shows() -> None:
     assert found.proportional.p == pytest.approx(2 / 120)
 
 
+def test_motion_that_hardly_varies_correlates_with_its_error_by_itself() -> None:
+    """Predicted values that know nothing of the measured ones, and have no bias at all.
+
+    With SDs m and p and no correlation, that of difference and mean is (p^2 - m^2)/(p^2 + m^2):
+    0.999 for m = 0.02 p, 0 for m = p.
+    """
+    rng = np.random.default_rng(7)
+    drawn = rng.normal(size=(2, 2000))
+    still = bland_altman(5.0 + 0.02 * drawn[0], 5.0 + drawn[1])
+    assert still.proportional.effect == pytest.approx(0.999, abs=0.002)
+    assert not still.comparable
+    assert (still.measured_sd, still.predicted_sd) == pytest.approx((0.02, 1.0), rel=0.05)
+    moved = bland_altman(5.0 + drawn[0], 5.0 + drawn[1])
+    assert moved.comparable
+    assert moved.proportional.effect == pytest.approx(0.0, abs=0.07)  # three standard errors
+
+
+@pytest.mark.parametrize(("times", "comparable"), [(1.99, True), (2.01, False), (0.49, False)])
+def test_spreads_are_comparable_within_a_factor_of_two(times: float, comparable: bool) -> None:
+    values = np.array([1.0, 2.0, 4.0, 7.0])
+    assert bland_altman(values, times * values).comparable == comparable
+
+
 def test_agreement_of_one_and_the_same_difference_has_no_intervals() -> None:
     found = bland_altman([1.0, 2.0, 3.0, 4.0], [1.5, 2.5, 3.5, 4.5])
     assert (found.status, found.bias, found.sd) == (Ended.CONSTANT, 0.5, 0.0)

@@ -288,20 +288,42 @@ def _cell(value: Any, column: Column) -> Cell:
 
 
 def judged(rows: pd.DataFrame) -> str:
-    """The same of any table of published quantities with verdicts."""
+    """How published quantities were judged, and what being inside a range took."""
     if rows.empty:
         return ""
     found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
     inside, outside = found.get("inside", 0), found.get("outside", 0)
-    others = (
-        ("circular", "are what the cohort was built to have"),
-        ("recomputed", "only follow from the paper's own numbers"),
-        ("contradicted", "are contradicted by other numbers of the paper and not chased"),
-        ("not_computed", "are not computed"),
-    )
-    told = [f"{found[name]} {words}" for name, words in others if name in found]
+    told = [f"{found[name]} {words}" for name, words in _NOT_COMPARED if name in found]
     words = (
         f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
         f"outside for {outside}"
     )
-    return "; ".join(part for part in (words, ", ".join(told)) if part) + "."
+    whole = "; ".join(part for part in (words, ", ".join(told)) if part)
+    return f"{whole}.{_what_it_took(rows[rows['verdict'] == 'inside'])}"
+
+
+_NOT_COMPARED = (
+    ("circular", "are what the cohort was built to have"),
+    ("recomputed", "only follow from the paper's own numbers"),
+    ("contradicted", "are contradicted by other numbers of the paper and not chased"),
+    ("not_computed", "are not computed"),
+)
+
+_WORDS_OF_LIMITS = {
+    "two_sided": "lie in a range with two ends whose width the paper gives",
+    "chosen": "in one whose width was chosen here",
+    "wide": "in one so wide (half to twice, or more) that inside is no agreement",
+    "one_sided": "are on the right side of a single limit or of zero",
+    "binary": "are the same yes, no or count",
+}
+
+
+def _what_it_took(inside: pd.DataFrame) -> str:
+    """How many of those inside lie in ranges of each kind; nothing where none is inside."""
+    if inside.empty:
+        return ""
+    counts = {name: int((inside["limit"] == name).sum()) for name in _WORDS_OF_LIMITS}
+    strongest, *weaker = _WORDS_OF_LIMITS
+    told = [f"{counts[strongest]} {_WORDS_OF_LIMITS[strongest]}"]
+    told += [f"{counts[name]} {_WORDS_OF_LIMITS[name]}" for name in weaker if counts[name]]
+    return f" Of the {len(inside)} inside, {', '.join(told)}."

@@ -39,13 +39,20 @@ class Claim:
         interval: tuple[float, float] | None = None,
         p: float | None = None,
         specimens: int | None = None,
+        p_no: float | None = None,
     ) -> Row:
-        """The row of a claim that was looked at; ``specimens`` : that decide, None for all."""
+        """The row of a claim that was looked at.
+
+        Parameters
+        ----------
+        specimens : that decide, None for all. p_no : of the test that the effect is as large as
+            what is still called none.
+        """
         low, high = interval or (None, None)
         named = {"finding": self.finding, "statement": self.statement}
         named |= {"quantity": self.quantity, "unit": self.unit}
-        found = {"value": value, "low": low, "high": high, "p": p, "specimens": specimens}
-        return {**named, **found, "holds": holds, "message": message}
+        found = {"value": value, "low": low, "high": high, "p": p, "p_no": p_no}
+        return {**named, **found, "specimens": specimens, "holds": holds, "message": message}
 
     def unknown(self, message: str) -> Row:
         """The row of a claim about which there are no numbers."""

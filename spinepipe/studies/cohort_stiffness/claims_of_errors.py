@@ -379,10 +379,11 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
             )
             family = statistics["family"] == f"between_{what}/{representation}/fitted"
             tests = statistics[family & (statistics["test"] == "Friedman")]
-            yield _errors_differ(claim, tests[tests["response"] == "loaded_error"], significance)
+            tests = tests[tests["response"] == "loaded_error"]
+            yield _errors_differ(claim, what, tests, significance)
 
 
-def _errors_differ(claim: Claim, tests: pd.DataFrame, significance: float) -> Row:
+def _errors_differ(claim: Claim, what: str, tests: pd.DataFrame, significance: float) -> Row:
     """Yes where a test is significant, else undecided: a small cohort cannot tell no difference."""
     known = tests.dropna(subset="p_holm")
     if tests.empty:
@@ -393,4 +394,17 @@ def _errors_differ(claim: Claim, tests: pd.DataFrame, significance: float) -> Ro
     below = known.loc[known["p_holm"] < significance, "stratum"]
     message = f"by itself under: {listed(list(below))}; {len(known)} load cases; no interval"
     value = float(known["effect"].max())
-    return claim.row("yes" if p < significance else "undecided", message, value, None, p)
+    holds = "yes" if p < significance else "undecided"
+    return claim.row(holds, message, value, None, p, _specimens_of(what, known))
+
+
+def _specimens_of(what: str, tests: pd.DataFrame) -> int | None:
+    """Specimens in the test of least p: its blocks, or what it compares.
+
+    Friedman's statistic is W n (k - 1) for n blocks of k, which gives k but where W is 0.
+    """
+    least = tests.sort_values("p_holm", kind="stable").iloc[0]
+    blocks, w = int(least["n"]), float(least["effect"])
+    if what == "levels":
+        return blocks
+    return None if w == 0.0 else 1 + round(float(least["statistic"]) / (w * blocks))

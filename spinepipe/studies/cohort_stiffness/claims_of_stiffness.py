@@ -7,6 +7,7 @@ import pandas as pd
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
+from spinepipe.effects.contract import Array
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status
@@ -21,7 +22,7 @@ LITTLE_DEG = 0.05
 """Adjusted share of the squared error below which what is not significant is called absent."""
 
 MARGIN = 1.1
-"""A ratio whose whole interval lies within this factor of 1 is called no difference."""
+"""A ratio that is surely within this factor of 1 is called no difference."""
 
 SHARE = (
     "share of specimens with a significant F test (Holm) of separate against joint fits, exact "
@@ -43,6 +44,8 @@ SPECIFIC = {
     ),
 }
 
+NO_BY_SIZE = "no by the size of this share alone: no test of its absence, so none corrected"
+
 MISFIT = "also misfit of a uniform stiffness, which differs between load cases, counts here"
 
 STIFFER = Claim(
@@ -55,7 +58,7 @@ STIFFER = Claim(
 )
 
 LITTLE = 0.1
-"""A share whose whole interval lies below this is called no difference."""
+"""A share that is surely below this is called no difference."""
 
 
 def load_case_findings(
@@ -92,8 +95,9 @@ def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str =
         f"{100 * explained:.2g} % of the squares, adjusted for their unknowns"
     )
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
+    untested = NO_BY_SIZE if holds == "no" else ""
     interval = float(ends.low), float(ends.high)
-    return claim.row(holds, joined(found, lost, note), below / n, interval, p, n)
+    return claim.row(holds, joined(found, untested, lost, note), below / n, interval, p, n)
 
 
 def adjusted_share(tests: pd.DataFrame) -> float:
@@ -134,22 +138,34 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
 
 
 def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
-    """Yes where the mean differs from 1, no where all of the interval is near 1."""
+    """Yes where the mean differs from 1, no where it is surely near 1."""
     if ratios.empty:
         return STIFFER.unknown("no joint has both stiffnesses, constrained by the data")
-    mean = mean_of(mean_excess(ratios).to_numpy(float))
+    excess = mean_excess(ratios).to_numpy(float)
+    mean = mean_of(excess)
     assert mean.value is not None
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
     many = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
     ends = mean.interval
+    p_no = None if ends is None else _within(1.0 + excess, 1.0 / MARGIN, MARGIN)
     holds = "undecided"
     if mean.p is not None and mean.p < significance:
         holds = "yes"
-    elif ends is not None and 1.0 + ends[0] > 1.0 / MARGIN and 1.0 + ends[1] < MARGIN:
+    elif p_no is not None and p_no < significance:
         holds = "no"
     interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
     value = 1.0 + mean.value
-    return STIFFER.row(holds, joined(told(mean), many), value, interval, mean.p, mean.n)
+    return STIFFER.row(holds, joined(told(mean), many), value, interval, mean.p, mean.n, p_no)
+
+
+def _within(values: Array, low: float, high: float) -> float:
+    """p that the mean of values (n,) is not between two ends: the larger of two t tests, doubled.
+
+    Doubled, it is below 0.05 where the 95 % interval of the mean lies between them.
+    """
+    above = float(stats.ttest_1samp(values, low, alternative="greater").pvalue)
+    below = float(stats.ttest_1samp(values, high, alternative="less").pvalue)
+    return min(1.0, 2.0 * max(above, below))
 
 
 def mean_excess(ratios: pd.DataFrame) -> pd.Series:
@@ -210,7 +226,7 @@ def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, wh
 def share_between(
     claim: Claim, rows: pd.DataFrame, factor: str, block: str, significance: float, note: str
 ) -> Row:
-    """Yes where the F test is significant, no where the whole interval of the share is small.
+    """Yes where the F test is significant, no where the share is surely small.
 
     The share is ICC(C,1) of McGraw and Wong 1996, doi:10.1037/1082-989X.1.1.30, Table 7.
     """
@@ -225,9 +241,12 @@ def share_between(
     times = values.shape[1] if block == "joint" else values.shape[0]
     low = _share(f / float(stats.f.isf(0.025, between, within)), times)
     high = _share(f * float(stats.f.isf(0.025, within, between)), times)
-    holds = "yes" if p < significance else "no" if high < LITTLE else "undecided"
+    # Twice the chance of so small an F where the share is LITTLE: below 0.05 if high < LITTLE.
+    of_little = f / (1.0 + times * LITTLE / (1.0 - LITTLE))
+    p_no = min(1.0, 2.0 * float(stats.f.cdf(of_little, between, within)))
+    holds = "yes" if p < significance else "no" if p_no < significance else "undecided"
     message = joined(f"F({between:.0f}, {within:.0f}) {f:.3g}", note)
-    return claim.row(holds, message, _share(f, times), (low, high), p, len(values))
+    return claim.row(holds, message, _share(f, times), (low, high), p, len(values), p_no)
 
 
 def log_grid(rows: pd.DataFrame) -> pd.DataFrame:

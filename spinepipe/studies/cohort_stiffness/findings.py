@@ -1,21 +1,30 @@
-"""Job: what the study says to the findings of Gould et al. 2024b, each with its number."""
+"""Job: what the study says to the findings of Gould et al. 2024b, each with its number.
 
-from collections.abc import Iterator, Mapping
+Each claim is decided by its own test first. Of some thirty that are looked at together one or two
+would be decided by chance alone, so p is corrected for their number (Holm 1979), of a no as of a
+yes. And few specimens decide nothing.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.cohort_stiffness.claims import Row
+from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, DECIDED, UNDECIDED, Row
 from spinepipe.studies.cohort_stiffness.claims_of_errors import error_findings, error_spreads
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     load_case_findings,
     stiffness_spreads,
 )
-from spinepipe.studies.cohort_stiffness.claims_together import together
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS
 from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables.shared import joined
+
+FEWEST = 3
+"""Specimens that a verdict needs; the scatter of two is that of one difference."""
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
@@ -42,3 +51,63 @@ def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Ite
         *error_spreads(statistics, significance),
     )
     yield from together(by_themselves, stiffness["specimen"].nunique(), significance)
+
+
+def together(rows: Sequence[Row], specimens: int, significance: float) -> Iterator[Row]:
+    """The rows with ``p_holm``, and undecided where few specimens or all claims together say so.
+
+    Parameters
+    ----------
+    specimens : in the study. significance : p below which a test decides.
+    """
+    for row, p_holm in zip(rows, _corrected(rows), strict=True):
+        row = row | {"p_holm": p_holm}
+        why = _why_not(row, specimens, significance)
+        doubted = {"holds": UNDECIDED, "message": joined(why, row["message"])}
+        yield row | doubted if why and row["holds"] in DECIDED else row
+
+
+def _corrected(rows: Sequence[Row]) -> list[float | None]:
+    """The deciding p of each row, corrected for all claims.
+
+    A claim may have two tests: of no effect, and of one that matters. At most one of these is
+    true, so that p is multiplied by the number of claims of which one may still be, none below
+    its predecessor (Holm 1979, with Shaffer 1986, doi 10.1080/01621459.1986.10478341). A claim of
+    two tests stays among them when one is settled. With one test each it is Holm's method.
+    """
+    tests = [
+        (row[name], place, name)
+        for place, row in enumerate(rows)
+        for name in _TESTS
+        if row[name] is not None and not row.get(BY_CONSTRUCTION)
+    ]
+    open_tests = Counter(place for _, place, _ in tests)
+    reached, found = 0.0, {}
+    for p, place, name in sorted(tests):
+        reached = max(reached, min(1.0, len(open_tests) * p))
+        found[place, name] = reached
+        open_tests[place] -= 1
+        open_tests += Counter()  # drops what has none left
+    return [found.get((place, _deciding(row))) for place, row in enumerate(rows)]
+
+
+_TESTS = ("p", "p_no")
+
+
+def _deciding(row: Row) -> str:
+    """Which test of a row decides: that of its verdict, else the one of smaller p."""
+    p, p_no = (row[name] for name in _TESTS)
+    if p_no is None or row["holds"] == "yes":
+        return "p"
+    return "p_no" if row["holds"] == "no" or p is None or p_no < p else "p"
+
+
+def _why_not(row: Row, specimens: int, significance: float) -> str:
+    """Why a claim cannot be decided, whatever its own test says."""
+    n = specimens if row["specimens"] is None else row["specimens"]
+    if n < FEWEST:
+        return f"{n} specimen{'' if n == 1 else 's'}, and a verdict needs {FEWEST}"
+    p, p_holm = row[_deciding(row)], row["p_holm"]
+    if p is not None and p_holm is not None and p < significance <= p_holm:
+        return "decided by itself, but not beside the other claims"
+    return ""

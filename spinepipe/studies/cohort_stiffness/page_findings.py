@@ -165,6 +165,12 @@ def _some(places: list[str]) -> str:
     return "; ".join(places[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
 
 
+CHOSEN_AFTER = (
+    " The first was chosen after looking, by these errors: p are too small, and one that tells "
+    "another from it proves little."
+)
+
+
 def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
     """The order of representations by each criterion."""
     rows = results.table("ranking")
@@ -174,7 +180,8 @@ def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
         ranked = rows[(rows["criterion"] == criterion) & rows["rank"].notna()].sort_values("rank")
         if (~ranked["representation"].isin(PUBLISHED)).any():
             told = [_place(row, study.significance) for row in ranked.to_dict("records")]
-            yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}."
+            after = CHOSEN_AFTER if ranked["p"].notna().any() else ""
+            yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}.{after}"
     best = [
         f"{words} prefers {_best(part)}"
         for name, words in (("aicc", "Akaike's criterion"), ("bic", "Schwarz's criterion"))
@@ -229,9 +236,10 @@ def _claim(row: dict[Any, Any]) -> str:
     if not (pd.isna(row["low"]) or pd.isna(row["high"])):
         numbers.append(f"95 % interval {number(row['low'])} to {number(row['high'])}")
     if not pd.isna(row["p"]):
-        beside = row["p_holm"]
+        beside, little = row["p_holm"], row["p_no"]
+        absent = "" if pd.isna(little) else f", {number(little, 2)} that it matters"
         told = "" if pd.isna(beside) else f", {number(beside, 2)} beside the other claims"
-        numbers.append(f"p {number(row['p'], 2)}{told}")
+        numbers.append(f"p {number(row['p'], 2)}{absent}{told}")
     return f"{words} ({', '.join(numbers)})"
 
 

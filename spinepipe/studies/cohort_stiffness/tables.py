@@ -374,7 +374,9 @@ RANKING = Table(
         Column(
             "p",
             "number",
-            "Wilcoxon's signed rank test of the specimens' values against the best's, uncorrected",
+            "Wilcoxon's signed rank test of the specimens' values against the best's. The best was "
+            "chosen after looking, by these very values, and nothing is corrected for that: p is "
+            "too small, and a small one is no proof that the best is better",
             null="the best itself, an information criterion, no result, or too few specimens",
             low=0.0,
             high=1.0,
@@ -405,15 +407,25 @@ FINDINGS = Table(
         Column(
             "p",
             "number",
-            "p value of its own test",
+            "p value of its own test, of no effect",
             null="there is none",
+            low=0.0,
+            high=1.0,
+        ),
+        Column(
+            "p_no",
+            "number",
+            "p value that the effect matters, against one too little to matter (a share below "
+            "0.1, a ratio within 1.1 of 1): below 0.05 where the whole 95 % interval is so little",
+            null="there is no such test",
             low=0.0,
             high=1.0,
         ),
         Column(
             "p_holm",
             "number",
-            "p corrected for all findings of the study that have one (Holm); it decides",
+            "p, or p_no of a no by it and where it is the smaller one of an undecided claim, "
+            "corrected for all findings of the study that have one (Holm, Shaffer); it decides",
             null="there is none",
             low=0.0,
             high=1.0,
@@ -429,9 +441,10 @@ FINDINGS = Table(
             "holds",
             "text",
             "yes: p_holm below the study's significance, on the claimed side; no: as sure, on the "
-            "other side, or by itself too little to matter; undecided: this cohort cannot tell, as "
-            "with fewer than 3 specimens; circular: true by construction, fitted to the readings "
-            "it is judged by; not_asked: the study leaves it out",
+            "other side, or surely too little to matter (of load cases by size alone, see "
+            "message); undecided: this cohort cannot tell, as with fewer than 3 "
+            "specimens; circular: true by construction, fitted to the readings it is judged by, or "
+            "put into a made-up cohort; not_asked: the study leaves it out",
             allowed=HOLDS,
         ),
         MESSAGE,

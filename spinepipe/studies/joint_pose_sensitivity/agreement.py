@@ -8,14 +8,19 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.statistics import Agreement, bland_altman
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
+from spinepipe.studies.joint_pose_sensitivity.tables import (
+    AGREEMENT,
+    NOT_MEANINGFUL,
+    NOTHING_TO_TELL,
+    TOLD,
+)
 from spinepipe.studies.joint_pose_sensitivity.variables import readings
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATE_UNITS
 
 _NUMBERS = (
     *("n", "bias", "bias_low", "bias_high", "sd", "lower_limit", "upper_limit"),
-    *("lower_limit_low", "upper_limit_high", "message"),
+    *("lower_limit_low", "upper_limit_high", "measured_sd", "predicted_sd", "message"),
 )
 
 
@@ -48,9 +53,13 @@ def _coordinates(part: pd.DataFrame) -> Iterator[dict[str, Any]]:
 
 
 def _row(found: Agreement) -> dict[str, Any]:
+    """Numbers of a row; the correlation only where it says something of a bias."""
+    rho, p = found.proportional.effect, found.proportional.p
+    told = NOTHING_TO_TELL if rho is None else TOLD if found.comparable else NOT_MEANINGFUL
     return {
         **{name: getattr(found, name) for name in _NUMBERS},
-        "proportional_rho": found.proportional.effect,
-        "proportional_p": found.proportional.p,
+        "proportional_rho": rho if told == TOLD else None,
+        "proportional_p": p if told == TOLD else None,
+        "proportional": told,
         "status": found.status.value,
     }

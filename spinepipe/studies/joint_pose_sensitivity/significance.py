@@ -25,6 +25,7 @@ from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
     measured_coordinates,
+    measured_size,
     pose_factors,
     pose_parameters,
     readings,
@@ -40,7 +41,8 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
     """Write ``statistics.parquet``."""
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
-    errors = absolute_error(readings(frames["simulations"], cohort.zeroed_at_step_0))
+    seen = readings(frames["simulations"], cohort.zeroed_at_step_0)
+    errors, motion = absolute_error(seen), measured_size(seen[seen["stiffness"] == "calibrated"])
     ranked_sets = ranking(best)
     rows: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
@@ -48,24 +50,30 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
         kept = judged.loc[judged["reduced"] & (judged["specimen"] == specimen), "pose"].to_numpy()
         own = {
             name: table[(table["specimen"] == specimen) & table["pose"].isin(kept)]
-            for name, table in (("errors", errors), ("poses", frames["poses"]))
+            for name, table in (("errors", errors), ("motion", motion), ("poses", frames["poses"]))
         }
         fits = frames["calibrations"]
         fits = fits[(fits["specimen"] == specimen) & fits["pose"].isin(kept)]
-        data = Specimen(settings, kept, own["poses"], fits, own["errors"], ranked_sets[specimen])
+        data = Specimen(settings, kept, **own, fits=fits, ranking=ranked_sets[specimen])
         rows += [{**row, "specimen": specimen} for row in corrected_rows(data.tests())]
     write(from_rows(STATISTICS, rows), output, provenance("statistics", settings, cohort))
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """What is tested of one specimen, its reduced poses only."""
+    """What is tested of one specimen, its reduced poses only.
+
+    Attributes
+    ----------
+    motion : mean size of the measured motion in the frames of each pose, as `measured_size`.
+    """
 
     settings: JointPoseSensitivity
     kept: Indices
     poses: pd.DataFrame
     fits: pd.DataFrame
     errors: pd.DataFrame
+    motion: pd.DataFrame
     ranking: Sequence[dict[str, Any]]
 
     def tests(self) -> Iterator[Tested]:
@@ -118,6 +126,16 @@ class Specimen:
         for factor in factors:
             values = factors[factor].to_numpy(float)
             yield from self._errors_against("error against pose", "*", str(factor), values)
+        for joint, coordinate in measured_coordinates(self.errors):
+            yield self._error_against_motion(joint, coordinate)
+
+    def _error_against_motion(self, joint: str, coordinate: str) -> Tested:
+        """Is the error larger where the same motion, seen in other frames, is larger?"""
+        moved = self.motion[self.motion["joint"] == joint].set_index("pose").loc[self.kept]
+        pair = pd.concat([moved[coordinate], self._own_errors(joint)[coordinate]], axis=1).dropna()
+        found = spearman(*pair.to_numpy(float).T)
+        response, factor = f"{coordinate}_error", f"{coordinate}_measured"
+        return Tested("error against motion", joint, response, factor, "", found)
 
     def _errors_against(
         self, family: str, joint: str, factor: str, values: Array

@@ -199,6 +199,9 @@ SIMULATIONS = Table(
 
 _LIMITS = "mm or deg, see unit"
 
+TOLD, NOT_MEANINGFUL, NOTHING_TO_TELL = "told", "not_meaningful", "no_result"
+"""What may be said of a correlation of difference and mean."""
+
 
 def _agreement(name: str, meaning: str) -> Column:
     return Column(name, "number", meaning, _LIMITS, null=NO_RESULT)
@@ -229,11 +232,21 @@ AGREEMENT = Table(
             "proportional_rho",
             "number",
             "Spearman's correlation of difference and mean: bias that grows with motion",
-            null=NO_RESULT,
+            null="see proportional",
             low=-1.0,
             high=1.0,
         ),
         p_value("proportional_p", "its p-value, uncorrected"),
+        _agreement("measured_sd", "standard deviation of the measured values"),
+        _agreement("predicted_sd", "standard deviation of the predicted values"),
+        Column(
+            "proportional",
+            "text",
+            "told: proportional_rho tells of a bias; not_meaningful: it is left out, because one "
+            "of measured_sd and predicted_sd is more than twice the other: values that hardly vary "
+            "beside ones that do correlate with their difference whatever the bias; no_result",
+            allowed=(TOLD, NOT_MEANINGFUL, NOTHING_TO_TELL),
+        ),
         ENDED,
         MESSAGE,
     ),

@@ -10,6 +10,7 @@ from spinepipe.studies.cohort_stiffness.claims import above_zero
 from spinepipe.studies.cohort_stiffness.claims_of_errors import (
     OWN_READINGS,
     error_findings,
+    error_spreads,
     every_level,
     overprediction_percent,
 )
@@ -22,6 +23,7 @@ from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     specific,
     stiffness_spreads,
 )
+from spinepipe.studies.cohort_stiffness.findings import together
 from spinepipe.studies.cohort_stiffness.significance import nested_fits
 from spinepipe.studies.cohort_stiffness.stages import without_result
 
@@ -57,6 +59,53 @@ def test_the_share_between_specimens_is_the_intraclass_correlation() -> None:
     # Between judges 97.49 / 3 = 32.49: F 31.87 over six targets, (F - 1) / (F + 5).
     levels = share_between(CLAIM, pd.DataFrame(rated()), "joint", "specimen", 0.05, "")
     assert levels["value"] == pytest.approx(30.87 / 36.87, abs=0.002)
+
+
+@pytest.mark.parametrize("spread", [0.02, 0.05, 0.1, 0.3])
+def test_a_share_is_surely_little_where_its_whole_interval_is(spread: float) -> None:
+    """Below 0.1: the p that it matters says the same as the upper end of the 95 % interval."""
+    rng = np.random.default_rng(3)
+    noise = rng.normal(size=(40, 30))
+    rows = [
+        stiff(f"s{place:02d}", f"j{level:02d}", spread * place / 40 + noise[place, level])
+        for place in range(40)
+        for level in range(30)
+    ]
+    row = share_between(CLAIM, pd.DataFrame(rows), "specimen", "joint", 1e-9, "")
+    assert row["p_no"] is not None
+    assert (row["p_no"] < 0.05) == (row["high"] < 0.1)
+    assert (row["p_no"] < 1e-9) == (row["holds"] == "no")
+
+
+@pytest.mark.parametrize(
+    ("what", "blocks", "groups", "specimens"), [("levels", 2, 5, 2), ("specimens", 5, 4, 4)]
+)
+def test_specimens_of_a_friedman_test_are_its_own(
+    what: str, blocks: int, groups: int, specimens: int
+) -> None:
+    """Of six specimens two have a complete block of levels, or four are compared."""
+    w = 0.6  # Kendall's W is the statistic over blocks (groups - 1)
+    rows = pd.DataFrame(
+        [
+            {
+                "family": f"between_{what}/per_specimen/fitted",
+                "test": "Friedman",
+                "response": "loaded_error",
+                "stratum": "flexion",
+                "n": blocks,
+                "statistic": w * blocks * (groups - 1),
+                "effect": w,
+                "p_holm": 1e-6,
+                "message": "",
+            }
+        ]
+    )
+    found = {row["finding"]: row for row in error_spreads(rows, 0.05)}
+    row = found[f"errors_differ_between_{what}"]
+    assert (row["specimens"], row["holds"]) == (specimens, "yes")
+    (beside,) = together([row], 6, 0.05)
+    assert beside["holds"] == ("undecided" if specimens < 3 else "yes")
+    assert ("2 specimens, and a verdict needs 3" in beside["message"]) == (specimens < 3)
 
 
 def test_spreads_need_a_grid_with_something_left() -> None:

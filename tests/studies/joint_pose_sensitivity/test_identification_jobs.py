@@ -536,6 +536,43 @@ def test_agreement_is_predicted_less_measured(tmp_path: Path) -> None:
     assert "anterior" not in rows.index.get_level_values("coordinate")
 
 
+@pytest.mark.parametrize(("scale", "told"), [(1.0, "told"), (0.01, "not_meaningful")])
+def test_no_correlation_is_told_of_motion_that_hardly_varies(
+    tmp_path: Path, scale: float, told: str
+) -> None:
+    """Measured motion varies like the predicted one, or a hundredth of it."""
+
+    def change(runs: pd.DataFrame) -> pd.DataFrame:
+        pose = runs["pose"].astype(float)
+        return runs.assign(
+            predicted_extension_deg=-5.0 + np.sin(1.7 * pose),
+            measured_extension_deg=-5.0 + scale * np.cos(pose),
+        )
+
+    run = Run(tmp_path, Size(specimens=("a",), poses=14), simulations=change)
+    rows = run.table("agreement").query("coordinate == 'extension' and dataset == 'all'")
+    assert set(rows["proportional"]) == {told}
+    assert rows["proportional_rho"].notna().all() == (told == "told")
+    assert rows["proportional_p"].notna().all() == (told == "told")
+    assert (rows["predicted_sd"] > 50.0 * rows["measured_sd"]).all() == (told != "told")
+
+
+def test_errors_are_held_against_the_motion_that_each_pose_sees(tmp_path: Path) -> None:
+    """Errors that grow with the measured motion: rank correlation 1 by every pose's own fit."""
+
+    def change(runs: pd.DataFrame) -> pd.DataFrame:
+        runs = runs[runs["step"] == 1]
+        pose = runs["pose"].astype(float)
+        return runs.assign(measured_extension_deg=-3.0 - 0.1 * pose, error_extension_deg=-pose)
+
+    run = Run(tmp_path, Size(specimens=("a",), poses=14), simulations=change)
+    rows = run.table("statistics").query("family == 'error against motion'")
+    own = rows[rows["response"] == "extension_error"]
+    assert set(own["factor"]) == {"extension_measured"}
+    assert own["effect"].tolist() == pytest.approx([1.0] * len(own))
+    assert len(own) == len(set(own["joint"])) > 0
+
+
 def bootstrap_rows(sizes: dict[int, float | None]) -> list[dict]:
     """Fits of a start bootstrap of two joints that ended at that many times their start."""
     rows = []

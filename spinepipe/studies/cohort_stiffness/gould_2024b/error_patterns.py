@@ -182,7 +182,7 @@ def _extremes() -> Iterator[Claim]:
     yield _extreme("per_specimen", "largest", above, Range(above, None, "above the paper's bound"))
     for model in MODELS:
         below = float(printed[f"{model}_below_deg"])
-        yield _extreme(model, "smallest", below, Range(0.0, below, "below the paper's bound"))
+        yield _extreme(model, "smallest", below, Range(None, below, "below the paper's bound"))
 
 
 def _extreme(model: str, which: str, bound: float, allowed: Range) -> Claim:

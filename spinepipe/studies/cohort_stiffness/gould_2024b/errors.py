@@ -179,7 +179,7 @@ def _ratio(
         quantity,
         "ratio",
         paper,
-        Range(0.0, 1.0, "the paper's order: below 1"),
+        Range(None, 1.0, "the paper's order: below 1"),
         ours,
         PHANTOM,
         note,

@@ -226,4 +226,4 @@ def mean_of_levels(test: str, joints: tuple[str, ...]) -> float:
 def near(value: float, of: str) -> Range:
     """A closed form with the reach of what it leaves out."""
     what = f"{of}, with {100.0 * _REACH:g} % either way, chosen here, for tilt and coupled moments"
-    return Range(value * (1.0 - _REACH), value * (1.0 + _REACH), what)
+    return Range(value * (1.0 - _REACH), value * (1.0 + _REACH), what, chosen=True)

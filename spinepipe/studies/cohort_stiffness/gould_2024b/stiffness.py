@@ -321,7 +321,7 @@ def _stiffer() -> Claim:
         "per_specimen",
         "%",
         None,
-        Range(50.0, 100.0, "most: more than half"),
+        Range(50.0, None, "most: more than half"),
         ours,
         PHANTOM,
         "in the loaded coordinate",

@@ -133,6 +133,7 @@ def _contradicted() -> Iterator[Claim]:
         exactly(1.0),
         _significant_between("flexion", "per_specimen", "specimen", STAGES[0]),
         "",
+        also=(exactly(0.0),),
         contradicted="B14: the text has this stage alone as significant, Table 5 has only the "
         f"left-out specimen ({_printed_between('flexion', MODELS[0], 'specimen', STAGES[2])})",
     )
@@ -145,6 +146,7 @@ def _contradicted() -> Iterator[Claim]:
         exactly(0.0),
         _significant_between("flexion", "per_specimen", "level", STAGES[2]),
         "",
+        also=(exactly(1.0),),
         contradicted="B15: the text has the fitted stage alone as significant, Table 5 this "
         f"one too ({_printed_between('flexion', MODELS[0], 'level', STAGES[2])})",
     )
@@ -229,7 +231,7 @@ def _smallest_p() -> Claim:
         f"smallest p that {pairs} pairs can have, times {family}",
         "p",
         None,
-        Range(0.0, bound, "below the smallest p that Table 6 prints"),
+        Range(None, bound, "below the smallest p that Table 6 prints"),
         ours,
         f"B20: {family} x 2 / 2^{pairs}",
     )

@@ -41,6 +41,9 @@ METHODS = {
     "forward_run_raw_units": "forward runs, default step, on stiffness in N/m and N m/rad",
 }
 
+FEWEST_OF_A_RATE = 10
+"""As many as the paper's smallest part has, its sets of damping; of fewer no rate is told."""
+
 FORCE_N = float(PAPER["load"]["largest_compression_n"])
 
 BEST_STIFFNESS = PAPER["best_model"]["stiffness"]
@@ -219,4 +222,10 @@ def _by_method(method: str) -> Callable[[Run], Ours]:
 def _percent(count: int, of: int) -> Ours:
     if of == 0:
         raise NotComputed("this run tried no such fit")
+    if of < FEWEST_OF_A_RATE:
+        low, high = wilson_percent(count, of)
+        raise NotComputed(
+            f"too few for a rate: {count} of {of} fits, 95 % interval {low:.0f} to {high:.0f} %; "
+            f"at least {FEWEST_OF_A_RATE} are needed"
+        )
     return Ours(100.0 * count / of, *wilson_percent(count, of), f"ours: {count} of {of}")

@@ -14,6 +14,7 @@ from spinepipe.comparison.claim import (
     Run,
     exactly,
     kendall_p,
+    of_sign,
     spearman_p,
     tested,
 )
@@ -24,9 +25,10 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     PAPER,
     REDUCED,
 )
+from spinepipe.tables.shared import joined
 from spinepipe.units import ROTATIONS
 
-_HALF = Range(0.5, 1.0, "the paper's tree finds the joint pose more influential: above one half")
+_HALF = Range(0.5, None, "the paper's tree finds the joint pose more influential: above one half")
 
 _TREE = (
     "the paper's own grid and tree are not published; how strong either factor is hangs on how "
@@ -93,16 +95,18 @@ def _cell(kind: str, factor: str, joint: str, error: str) -> Iterator[Claim]:
             f"{words}, median of the significant ones",
             "tau" if kind == "orientation" else "rho",
             None,
-            Range(0.0, 1.0, sign) if low > 0.0 else Range(-1.0, 0.0, sign),
+            of_sign(low, sign),
             _coefficients(kind, factor, joint, error),
             _SIGN,
-            note,
-            _unreachable(kind, low, high),
+            joined(note, _unreachable(kind, low, high)),
         )
 
 
 def _unreachable(kind: str, low: float, high: float) -> str:
-    """Why a printed coefficient cannot be significant after Bonferroni, or nothing."""
+    """Why a printed coefficient cannot be significant after Bonferroni, or nothing.
+
+    Its size is contradicted then. Its sign is printed all the same, and is compared.
+    """
     smallest = min(abs(low), abs(high))
     if kind == "stiffness":
         check, n, p = "A24", _BEST, spearman_p(smallest, _BEST)
@@ -175,7 +179,7 @@ def _share_of_models() -> Iterator[Claim]:
             f"poses in which {factor} stiffness correlates with an error, largest cell",
             "%",
             percent,
-            Range(0.0, percent, f"fewer than {count} of {REDUCED} poses in the paper"),
+            Range(None, percent, f"fewer than {count} of {REDUCED} poses in the paper"),
             _largest_share(factor),
             _POWER,
         )
@@ -202,6 +206,7 @@ def _contradicted() -> Iterator[Claim]:
         exactly(1.0),
         _any("stiffness", "anterior", "L3L4", "extension"),
         "",
+        also=(exactly(0.0),),
         contradicted="A29: section 3.4 says so, Table 6 has no significant test at either joint",
     )
     caption = float(_PRINTED["p_below_of_caption"])
@@ -235,7 +240,7 @@ def claims_of_factors() -> Iterator[Claim]:
             f"largest p of Friedman tests of errors between levels of {factor}",
             "p",
             None,
-            Range(0.0, bound, f"the paper finds all below {bound:g}"),
+            Range(None, bound, f"the paper finds all below {bound:g}"),
             _friedman(factor),
             _TREE,
         )

@@ -108,15 +108,26 @@ def claims_of_nominal() -> Iterator[Claim]:
             contradicted=""
             if check is None
             else f"{check}: {_implied_nominal(paper, percent, name)}",
+            also=_windows(_nominal_percents(paper, name)),
         )
 
 
 def _implied_nominal(error: float, percent: float, name: str) -> str:
-    parts = [f"{100.0 * error / measured(joint, name):.1f}" for joint in MEASURED_JOINTS]
+    parts = [f"{share:.1f}" for share in _nominal_percents(error, name)]
     return (
         f"{error:g} {COORDINATE_UNITS[name]} are {' or '.join(parts)} % of the printed motion, "
         f"not {percent:g} %"
     )
+
+
+def _nominal_percents(error: float, name: str) -> list[float]:
+    """The printed error in percent of the printed motion of either joint."""
+    return [100.0 * error / measured(joint, name) for joint in MEASURED_JOINTS]
+
+
+def _windows(values: list[float]) -> tuple[Range, ...]:
+    """Ranges about what the paper's other numbers make of a contradicted one."""
+    return tuple(factor_of_two(value) for value in values)
 
 
 def claims_of_bootstraps() -> Iterator[Claim]:
@@ -182,20 +193,27 @@ def _percent(what: str, loading: str, name: str) -> Claim:
         ),
         NO_RAW_DATA,
         contradicted="" if check is None else f"{check}: {_implied(what, loading, name)}",
+        also=_windows(_percents_of_medians(what, loading, name)),
     )
 
 
 def _implied(what: str, loading: str, name: str) -> str:
     """What the printed errors make of the printed motion."""
     printed = PAPER[f"{what}_bootstrap_error"][loading]
-    percents = [
-        100.0 * float(printed[joint]["median"][MOTION_KEY[name]]) / measured(joint, name)
-        for joint in MEASURED_JOINTS
-    ]
+    percents = _percents_of_medians(what, loading, name)
     return (
         f"the printed medians are {percents[0]:.0f} and {percents[1]:.0f} % of the motion of "
         f"section 3.1, printed is {float(printed['largest_percent'][name]):g} %"
     )
+
+
+def _percents_of_medians(what: str, loading: str, name: str) -> list[float]:
+    """The printed medians in percent of the printed motion of either joint."""
+    printed = PAPER[f"{what}_bootstrap_error"][loading]
+    return [
+        100.0 * float(printed[joint]["median"][MOTION_KEY[name]]) / measured(joint, name)
+        for joint in MEASURED_JOINTS
+    ]
 
 
 def _lower_when_quasi_static() -> Claim:
@@ -209,6 +227,7 @@ def _lower_when_quasi_static() -> Claim:
         exactly(100.0),
         _share_lower,
         NO_RAW_DATA,
+        also=(Range(_printed_lower(), 100.0, "from what Tables 2 and 3 have to all"),),
         contradicted=f"A16: in Tables 2 and 3 themselves {_printed_lower():.0f} % are",
     )
 

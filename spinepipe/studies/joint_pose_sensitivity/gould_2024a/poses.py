@@ -14,6 +14,7 @@ from spinepipe.comparison.claim import (
     exactly,
     factor_of_two,
     insignificant,
+    of_sign,
     spearman_interval,
     spearman_threshold,
     tested,
@@ -252,6 +253,8 @@ def claims_of_correlations() -> Iterator[Claim]:
         if rho is not None:
             yield _sign(error, stiffness, float(rho))
     yield from _poses()
+    for joint, name in product(MEASURED_JOINTS, FITTED):
+        yield _on_motion(joint, name)
 
 
 def _sign(error: str, stiffness: str, rho: float) -> Claim:
@@ -261,7 +264,7 @@ def _sign(error: str, stiffness: str, rho: float) -> Claim:
         f"Spearman: {error} error and {stiffness} stiffness, sign only",
         "rho",
         rho,
-        Range(0.0, 1.0, "the paper's sign") if rho > 0.0 else Range(-1.0, 0.0, "the paper's sign"),
+        of_sign(rho, "the paper's sign"),
         _rho("error against stiffness", f"{error}_error", f"{stiffness}_stiffness"),
         _CONFOUNDED,
         OPPOSITE.get((error, stiffness), ""),
@@ -308,6 +311,31 @@ def _poses() -> Iterator[Claim]:
             _ELSEWHERE,
             note,
         )
+
+
+def _on_motion(joint: str, name: str) -> Claim:
+    """Whether the error goes with the measured motion, which each joint frame sees otherwise."""
+    paper = float(bool(PAPER["error_depends_on_motion"][name]))
+    return Claim(
+        f"error_depends_on_motion.{joint}.{name}",
+        "section 3.3, supplement SE",
+        f"{name} error at {joint} depends on the measured motion: rho beyond {_THRESHOLD:.3f}, the "
+        f"threshold of p = {P_BELOW:g} in {REDUCED} pairs",
+        "1: yes, 0: no",
+        paper,
+        exactly(paper),
+        partial(_depends_on_motion, joint, name),
+        "the paper's motion in the frames of its poses is not published, nor is the size of its "
+        "correlation; ours here is the opposite of what it reports",
+    )
+
+
+def _depends_on_motion(joint: str, name: str, run: Run) -> Ours:
+    where = {"joint": joint, "response": f"{name}_error"}
+    row = tested(run, "spearman", family="error against motion", **where).iloc[0]
+    rho = float(row["effect"])
+    note = f"ours: rho {rho:.2f}, n = {int(row['n'])}, p = {row['p']:.2g} uncorrected"
+    return Ours(float(abs(rho) > _THRESHOLD), note=note)
 
 
 def _significant(family: str, key: str) -> Callable[[Run], Ours]:

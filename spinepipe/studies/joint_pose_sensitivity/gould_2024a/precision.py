@@ -82,7 +82,7 @@ def claims_of_precision() -> Iterator[Claim]:
             f"{PER_AXIS_MM:.2f} mm",
             "%",
             100.0,
-            Range(95.0, 100.0, "the paper says all poses; 95 % is allowed here"),
+            Range(95.0, None, "the paper says all poses; 95 % is allowed here"),
             _share(motion, limit),
             _TARGET,
         )
@@ -201,7 +201,7 @@ def _significance() -> Iterator[Claim]:
         f"smallest significant rho of {REDUCED} pairs",
         "rho",
         None,
-        Range(0.0, smallest, "up to the smallest coefficient printed as significant"),
+        Range(None, smallest, "up to the smallest coefficient printed as significant"),
         spearman_threshold(P_BELOW, REDUCED),
         "A23",
     )
@@ -231,7 +231,7 @@ def _ratios() -> Iterator[Claim]:
             f"{kind} of anterior stiffness of the ten best",
             "% of median",
             paper,
-            Range(paper - _POINTS, paper + _POINTS, "two points either way, chosen here"),
+            Range(paper - _POINTS, paper + _POINTS, "two points either way, chosen here", True),
             ours,
             check,
         )

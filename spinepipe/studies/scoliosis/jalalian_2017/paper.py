@@ -144,13 +144,13 @@ OTHER_TRUTH = (
 def window(value: float) -> Range:
     """Half to twice a number of patients that are not ours."""
     what = f"half to twice {value:.3g}, a window chosen here; inside it is no agreement"
-    return Range(value / 2.0, value * 2.0, what)
+    return Range(value / 2.0, value * 2.0, what, chosen=True)
 
 
 def window_of_percent(value: float) -> Range:
     """The same of a reduction, of which no more than all is possible."""
     half_to_twice = window(value)
-    return Range(half_to_twice.low, min(2.0 * value, 100.0), half_to_twice.what)
+    return Range(half_to_twice.low, min(2.0 * value, 100.0), half_to_twice.what, True)
 
 
 def spread(value: float, sd: float) -> Range:

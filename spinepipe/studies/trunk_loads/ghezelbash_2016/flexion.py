@@ -87,7 +87,7 @@ def _muscle(group: str) -> Iterator[Claim]:
         "%",
         None,
         Range(
-            0.0,
+            None,
             RELAXED_PERCENT,
             f"up to {RELAXED_PERCENT:g} %, chosen here for what the paper calls relaxed",
         ),

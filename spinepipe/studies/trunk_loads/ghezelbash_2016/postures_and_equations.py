@@ -16,7 +16,6 @@ from spinepipe.studies.trunk_loads.ghezelbash_2016.paper import (
     VOLUNTEER,
     Value,
     missing,
-    near,
     put_in,
     yes_no,
 )
@@ -52,9 +51,7 @@ def _upright() -> Iterator[Claim]:
                 f"rotation of {body} of {person} when standing upright",
                 "deg",
                 float(value),
-                near(
-                    float(value), BOUND_DEG, "as far as Eq 2 may turn a body from where it starts"
-                ),
+                _of_one_size(float(value)),
                 _rotation(person, body),
                 OTHER_MODEL,
                 _ORDER_OF_SIZE,
@@ -72,7 +69,7 @@ def _upright() -> Iterator[Claim]:
         "deg",
         _spread_in_paper(),
         Range(
-            0.0, 1.0, "less than one degree, chosen here: the paper's persons stand alike to half"
+            None, 1.0, "less than one degree, chosen here: the paper's persons stand alike to half"
         ),
         _spread,
         OTHER_MODEL,
@@ -84,7 +81,7 @@ def _upright() -> Iterator[Claim]:
         "largest rotation of a body from the start of Eq 2",
         "deg",
         BOUND_DEG,
-        Range(0.0, BOUND_DEG * (1.0 + _TRIFLE), "no more than the paper's bound"),
+        Range(None, BOUND_DEG * (1.0 + _TRIFLE), "no more than the paper's bound"),
         _farthest_from_start,
         "bodies were turned farther than Eq 2 allows",
     )
@@ -94,10 +91,16 @@ def _upright() -> Iterator[Claim]:
         "sum of moments upright over that at the start, the worst of all persons",
         "ratio",
         None,
-        Range(0.0, 1.0 + _TRIFLE, "no larger than at the start"),
+        Range(None, 1.0 + _TRIFLE, "no larger than at the start"),
         _moments,
         "moments are larger upright than where Eq 2 started",
     )
+
+
+def _of_one_size(value: float) -> Range:
+    """A rotation as far off as Eq 2 may turn a body: what the paper prints has no spread."""
+    what = f"{BOUND_DEG:g} deg either way, chosen here: as far as Eq 2 may turn a body"
+    return Range(value - BOUND_DEG, value + BOUND_DEG, what, chosen=True)
 
 
 def _upright_of(run: Run, person: str) -> "pd.Series[float]":
@@ -149,7 +152,7 @@ def _forces() -> Iterator[Claim]:
         "largest moment that no muscle holds in tasks 1 to 9",
         "N m",
         0.0,
-        Range(0.0, SLACK_NM, f"to {SLACK_NM:g} N m, this study's goal; Eq 1 has none"),
+        Range(None, SLACK_NM, f"to {SLACK_NM:g} N m, this study's goal; Eq 1 has none"),
         _slack,
         "muscles of these persons cannot hold a task at the stated largest stress",
     )
@@ -281,7 +284,7 @@ def _exertions() -> Iterator[Claim]:
             f"share of the strength that the exertion in {what} takes",
             "ratio",
             None,
-            Range(0.0, 1.0, "no more than all: the paper's muscles hold it at 1.0 MPa"),
+            Range(None, 1.0, "no more than all: the paper's muscles hold it at 1.0 MPa"),
             _strength(number),
             f"the task is beyond the muscles' strength; {OTHER_MODEL}",
             "pressure in the abdomen and antagonists, which the paper adds, are left out",

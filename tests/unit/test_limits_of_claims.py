@@ -1,0 +1,141 @@
+"""What it takes to be inside a range of a paper, worked out anew from the rows themselves."""
+
+import importlib
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from spinepipe.comparison.claim import (
+    Claim,
+    Limit,
+    NotComputed,
+    Ours,
+    Range,
+    Run,
+    factor_of_two,
+    judge,
+)
+from spinepipe.report.page.document import judged as told
+from spinepipe.tables.shared import LIMITS
+
+PAPERS = {
+    "gould_2024a": "joint_pose_sensitivity",
+    "gould_2024b": "cohort_stiffness",
+    "ghezelbash_2016": "trunk_loads",
+    "jalalian_2017": "scoliosis",
+    "wang_2021": "tracking",
+}
+NOTHING = Run({}, {"failed_when": "all"})
+
+NO_OTHER_NUMBER = (
+    *(f"joint_orientation.reduced.{joint}.extension.iqr" for joint in ("L1L2", "L2L3", "L3L4")),
+    *(f"reduced_against_complete.extension_iqr_drop.{joint}" for joint in ("L1L2", "L3L4")),
+)
+"""A19: a column that is probably a copy, in whose place nothing else is printed."""
+
+
+def claims(paper: str) -> tuple[Claim, ...]:
+    module = importlib.import_module(f"spinepipe.studies.{PAPERS[paper]}.{paper}.against")
+    found: tuple[Claim, ...] = module.CLAIMS
+    return found
+
+
+def by_hand(row: Mapping[str, Any]) -> str:
+    """The kind of limit from the two ends and the words of the row."""
+    low, high = row["paper_low"], row["paper_high"]
+    ends = [end for end in (low, high) if end is not None]
+    if len(ends) < 2:
+        return "one_sided" if ends else "none"
+    if low == high:
+        return "binary"
+    across_zero = low < 0.0 < high
+    if not across_zero and max(abs(low), abs(high)) / 4.0 >= min(abs(low), abs(high)):
+        return "wide"
+    return "chosen" if "chosen here" in row["reason"].split(";")[0] else "two_sided"
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_limit_follows_from_the_row(paper: str) -> None:
+    rows = [judge(claim, NOTHING) for claim in claims(paper)]
+    compared = [row for row in rows if row["verdict"] != "contradicted"]  # tells no range
+    assert {row["id"]: row["limit"] for row in compared} == {
+        row["id"]: by_hand(row) for row in compared
+    }
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_a_sign_alone_is_never_called_contradicted(paper: str) -> None:
+    """Where the paper's sign is known, ours agrees with it or does not."""
+    signs = [claim for claim in claims(paper) if 0.0 in (claim.range.low, claim.range.high)]
+    hidden = [one.id for one in signs if one.range.limit is Limit.ONE_SIDED and one.contradicted]
+    assert hidden == []
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_a_contradicted_number_of_a_run_is_compared_with_all_that_is_printed(paper: str) -> None:
+    for claim in claims(paper):
+        if not claim.contradicted or claim.also or claim.id in NO_OTHER_NUMBER:
+            continue
+        try:
+            claim.ours(NOTHING)  # the paper's own other number, of no run
+        except NotComputed:
+            pytest.fail(f"{claim.id}: our value is not held against the paper's other numbers")
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"), [(1.0, "contradicted"), (20.0, "contradicted"), (5.0, "outside")]
+)
+def test_ours_outside_all_that_the_paper_prints_disagrees(value: float, verdict: str) -> None:
+    """Printed are 1 (0.5 to 2) and 20 (10 to 40)."""
+    claim = Claim(
+        *("a", "Table 1", "something", "mm", 1.0, factor_of_two(1.0)),
+        ours=lambda run: Ours(value),
+        outside="for a reason",
+        contradicted="A1: 1 is not 20",
+        also=(factor_of_two(20.0),),
+    )
+    row = judge(claim, NOTHING)
+    assert row["verdict"] == verdict
+    assert "A1: 1 is not 20" in row["reason"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "chosen", "limit"),
+    [
+        (1.0, 2.0, False, "two_sided"),
+        (1.0, 2.0, True, "chosen"),
+        (1.0, 4.0, True, "wide"),
+        (1.0, 3.99, False, "two_sided"),
+        (0.0, 3.0, False, "wide"),
+        (-4.0, -1.0, False, "wide"),
+        (-1.0, 3.0, False, "two_sided"),
+        (2.0, None, False, "one_sided"),
+        (None, 2.0, True, "one_sided"),
+        (2.0, 2.0, False, "binary"),
+        (None, None, False, "none"),
+    ],
+)
+def test_kinds_of_limits(low: float | None, high: float | None, chosen: bool, limit: str) -> None:
+    assert Range(low, high, "a range", chosen).limit == limit
+
+
+def test_the_schema_knows_every_limit() -> None:
+    assert tuple(limit.value for limit in Limit) == LIMITS
+
+
+def test_the_page_says_what_inside_took() -> None:
+    """Ten inside: 1 two-sided, 2 half to twice, 3 signs, 4 yes or no; one wide outside."""
+    inside = ["two_sided", *["wide"] * 2, *["one_sided"] * 3, *["binary"] * 4]
+    rows = pd.DataFrame(
+        [{"limit": limit, "verdict": "inside"} for limit in inside]
+        + [{"limit": "wide", "verdict": "outside"}, {"limit": "binary", "verdict": "circular"}]
+    )
+    assert told(rows) == (
+        "Of 12 published quantities ours are inside the paper's range for 10 and outside for 1; "
+        "1 are what the cohort was built to have. Of the 10 inside, 1 lie in a range with two ends "
+        "whose width the paper gives, 2 in one so wide (half to twice, or more) that inside is no "
+        "agreement, 3 are on the right side of a single limit or of zero, 4 are the same yes, no "
+        "or count."
+    )
