@@ -133,3 +133,27 @@ rule landmark_errors:
         digest=digest("landmark_errors"),
     run:
         run_job(rule, "landmark_errors", wildcards, input, output, log)
+
+
+rule spread_over_landmark_sd:
+    output:
+        output=f"{POSES}/spread_over_landmark_sd/specimen={{specimen}}.parquet",
+    log:
+        f"{LOGS}/spread_over_landmark_sd/specimen={{specimen}}.log",
+    params:
+        digest=digest("spread_over_landmark_sd"),
+    run:
+        run_job(rule, "spread_over_landmark_sd", wildcards, input, output, log)
+
+
+rule over_load_point:
+    output:
+        output=f"{POSES}/stiffness_over_load_point/specimen={{specimen}}.parquet",
+    log:
+        f"{LOGS}/over_load_point/specimen={{specimen}}.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("over_load_point"),
+    run:
+        run_job(rule, "over_load_point", wildcards, input, output, log)

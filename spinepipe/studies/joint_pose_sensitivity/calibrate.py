@@ -7,15 +7,16 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
-from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.fitted_stiffness import stiffness_cells
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, region_columns
+from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
 from spinepipe.tables import to_arrow, write
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATE_COLUMNS
 
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
@@ -72,7 +73,7 @@ def _fitted(
         {
             **common,
             "joint": "*" if shared else model.joints[joint],
-            **_stiffness(problem, found, model, joint, solved),
+            **stiffness_cells(problem, found, model, joint),
         }
         for joint in joints
     ]
@@ -85,37 +86,6 @@ def _message(found: Fit) -> str:
     if found.n_optima > 1:
         notes.append(f"{found.n_optima} optima: the answer depends on the start")
     return "; ".join(notes)
-
-
-def _stiffness(
-    problem: Problem, found: Fit, model: SpineModel, joint: int, solved: bool
-) -> dict[str, Any]:
-    """Stiffness, its error and its region, of one joint."""
-    row: dict[str, Any] = {}
-    values = model.effects[0].values[joint]
-    for column, (name, stiffness) in enumerate(zip(COORDINATES, STIFFNESS_COLUMNS, strict=True)):
-        row[stiffness] = values[column] if solved else None
-        row |= dict.fromkeys(region_columns(name))
-        for index, unknown in enumerate(problem.free):
-            if unknown.column == column and joint in unknown.rows and solved:
-                row |= _region(name, values[column], found, index)
-    return row
-
-
-def _region(name: str, value: float, found: Fit, index: int) -> dict[str, Any]:
-    """What is known of one free stiffness: its standard error and how far it may be from there."""
-    reach = found.reach(index, value)
-    assert reach is not None  # of every fit that has a stiffness
-    error = value * found.uncertainty.standard_error[index]
-    cells = (
-        error if np.isfinite(error) else None,
-        reach.low,
-        reach.high,
-        reach.open_below,
-        reach.open_above,
-        found.identifiable(index),
-    )
-    return dict(zip(region_columns(name), cells, strict=True))
 
 
 def _errors(found: Fit) -> dict[str, Any]:

@@ -31,6 +31,7 @@ def check_joint_pose_sensitivity(
     yield from _landmarks(document, study, cohort)
     yield from _loading(document, study, cohort)
     yield from _tests(document, study, cohort)
+    yield from _load_point(document, study, cohort)
     if study.best_models > study.poses:
         place = at(document, "best_models")
         allowed = f"at most the number of poses, {study.poses}"
@@ -84,6 +85,25 @@ def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) ->
     place = at(document, "loading")
     allowed = "equilibrium, or a cohort with masses and inertias of all moving vertebrae"
     yield Problem(*place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in")
+
+
+def _load_point(
+    document: Document, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[Problem]:
+    """Only forces have a point: another one changes nothing under pure moments."""
+    if not study.load_point.asked or cohort.loads is None:
+        return
+    forces = ["fx_n", "fy_n", "fz_n"]
+    loads = cohort.loads[cohort.loads["test"].isin(study.tests or cohort.tests)]
+    preload = cohort.preload
+    if loads[forces].abs().gt(0.0).any(axis=None):
+        return
+    if preload is not None and preload[forces].abs().gt(0.0).any(axis=None):
+        return
+    found = "other load points, but no force in any chosen test"
+    place = at(document, "load_point")
+    allowed = "tests with a force: a pure moment has no point"
+    yield Problem(*place, found, allowed, "choose tests with forces, or leave load_point out")
 
 
 def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:

@@ -14,6 +14,9 @@ from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
+    TABLES as TABLES_OF_LOAD_POINT,
+)
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
 
@@ -27,6 +30,7 @@ COMPARED = (
     *("summary", "counts", "statistics", "importance", "variance_shares", "success_by_method"),
     *("bootstrap", "required_precision", "landmark_precision", "landmarks"),
     *("calibrations", "simulations", "success"),
+    *("spread_over_landmark_sd", "stiffness_over_load_point"),
 )
 """Tables that are compared with the paper's."""
 
@@ -47,7 +51,7 @@ _JOBS = {
 }
 """Folder of the job files of each table that is made of them."""
 
-BY_SPECIMEN = ("landmarks", "poses")
+BY_SPECIMEN = ("landmarks", "poses", "spread_over_landmark_sd", "stiffness_over_load_point")
 """Tables joined from one file per specimen."""
 
 OF_JOBS = (*_JOBS, *BY_SPECIMEN)
@@ -61,6 +65,8 @@ _MADE_BY = {
     "bootstrap": "bootstrap",
     "method_fits": "fit_by_method",
     "precision_errors": "landmark_errors",
+    "spread_over_landmark_sd": "spread_over_landmark_sd",
+    "stiffness_over_load_point": "over_load_point",
 }
 """The job that writes the files of each of them."""
 
@@ -127,6 +133,12 @@ class Layout(StudyFiles):
             "figures.success:success_figure",
             ("success_by_method", "method_fits"),
         ),
+        Figure(
+            "load_point",
+            "Where the load acts",
+            "figures.load_point:load_point_figure",
+            ("stiffness_over_load_point", "load_point_effect"),
+        ),
     )
 
     study: JointPoseSensitivity
@@ -164,6 +176,8 @@ class Layout(StudyFiles):
                 "precision_errors"
             ),
             ("against_gould_2024a",): int(self.rebuilt),
+            ("spread_over_landmark_sd",): self.study.landmark_precision.poses,
+            ("stiffness_over_load_point", "load_point_effect"): int(self.study.load_point.asked),
         }
         return (*ALWAYS, *(name for names, count in parts.items() if count for name in names))
 
@@ -178,8 +192,8 @@ class Layout(StudyFiles):
 
     @property
     def by_specimen(self) -> tuple[str, ...]:
-        """What is sampled."""
-        return BY_SPECIMEN
+        """What is sampled, and what one job of a specimen makes."""
+        return tuple(name for name in BY_SPECIMEN if name in self.tables)
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -258,7 +272,7 @@ _GROUPING = ("best_models", "block")
 _MODEL = ("tests", "load_point_shift_mm", "stiffness", "damping", "calibration")
 _BOOTSTRAPS = ("start_bootstrap", "damping_bootstrap", "dynamic")
 _JUDGING = ("success", "significance")
-_PARTS = ("methods", "landmark_precision", *_BOOTSTRAPS, *_JUDGING)
+_PARTS = ("methods", "landmark_precision", "load_point", *_BOOTSTRAPS, *_JUDGING)
 """Settings by what they decide; the last were added to the sampled poses, whose fits and
 simulations do not hang on them."""
 
@@ -296,6 +310,7 @@ _ADDED = (
         many=True,
         ignores=ignoring(
             *("poses", "landmark_sd_mm", "loading", "methods", "landmark_precision"),
+            "load_point",
             *(*_GROUPING, *_JUDGING),
             start_bootstrap={"loadings"},
             damping_bootstrap={"loadings"},
@@ -305,17 +320,34 @@ _ADDED = (
         "landmark_errors",
         ignores=ignoring(
             *("poses", "landmark_sd_mm", "damping", "methods", *_SOLVING, *_GROUPING),
-            *(*_BOOTSTRAPS, *_JUDGING),
+            *("load_point", *_BOOTSTRAPS, *_JUDGING),
             landmark_precision={"sd_mm", "translation_limit_mm", "rotation_limit_deg", "share"},
         ),
     ),
     Job(
         "fit_by_method",
         ignores=ignoring(
-            *("poses", "loading", "landmark_precision", "significance"),
+            *("poses", "loading", "landmark_precision", "load_point", "significance"),
             *(*_GROUPING, *_BOOTSTRAPS),
             methods={"poses"},
             success={"failed_when", "outlier_times_start"},
+        ),
+    ),
+    Job(
+        "spread_over_landmark_sd",
+        "spread",
+        ignores=ignoring(
+            *("landmark_sd_mm", *_MODEL, *_SOLVING, *_GROUPING),
+            *(name for name in _PARTS if name != "landmark_precision"),
+            landmark_precision={"poses", "translation_limit_mm", "rotation_limit_deg", "share"},
+        ),
+    ),
+    Job(
+        "over_load_point",
+        ignores=ignoring(
+            *("poses", "landmark_sd_mm", *_SOLVING, *_GROUPING),
+            *(name for name in _PARTS if name != "load_point"),
+            load_point={"anterior_sd_mm", "superior_sd_mm"},
         ),
     ),
 )
@@ -348,6 +380,13 @@ _ANALYSES = (
         ignoring("block", *_NOT_PRECISE),
     ),
     Job(
+        "load_point_effect",
+        "load_point_effect",
+        ("stiffness_over_load_point",),
+        ("load_point_effect",),
+        ignoring("block", *(name for name in _PARTS if name != "load_point")),
+    ),
+    Job(
         "against_gould_2024a",
         "gould_2024a.against",
         COMPARED,
@@ -360,7 +399,7 @@ KIND = Kind(
     settings=JointPoseSensitivity,
     files=Layout,
     checks=(check_joint_pose_sensitivity,),
-    tables=(*TABLES, *TABLES_OF_FITS),
+    tables=(*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT),
     jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
     ignored_by_figures=("block",),
     makes_models="start_model",

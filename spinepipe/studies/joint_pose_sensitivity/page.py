@@ -19,6 +19,9 @@ from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivi
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
+    TABLES as TABLES_OF_LOAD_POINT,
+)
 from spinepipe.tables.schema import Column
 from spinepipe.tables.shared import STATISTICS, against_as_shown
 
@@ -35,6 +38,8 @@ SHOWN = {
     "variance_shares": "Variance shares of joint pose and stiffness",
     "importance": "Importance in the regression tree, by factor",
     "required_precision": "Landmark precision needed",
+    "load_point_effect": "Where the load acts",
+    "spread_over_landmark_sd": "Spread of joint frames by landmark SD",
     "agreement": "Agreement of predicted and measured motion",
     "statistics": "Tests of significance",
 }
@@ -87,7 +92,7 @@ FOLDED = (
 
 _AGAINST = against_as_shown(AGAINST_GOULD_2024A)
 
-_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS)}
+_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT)}
 
 
 def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
@@ -116,7 +121,9 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
         ("comparison of ways of fitting", "methods: poses", study.methods.poses),
         ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
     )
-    return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
+    told = tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
+    point = "stiffness over load points (load_point: one point and no SD)"
+    return told if study.load_point.asked else (*told, point)
 
 
 def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:

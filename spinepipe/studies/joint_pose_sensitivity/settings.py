@@ -38,6 +38,20 @@ _SDs = Annotated[
 ]
 
 
+def _with_zero(shifts: tuple[float, ...]) -> tuple[float, ...]:
+    if 0.0 not in shifts:
+        raise ValueError("0 among them, the point of the study itself")
+    return shifts
+
+
+_Shifts = Annotated[
+    tuple[Annotated[float, Field(ge=-200, le=200)], ...],
+    Field(strict=False, min_length=1, max_length=50),
+    AfterValidator(_rising),
+    AfterValidator(_with_zero),
+]
+
+
 class Success(BaseModel):
     """Filters of the published study; what they leave is the reduced dataset."""
 
@@ -168,6 +182,50 @@ class LandmarkPrecision(BaseModel):
     )
 
 
+TWO_SDS = 2.0
+"""So far fits must reach where the load point has an SD; the prior is cut off where they end."""
+
+
+class LoadPoint(BaseModel):
+    """Does the fitted stiffness hang on where the load acts?"""
+
+    model_config = FORM
+
+    anterior_mm: _Shifts = Field(
+        default=(0.0,), description="shifts anterior of all load points that are tried, mm, with 0"
+    )
+    superior_mm: _Shifts = Field(
+        default=(0.0,), description="shifts superior of all load points that are tried, mm, with 0"
+    )
+    anterior_sd_mm: float = Field(
+        default=0.0, ge=0, le=50, description="SD of the load points anterior, mm; 0: known"
+    )
+    superior_sd_mm: float = Field(
+        default=0.0, ge=0, le=100, description="SD of the load points superior, mm; 0: known"
+    )
+
+    @model_validator(mode="after")
+    def _reaches(self) -> Self:
+        for way, shifts, sd in (
+            ("anterior", self.anterior_mm, self.anterior_sd_mm),
+            ("superior", self.superior_mm, self.superior_sd_mm),
+        ):
+            if sd > 0.0 and (shifts[0] > -TWO_SDS * sd or shifts[-1] < TWO_SDS * sd):
+                ends = f"{-TWO_SDS * sd:g} to {TWO_SDS * sd:g}"
+                raise ValueError(f"{way}_mm from {ends} at least: two SDs of {sd:g} each way")
+        return self
+
+    @property
+    def asked(self) -> bool:
+        """Whether any other load point is tried."""
+        return len(self.anterior_mm) * len(self.superior_mm) > 1 or self.uncertain
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether load points have an SD."""
+        return self.anterior_sd_mm > 0.0 or self.superior_sd_mm > 0.0
+
+
 class Calibration(BaseModel):
     """How stiffness is fitted to measured motion."""
 
@@ -250,6 +308,10 @@ class JointPoseSensitivity(Study):
     )
     landmark_precision: LandmarkPrecision = Field(
         default_factory=LandmarkPrecision, description="errors over landmark SD"
+    )
+    load_point: LoadPoint = Field(
+        default_factory=LoadPoint,
+        description="stiffness over load points; left out with one shift each way and no SD",
     )
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"

@@ -53,7 +53,8 @@ def region_columns(name: str) -> tuple[str, ...]:
     return (*numbers, *(f"{name}_{flag}" for flag in ("open_below", "open_above", "identifiable")))
 
 
-def _calibration_columns() -> tuple[Column, ...]:
+def stiffness_columns() -> tuple[Column, ...]:
+    """Stiffness of a fit against each coordinate, its error and its region."""
     columns = []
     for name in COORDINATES:
         suffix, unit = stiffness_unit(name)
@@ -116,7 +117,7 @@ CALIBRATIONS = Table(
         SPECIMEN,
         POSE,
         Column("joint", "text", "joint, or * for a stiffness shared by all"),
-        *_calibration_columns(),
+        *stiffness_columns(),
         *(
             Column(
                 f"{name}_error_{length_or_angle(name)}",
