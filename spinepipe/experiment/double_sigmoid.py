@@ -34,6 +34,9 @@ FEWEST_POINTS = 10
 SIGNIFICANCE = 0.05
 """More unknowns are believed where fewer would leave so much by chance at most so often."""
 
+_HARDLY = 0.001
+"""Chance by which noise leaves so much that a curve does not describe the points."""
+
 _FAR, _LARGEST = 60.0, 60.0
 """Bounds of |a| and |d|, and of c, with the largest load and the range of rotation as units."""
 
@@ -57,6 +60,7 @@ class Zone(StrEnum):
     """Whether a neutral zone was found."""
 
     FOUND = "found"
+    NOT_DESCRIBED = "not_described"
     NOT_MEANINGFUL = "not_meaningful"
     TOO_FEW = "too_few"
     ONE_SIDE = "one_side"
@@ -124,7 +128,23 @@ def neutral_zone(
     if places is None:
         why = "no neutral zone: compliance does not rise and fall between the largest loads"
         return None, Zone.NOT_MEANINGFUL, why
+    if sd is not None and not _describes(curve, len(load), sd):
+        left = float(np.sqrt(curve.squares / len(load)))
+        why = (
+            f"softer in the middle, but sigmoids leave {np.rad2deg(left):.2g} deg where readings "
+            f"are noisy by {np.rad2deg(sd):.2g}: no neutral zone from these loads, read more"
+        )
+        return None, Zone.NOT_DESCRIBED, why
     return _measured(curve, places), Zone.FOUND, ""
+
+
+def _describes(curve: Curve, points: int, sd: float) -> bool:
+    """Whether noise explains what a curve leaves: where it does not, its bends are not the joint's.
+
+    A zone narrower than the steps of load bends faster than any sigmoid that they allow.
+    """
+    freedom = points - len(curve.theta)
+    return curve.squares / sd**2 <= float(stats.chi2.isf(_HARDLY, freedom))
 
 
 def _distinct(load: Array) -> int:

@@ -225,6 +225,18 @@ def test_what_has_no_neutral_zone_says_why() -> None:
     np.testing.assert_allclose(curve.rotation(load), sigmoid(load), atol=1e-6)
 
 
+def test_a_zone_narrower_than_the_steps_of_load_has_no_number() -> None:
+    """Stiffness 0.3 of that outside within 2 deg: the compliance is a spike between two loads."""
+    angle = np.deg2rad(np.linspace(-30.0, 30.0, 60_001))
+    width = np.deg2rad(2.0)
+    moment = 60.0 * angle - 42.0 * width * np.tanh(angle / width)
+    load = np.linspace(-PEAK, PEAK, 11)
+    zone, found, why = neutral_zone(load, np.interp(load, moment, angle), np.deg2rad(0.03))
+    assert zone is None
+    assert found is Zone.NOT_DESCRIBED
+    assert "read more" in why
+
+
 def test_what_nothing_is_known_of_leaves_no_interval() -> None:
     root, free = np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
     spread = Spread(root, free, 2.0)
