@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from spinepipe.studies.cohort_stiffness import fit, left_out, literature, pool
+from spinepipe.studies.cohort_stiffness import experiment, fit, left_out, literature, pool
 from spinepipe.tables import read_frame
 
 STUDY = "probe"
@@ -162,6 +162,15 @@ class Written:
         """Tables of the job ``pool``."""
         files = self._files("stiffness", "fits", "errors", "pooling")
         pool.run(str(self.root), STUDY, representation, fitted_to, without, **files)
+        return _read(files)
+
+    def experiment(self, specimen: str, representation: str | None = "per_joint") -> Tables:
+        """Tables of the job ``experiment`` and, before it, of the fit that it simulates."""
+        if representation is not None:
+            self.fit(specimen, representation)
+        fitted = [] if representation is None else [str(self.root / "stiffness.parquet")]
+        files = self._files("load_displacement", "helical_axes")
+        experiment.run(str(self.root), STUDY, fitted, specimen, **files)
         return _read(files)
 
     def _files(self, *names: str) -> dict[str, str]:

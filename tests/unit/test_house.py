@@ -24,6 +24,7 @@ ROOMS = (
         "progress",
         "frames",
         "decomposition",
+        "experiment",
         "marks",
         "anatomy",
     ),
@@ -258,7 +259,7 @@ def test_a_digest_hangs_on_its_own_kind_alone(kind: str, module: str) -> None:
 
 
 SOLVING = {
-    "cohort_stiffness": {"fit", "literature", "left_out", "pool"},
+    "cohort_stiffness": {"fit", "literature", "left_out", "pool", "experiment"},
     "discrepancy": {"search"},
     "global_sensitivity": {"base", "respond", "calibrate"},
     "joint_pose_sensitivity": {

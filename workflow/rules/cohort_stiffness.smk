@@ -74,3 +74,19 @@ rule pool:
         digest=digest("pool"),
     run:
         run_job(rule, "pool", wildcards, input, output, log)
+
+
+rule experiment:
+    input:
+        base_model,
+        # The specimen's own fit to all load cases, with which its tests are simulated.
+        fitted=lambda wildcards: layout(wildcards.study).simulated_fit(wildcards.specimen),
+    output:
+        load_displacement=f"{COHORTS}/experiment/specimen={{specimen}}/load_displacement.parquet",
+        helical_axes=f"{COHORTS}/experiment/specimen={{specimen}}/helical_axes.parquet",
+    log:
+        f"{LOGS}/experiment/specimen={{specimen}}.log",
+    params:
+        digest=digest("experiment"),
+    run:
+        run_job(rule, "experiment", wildcards, input, output, log)

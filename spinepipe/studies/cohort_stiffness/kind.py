@@ -9,20 +9,25 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
-from spinepipe.studies.cohort_stiffness.representations import POOLED
+from spinepipe.studies.cohort_stiffness.representations import POOLED, finest
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
     CohortStiffness,
+    joint_label,
     load_sets,
     representations_of,
     tests_of,
 )
 from spinepipe.studies.cohort_stiffness.tables import TABLES
+from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles
 
-OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling")
+OF_EXPERIMENTS = ("load_displacement", "helical_axes")
+"""What laboratories report, one job per specimen."""
+
+OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling", *OF_EXPERIMENTS)
 """Tables joined from job files."""
 
 _ANALYSES = (
@@ -42,7 +47,13 @@ _ANALYSES = (
 EVERYONE, POOLED_BLOCK = "everyone", "pooled"
 """Place of the block of the pooled fits, which are of no single specimen."""
 
-_MADE_BY = {"literature": "literature", "fits": "fit", "left_out": "left_out", "pooled": "pool"}
+_MADE_BY = {
+    "literature": "literature",
+    "fits": "fit",
+    "left_out": "left_out",
+    "pooled": "pool",
+    "experiment": "experiment",
+}
 """The job that writes the files in each folder."""
 
 _SINGLE_BLOCK = "000"
@@ -84,6 +95,12 @@ class CohortLayout(StudyFiles):
             "figures.load_case_stiffness:load_case_stiffness_figure",
             ("stiffness", "errors", "statistics"),
         ),
+        Figure(
+            "range_of_motion",
+            "Range of motion, measured and simulated",
+            "figures.range_of_motion:range_of_motion_figure",
+            ("load_displacement",),
+        ),
     )
 
     study: CohortStiffness
@@ -105,7 +122,8 @@ class CohortLayout(StudyFiles):
         analysed = (
             job.name for job in _ANALYSES if self.rebuilt or not job.name.startswith("against")
         )
-        return ("stiffness", "fits", "errors", "sign_checks", *pooled, *analysed)
+        own = ("stiffness", "fits", "errors", "sign_checks", *pooled, *OF_EXPERIMENTS)
+        return (*own, *analysed)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -126,13 +144,16 @@ class CohortLayout(StudyFiles):
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
-        whole = table != "sign_checks" and self._pooled_ones
+        alone = table in ("sign_checks", *OF_EXPERIMENTS)
+        whole = not alone and self._pooled_ones
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         if block == POOLED_BLOCK:
             return [f"{self.folder}/pooled/{place}/{table}.parquet" for place in self._pooled()]
+        if table in OF_EXPERIMENTS:
+            return [f"{self.folder}/experiment/specimen={specimen}/{table}.parquet"]
         places = [f"literature/specimen={specimen}"] if table != "fits" else []
         if table in ("stiffness", "errors", "fits"):
             places += [f"fits/specimen={specimen}/{place}" for place in self._fits()]
@@ -148,6 +169,14 @@ class CohortLayout(StudyFiles):
             for name in self.specimens
             if name != specimen
         ]
+
+    def simulated_fit(self, specimen: str) -> list[str]:
+        """The stiffness file of a specimen's own fit that its tests are simulated with, if any."""
+        name = finest(self.representations)
+        if name is None:
+            return []
+        place = f"representation={name}/fitted_to={joint_label(self.tests)}"
+        return [f"{self.folder}/fits/specimen={specimen}/{place}/stiffness.parquet"]
 
     @property
     def _single(self) -> tuple[str, ...]:
@@ -202,6 +231,12 @@ def _fits_of_others(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [expected.of_part("stiffness", fit) for fit in expected.files.fits_of_others(*where)]
 
 
+def _simulated_fit(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The mark of the fit that the tests of a specimen are simulated with."""
+    files = expected.files.simulated_fit(place["specimen"])
+    return [expected.of_part("stiffness", file) for file in files]
+
+
 _HELD_OUT = ("representations", "cross_validation", "significance")
 _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
@@ -211,7 +246,7 @@ KIND = Kind(
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
     checks_of_files=(BaseCheck(own_bushings=True), check_one_stiffening),
-    tables=TABLES,
+    tables=(*TABLES, *TABLES_OF_EXPERIMENTS),
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
         Job("literature", ignores=ignoring(*_HELD_OUT, *_FITTING), reads_base=True),
@@ -220,6 +255,12 @@ KIND = Kind(
             "pool",
             ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
             reads_base=True,
+        ),
+        Job(
+            "experiment",
+            ignores=ignoring("cross_validation", "significance"),
+            reads_base=True,
+            also=_simulated_fit,
         ),
         *_ANALYSES,
     ),

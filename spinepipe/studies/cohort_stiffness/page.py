@@ -17,6 +17,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
 )
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
+from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
 from spinepipe.tables.shared import against_as_shown
 
 QUESTION = (
@@ -31,6 +32,8 @@ SHOWN = {
     "pooling": "How stiffness is spread over the cohort",
     "against_gould_2024b": "Beside Gould et al. 2024b",
     "sign_checks": "Does each joint move with the load?",
+    "load_displacement": "Range of motion, neutral zone, stiffness and lost work of each curve",
+    "helical_axes": "Helical axes and centres of rotation",
     "fits": "Fits",
     "stiffness": "Stiffness fitted to all load cases",
     "statistics": "Tests of significance",
@@ -51,7 +54,7 @@ _COLUMNS = {
 }
 """What a reader compares stands first; short names are left to the files."""
 
-_SHAPES = {table.name: table for table in TABLES}
+_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_EXPERIMENTS)}
 
 NO_LEVELS = (
     "no stiffness of single levels is published for these joints and the coordinates that are free"

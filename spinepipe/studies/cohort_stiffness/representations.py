@@ -4,6 +4,7 @@ What studies may ask for, how it is fitted, and how tables, figures and findings
 order it, all follow from the entries.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -155,3 +156,9 @@ def named(name: str) -> Representation:
 def start_of(name: str) -> str:
     """The published set that a representation starts from."""
     return next(one for one in PUBLISHED if named(one).by_level == named(name).by_level)
+
+
+def finest(names: Iterable[str]) -> str | None:
+    """Of some fitted specimen by specimen, the one with most unknowns; None where there is none."""
+    known = set(names) - {POOLED}
+    return next((name for name in (*OF_JOINTS, *SHARED) if name in known), None)

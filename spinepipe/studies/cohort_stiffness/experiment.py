@@ -1,0 +1,306 @@
+"""Job: what laboratories report of the tests of a specimen, measured and simulated."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from spinepipe.calibrate import Evaluator, Problem
+from spinepipe.calibrate.solvers import AtRest
+from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import MeasurementSd
+from spinepipe.decomposition import eigh
+from spinepipe.effects.contract import Array
+from spinepipe.experiment.loop import Loop, Spread, reading_noise
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.marks import read_mark
+from spinepipe.model import RefusedModel, ScopedEffect
+from spinepipe.status import USABLE, Status
+from spinepipe.studies.cohort_stiffness.loop_rows import (
+    TWO_ZEROS,
+    Seen,
+    axis_row,
+    displacement_row,
+    empty,
+    noise_of_poses,
+)
+from spinepipe.studies.cohort_stiffness.loops import Cycle, cycles_of
+from spinepipe.studies.cohort_stiffness.predict import predicted
+from spinepipe.studies.cohort_stiffness.problem import (
+    SpecimenTests,
+    base_effects,
+    calibration_problem,
+    origin,
+    specimen_tests,
+    start_stiffness,
+)
+from spinepipe.studies.cohort_stiffness.representations import finest
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness, representations_of
+from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
+    HELICAL_AXES,
+    LOAD_DISPLACEMENT,
+    MEASURED,
+    NO_POSE,
+    NOT_READ,
+    NOWHERE,
+    SIMULATED,
+)
+from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.tables.shared import joined
+from spinepipe.units import COORDINATES, DEG_PER_RAD, less_step_0
+
+Row = dict[str, Any]
+
+NO_MOMENT = "no moment drives a rotation that was read: there is no curve of moment and rotation"
+ONE_READING = "fewer than two load steps were read"
+NO_FIT = "no stiffness was fitted specimen by specimen: nothing to simulate with"
+NO_SD = "no measurement_sd is declared: no interval"
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Motion of a fitted model, and how it hangs on the fitted stiffness.
+
+    Attributes
+    ----------
+    motion : (T, J, 6) m and rad of each cycle, or the status and message of one without.
+    slopes : (T, J, 6, m) of each cycle, by the logarithms of the unknowns; None without a pose.
+    root : (m, k), root @ root.T is the covariance of the unknowns that the data hold.
+    held : (m,) which these are. reach : SDs to the ends of a 95 % interval.
+    """
+
+    representation: str
+    motion: Sequence[tuple[Array | None, Status, str]]
+    slopes: Sequence[Array] | None
+    root: Array
+    held: NDArray[np.bool_]
+    reach: float
+
+
+def run(
+    root: str,
+    study: str,
+    fitted: list[str],
+    specimen: str,
+    load_displacement: str,
+    helical_axes: str,
+) -> None:
+    """Write the tables of one specimen; ``fitted`` is the file of its own stiffness, if any."""
+    settings, cohort = study_of_kind(CohortStiffness, root, study)
+    tests = specimen_tests(settings, cohort, specimen)
+    others = base_effects(root, settings, cohort, specimen)
+    name = finest(representations_of(settings, cohort.joint_names))
+    frame = read_frame(fitted[0]) if fitted else None
+    model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)
+    sd = settings.measurement_sd or cohort.measurement_sd
+    curves: list[Row] = []
+    axes: list[Row] = []
+    for cycle in cycles_of(tests.tested):
+        for joint, label in enumerate(cohort.joint_names):
+            key = {"joint": label, "test": cycle.test, "cycle": cycle.number}
+            for curve, axis in _of_joint(cycle, joint, sd, cohort.zeroed_at_step_0, model, why):
+                curves.append({**curve, **key})
+                axes += [{**axis, **key}] if axis else []
+    made = origin("experiment", root, settings, cohort, [specimen], [read_mark(p) for p in fitted])
+    write(from_rows(LOAD_DISPLACEMENT.without("specimen"), curves), load_displacement, made)
+    write(from_rows(HELICAL_AXES.without("specimen"), axes), helical_axes, made)
+
+
+def _simulation(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    specimen: str,
+    tests: SpecimenTests,
+    others: tuple[ScopedEffect, ...],
+    representation: str | None,
+    frame: pd.DataFrame | None,
+) -> tuple[Simulation | None, str]:
+    """The fitted model under all tests, or why there is none."""
+    if representation is None or frame is None or not tests.tested:
+        return None, NO_FIT
+    if not frame["status"].isin(USABLE).all() or frame["stiffness"].isna().any():
+        return None, joined("the fit has no stiffness", str(frame["message"].iloc[0]))
+    start = start_stiffness(settings, cohort, representation)
+    k, bound = _fitted(cohort, start, frame)
+    motion = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    try:
+        problem = calibration_problem(
+            settings, cohort, specimen, representation, tests.frames, tests.tested, others
+        )
+        at = [(unknown.rows[0], unknown.column) for unknown in problem.free]
+        x = np.array([np.log(k[one] / start[one]) for one in at])
+        at_bound = np.array([bound[one] for one in at])
+        slopes = _slopes(problem, tests, x, cohort.zeroed_at_step_0)
+        root, held, reach = _covariance(settings, problem, x, at_bound)
+    except RefusedModel as error:
+        return None, str(error)
+    return Simulation(representation, motion, slopes, root, held, reach), ""
+
+
+def _fitted(cohort: Cohort, start: Array, frame: pd.DataFrame) -> tuple[Array, NDArray[np.int64]]:
+    """(J, 6) fitted stiffness, SI, and (J, 6) which is at a bound: -1 lower, 1 upper."""
+    k, bound = start.copy(), np.zeros(start.shape, dtype=np.int64)
+    sides = {"lower": -1, "no": 0, "upper": 1}
+    for row in frame.to_dict("records"):
+        at = cohort.joint_names.index(row["joint"]), COORDINATES.index(row["coordinate"])
+        k[at], bound[at] = row["stiffness"], sides[row["at_bound"]]
+    return k, bound
+
+
+def _slopes(problem: Problem, tests: SpecimenTests, x: Array, zeroed: bool) -> list[Array] | None:
+    """(T, J, 6, m) derivatives of the motion of each cycle by the unknowns; None without a pose."""
+    cases = [one.case for one in tests.tested]
+    (seen,) = AtRest(problem.model, cases, problem.free, problem.scale).solve([(0, x)])
+    return None if isinstance(seen, str) else [less_step_0(one, zeroed) for one in seen.by_x]
+
+
+def _covariance(
+    settings: CohortStiffness, problem: Problem, x: Array, at_bound: Array
+) -> tuple[Array, NDArray[np.bool_], float]:
+    """Root of the covariance of the unknowns that the data hold, which these are, and the reach."""
+    evaluator = Evaluator(problem)
+    found = uncertainty(
+        evaluator.problem, evaluator.at(x), at_bound, settings.identifiable_below, None
+    )
+    held = found.identifiable
+    values, vectors = eigh(found.covariance[np.ix_(held, held)]) if held.any() else (None, None)
+    if values is None or vectors is None:
+        return np.zeros((0, 0)), held, 0.0
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return root, held, float(stats.t.ppf(0.975, found.degrees_of_freedom))
+
+
+def _of_joint(
+    cycle: Cycle,
+    joint: int,
+    sd: MeasurementSd | None,
+    zeroed: bool,
+    model: Simulation | None,
+    why: str,
+) -> Iterator[tuple[Row, Row | None]]:
+    """Rows of the curve and of the axis, measured and simulated, of a joint that was read."""
+    measured = cycle.measured[:, joint]
+    if cycle.coordinate is None:
+        if np.isfinite(measured).any():
+            yield _refused(MEASURED, "", None, NO_MOMENT, Status.REFUSED), None
+        return
+    place = COORDINATES.index(cycle.coordinate)
+    known = np.isfinite(measured[:, place])
+    if not known.any():
+        return
+    told = TWO_ZEROS if zeroed and len(cycle.recordings) > 1 else ""
+    if known.sum() < 2:
+        told = joined(told, ONE_READING)
+        yield _refused(MEASURED, "", cycle.coordinate, told, Status.REFUSED), None
+        return
+    noise = None if sd is None else reading_noise(cycle.parts, 1.0, zeroed)
+    read = _Read(cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD)
+    spread = None if noise is None or read.sd is None else _scaled(noise, read.sd).at(known)
+    row = read.curve(measured, spread) | {"source": MEASURED, "representation": ""}
+    row["message"] = joined(row["message"], told, NO_SD if sd is None else "")
+    first, last = read.ends
+    root = None
+    if sd is not None and noise is not None:
+        root = noise_of_poses(sd.translation_mm, sd.rotation_deg, noise.root[[first, last]])
+    yield row, read.axis(measured, root, np.zeros((12, 0)), MEASURED, "")
+    yield _simulated(read, joint, model, why)
+
+
+def _scaled(noise: Spread, sd: float) -> Spread:
+    return Spread(sd * noise.root, noise.free, noise.reach)
+
+
+def _refused(
+    source: str, representation: str, coordinate: str | None, why: str, status: Status
+) -> Row:
+    """A row of a curve without numbers."""
+    return empty(LOAD_DISPLACEMENT) | {
+        "source": source,
+        "representation": representation,
+        "coordinate": coordinate,
+        "readings": 0,
+        "neutral_zone": NOT_READ,
+        "elastic_zone": NOWHERE,
+        "status": status.value,
+        "message": why,
+    }
+
+
+@dataclass(frozen=True)
+class _Read:
+    """Which steps of a cycle were read of one coordinate of a joint.
+
+    Attributes
+    ----------
+    place : of the coordinate. known : (T,). sd : rad, of one reading, if it is declared.
+    """
+
+    cycle: Cycle
+    place: int
+    known: NDArray[np.bool_]
+    sd: float | None
+
+    def loop(self, motion: Array) -> Loop:
+        """Moment and rotation of motion (T, 6) at the steps that were read."""
+        return Loop(self.cycle.load[self.known], motion[self.known, self.place])
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Steps of the least and of the largest moment that were read."""
+        steps, load = np.flatnonzero(self.known), self.cycle.load[self.known]
+        return int(steps[np.argmin(load)]), int(steps[np.argmax(load)])
+
+    def curve(self, motion: Array, spread: Spread | None) -> Row:
+        """Row of the curve of motion (T, 6), without its source."""
+        row = displacement_row(Seen(self.loop(motion), spread, self.sd))
+        ended = {"coordinate": self.cycle.coordinate, "status": Status.CONVERGED.value}
+        return row | ended
+
+    def axis(
+        self, motion: Array, root: Array | None, free: Array | None, source: str, name: str
+    ) -> Row:
+        """Row of the axis of motion (T, 6)."""
+        first, last = self.ends
+        row = axis_row(motion[first], motion[last], root, free)
+        loads = {"from_nm": float(self.cycle.load[first]), "to_nm": float(self.cycle.load[last])}
+        return row | loads | {"source": source, "representation": name}
+
+
+def _simulated(
+    read: _Read, joint: int, model: Simulation | None, why: str
+) -> tuple[Row, Row | None]:
+    """Rows of the model under the loads of the cycle, at the steps that were read."""
+    cycle = read.cycle
+    name = "" if model is None else model.representation
+    lost = Status.REFUSED, why
+    if model is not None:
+        ended = [model.motion[place] for place in cycle.places]
+        lost = next(((s, told) for one, s, told in ended if one is None), (Status.CONVERGED, ""))
+    if model is None or not lost[0].usable:
+        first, last = read.ends
+        nothing = empty(HELICAL_AXES) | {
+            "from_nm": float(cycle.load[first]),
+            "to_nm": float(cycle.load[last]),
+            "source": SIMULATED,
+            "representation": name,
+            "status": NO_POSE,
+            "message": lost[1],
+        }
+        return _refused(SIMULATED, name, cycle.coordinate, lost[1], lost[0]), nothing
+    motion = np.concatenate([one[:, joint] for one, _, _ in ended if one is not None])
+    if model.slopes is None:
+        row, axis = read.curve(motion, None), read.axis(motion, None, None, SIMULATED, name)
+    else:
+        by = cycle.of(model.slopes)[:, joint]
+        held, loose = by[..., model.held] @ model.root, by[..., ~model.held]
+        spread = Spread(held[:, read.place], loose[:, read.place], model.reach).at(read.known)
+        row = read.curve(motion, spread)
+        both = list(read.ends)
+        flat = (held[both].reshape(12, -1), loose[both].reshape(12, -1))
+        axis = read.axis(motion, *flat, SIMULATED, name)
+    return row | {"source": SIMULATED, "representation": name}, axis
