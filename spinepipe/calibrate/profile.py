@@ -28,6 +28,8 @@ from spinepipe.effects.contract import Array, Indices
 
 LEVEL = 0.95
 
+NORMAL_95 = float(norm.ppf(0.975))
+
 ENOUGH = Settled(cost=1e-6, step=1e-5, slope=1e-14, evaluations=30)
 """When the others have been fitted well enough for the rise to be known to a hundredth or so."""
 
@@ -173,15 +175,15 @@ def profile(
 
 
 def profile_in_turn(
-    best: Best, point: Point, asked: Sequence[int], level: float = LEVEL
+    best: Best, point: Point, asked: Sequence[int], limit: float = NORMAL_95
 ) -> Profile:
     """Region of some unknowns where residuals are in their own SDs; all else is left open.
 
     Parameters
     ----------
     point : residuals and Jacobian anywhere, None where there is no equilibrium.
+    limit : SDs that an unknown may be off; Student's t where the SD is that of the residuals.
     """
-    limit = float(norm.ppf(0.5 + level / 2.0))
     rises: list[_Rise | None] = [None] * len(best.x)
     for unknown in asked:
         left, _ = _not_made(best.jacobian, unknown, best.others(unknown))

@@ -429,7 +429,17 @@ def tuning_rows() -> Iterator[Row]:
                     "default": 1.0,
                     "unit": "",
                     "at_bound": bound,
+                    **_region_of(tier, bound),
                 }
+
+
+def _region_of(tier: str, bound: bool) -> Row:
+    """0.4 to 1.1, or 1.4 and more where the value is at its bound; none of tasks left out."""
+    names = ("low", "high", "open_below", "open_above", "identifiable")
+    if tier != "tuned":
+        return dict.fromkeys(names)
+    cells = (1.4, None, False, True, False) if bound else (0.4, 1.1, False, False, True)
+    return dict(zip(names, cells, strict=True))
 
 
 def sampled(size: Size) -> list[Held]:

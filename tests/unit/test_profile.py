@@ -113,6 +113,27 @@ def test_a_joint_too_stiff_for_its_readings_is_open_above() -> None:
     assert seen.low[0] < found.x[0]
 
 
+def test_from_its_upper_bound_the_lower_end_is_found() -> None:
+    """Readings that turn against the moments: the best 1 / k would be negative, the fit is at its
+    bound, and its lower end lies far below."""
+    theta = noisy(0, 1e6) - 1e-4 * MOMENTS_NM
+    size = float(MOMENTS_NM @ MOMENTS_NM)
+    u = float(MOMENTS_NM @ theta) / size
+    assert u < 0.0
+    problem = one_spring(theta, 9.0)
+    found = fit(problem, profiled=True)
+    seen = region(found)
+    at = compliances(problem, problem.upper)[0]
+    freedom = len(theta) - 1
+    scatter = np.sqrt(np.sum((theta - MOMENTS_NM * at) ** 2) / freedom)
+    way = stats.t.ppf(0.975, freedom) * scatter / np.sqrt(size)
+    end = u + np.hypot(at - u, way)  # the cost rises from what it is at the bound
+    assert found.at_bound.tolist() == [1]
+    assert (seen.open_below[0], seen.open_above[0]) == (False, True)
+    assert end > 50.0 * at
+    assert compliances(problem, seen.low)[0] == pytest.approx(end, abs=SLACK * way)
+
+
 def test_exact_readings_leave_no_room() -> None:
     """No scatter, no region: both ends are the fitted value."""
     seen = region(fit(one_spring(MOMENTS_NM / 60.0, 8.0), profiled=True))

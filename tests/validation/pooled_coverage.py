@@ -24,7 +24,7 @@ from tests.validation.made_by import made_by
 
 ROOT = Path(__file__).resolve().parents[2]
 CENTRE_ERRORS_MM = (0.0, 3.0)
-PHANTOMS = 50
+PHANTOMS = 25
 Z = 1.959963984540054
 STUDY = CohortStiffness(study="pooled_coverage", kind="cohort_stiffness", cohort="phantom")
 

@@ -178,7 +178,8 @@ def tuned(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     own = rows[rows["tier"] == "tuned"].to_dict("records")
     told = [
         f"{factor(row['parameter'])} {number(row['value'])}{_unit(row)} instead of "
-        f"{number(row['default'])}" + (", at the end of its range" if row["at_bound"] else "")
+        f"{number(row['default'])}{_ends(row)}"
+        + (", at the end of its range" if row["at_bound"] else "")
         for row in own
     ]
     if told:
@@ -186,6 +187,32 @@ def tuned(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
             row["at_bound"] for row in own
         )
         yield f"Fitted to measured pressures: {'; '.join(told)}.{bound}"
+    open_ones = [
+        factor(row["parameter"])
+        for row in own
+        if pd.notna(row["identifiable"]) and not row["identifiable"]
+    ]
+    if open_ones:
+        yield (
+            f"Measured pressures do not tell {listed(open_ones)}: its region is open, so the "
+            "fitted value is a number of the fit and nothing known of the volunteer."
+            if len(open_ones) == 1
+            else f"Measured pressures tell neither {' nor '.join(open_ones)}: their regions are "
+            "open, so the fitted values are numbers of the fit and nothing known of the volunteer."
+        )
+
+
+def _ends(row: dict[Any, Any]) -> str:
+    """Region of a fitted number in words, where one was looked for."""
+    if pd.isna(row["open_below"]):
+        return ""
+    if row["open_below"] and row["open_above"]:
+        return " (open on both sides)"
+    if row["open_above"]:
+        return f" ({number(row['low'], 2)} or more)"
+    if row["open_below"]:
+        return f" ({number(row['high'], 2)} or less)"
+    return f" ({number(row['low'], 2)} to {number(row['high'], 2)})"
 
 
 def _unit(row: dict[Any, Any]) -> str:

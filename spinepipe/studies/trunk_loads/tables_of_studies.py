@@ -67,6 +67,12 @@ PRESSURES = Table(
     ),
 )
 
+REGION = ("low", "high", "open_below", "open_above", "identifiable")
+"""Columns of how far a fitted number may go."""
+
+_UNASKED = "not looked for: a task is left out, or errors tell no scatter"
+_OPEN = f"open, or {_UNASKED}"
+
 TUNING = Table(
     "tuning",
     "Numbers fitted to measured pressures: one row per tier, task left out and number.",
@@ -80,6 +86,17 @@ TUNING = Table(
         Column("default", "number", "its value untuned"),
         Column("unit", "text", "unit"),
         Column("at_bound", "flag", "whether it stands at the end of its range"),
+        Column(
+            "low",
+            "number",
+            "lower end of its 95 % region: the other number is fitted anew, one scatter for all "
+            "errors (profile likelihood)",
+            null=_OPEN,
+        ),
+        Column("high", "number", "upper end of it", null=_OPEN),
+        Column("open_below", "flag", "whether pressures allow all its range below", null=_UNASKED),
+        Column("open_above", "flag", "the same above", null=_UNASKED),
+        Column("identifiable", "flag", "whether pressures tell both ends", null=_UNASKED),
     ),
 )
 

@@ -7,8 +7,11 @@ from itertools import product
 from math import atanh, inf, sqrt, tanh
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
 
-from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.descent import Point, Settled, descend, once
+from spinepipe.calibrate.profile import LEVEL, Best, Profile, profile_in_turn
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
@@ -33,7 +36,7 @@ from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
-from spinepipe.studies.trunk_loads.tables_of_studies import AGREEMENT, PRESSURES, TUNING
+from spinepipe.studies.trunk_loads.tables_of_studies import AGREEMENT, PRESSURES, REGION, TUNING
 from spinepipe.tables import from_rows, write
 
 RANGE = {
@@ -165,7 +168,9 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     progress.round("fitting all counted tasks")
     best, bound = fitted_widely(who, tuned, counted)
     tiers = {"untuned": who.computed({}), "tuned": who.computed(_named(tuned, best))}
-    tuning = list(_tuning("tuned", "", tuned, best, bound))
+    progress.round("how far each number may go")
+    told = regions(who, tuned, counted, best)
+    tuning = list(_tuning("tuned", "", tuned, best, bound, told))
     without: dict[str, Computed] = {}
     for one in progress.through(counted, "tasks left out"):
         rest = [other for other in counted if other is not one]
@@ -184,7 +189,7 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
 
 def fitted_widely(
     who: Volunteer, names: Sequence[str], counted: Sequence[Beside]
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.bool_]]:
     """As `fitted`, from what is nominal and from a step off it in all directions.
 
     Pressures jump where a muscle comes to its end and others take over: one descent stops there.
@@ -200,9 +205,51 @@ def fitted_widely(
 
 def fitted(
     who: Volunteer, names: Sequence[str], counted: Sequence[Beside], start: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.bool_]]:
     """Values (P,) of the named numbers with the least squares of errors, and whether at a bound."""
+    low, high, step = _ranges(names)
+    start = np.clip(start, low, high)
+    if not len(counted) or who.errors(_named(names, start), counted) is None:
+        return start, np.zeros(len(names), dtype=bool)
+    point = once(_errors(who, names, counted))
+    found = descend(point, start, (low, high), step, len(counted), SETTLED).x
+    return found, (found - low < 1e-3 * step) | (high - found < 1e-3 * step)
+
+
+def regions(
+    who: Volunteer, names: Sequence[str], counted: Sequence[Beside], best: Array
+) -> Profile | None:
+    """How far each fitted number may go by what the others leave, with one scatter of all errors.
+
+    None where errors tell no scatter: no task is left over, or all are met.
+    """
+    found = _errors(who, names, counted)(best) if len(names) else None
+    freedom = len(counted) - len(names)
+    if found is None or freedom <= 0 or not found[0].any():
+        return None
+    scatter = sqrt(float(found[0] @ found[0]) / freedom)
+    errors = _errors(who, names, counted)
+
+    def point(x: Array) -> tuple[Array, Array] | None:
+        here = errors(x)
+        return None if here is None else (here[0] / scatter, here[1] / scatter)
+
+    low, high, step = _ranges(names)
+    straight = np.zeros(len(names), dtype=bool)
+    at = Best(best, found[0] / scatter, found[1] / scatter, low, high, step, straight, SETTLED)
+    limit = float(t.ppf(0.5 + 0.5 * LEVEL, freedom))
+    return profile_in_turn(at, once(point), range(len(names)), limit)
+
+
+def _ranges(names: Sequence[str]) -> tuple[Array, Array, Array]:
+    """(P,) each: lowest, highest, size of a first step."""
     low, high, step = (np.array([RANGE[name][k] for name in names]) for k in range(3))
+    return low, high, step
+
+
+def _errors(who: Volunteer, names: Sequence[str], counted: Sequence[Beside]) -> Point:
+    """Errors of the counted tasks, MPa, and their slopes by the named numbers."""
+    _, high, step = _ranges(names)
 
     def errors(x: Array) -> Array | None:
         return who.errors(_named(names, x), counted)
@@ -221,11 +268,7 @@ def fitted(
             )
         return here, np.stack(columns, axis=1)
 
-    start = np.clip(start, low, high)
-    if not len(counted) or errors(start) is None:
-        return start, np.zeros(len(names), dtype=bool)
-    found = descend(once(point), start, (low, high), step, len(counted), SETTLED).x
-    return found, (found - low < 1e-3 * step) | (high - found < 1e-3 * step)
+    return point
 
 
 def _named(names: Sequence[str], x: Array) -> dict[str, float]:
@@ -233,9 +276,16 @@ def _named(names: Sequence[str], x: Array) -> dict[str, float]:
 
 
 def _tuning(
-    tier: str, left_out: str, names: Sequence[str], x: Array, bound: Array
+    tier: str,
+    left_out: str,
+    names: Sequence[str],
+    x: Array,
+    bound: NDArray[np.bool_],
+    told: Profile | None = None,
 ) -> Iterator[Row]:
-    for name, value, at_bound in zip(names, x.tolist(), bound.tolist(), strict=True):
+    for k, (name, value, at_bound) in enumerate(
+        zip(names, x.tolist(), bound.tolist(), strict=True)
+    ):
         yield {
             "tier": tier,
             "left_out": left_out,
@@ -244,7 +294,18 @@ def _tuning(
             "default": NOMINAL[name],
             "unit": RANGE[name][3],
             "at_bound": bool(at_bound),
+            **_region(told, k),
         }
+
+
+def _region(told: Profile | None, k: int) -> Row:
+    """Cells of a number's region; an open end is none."""
+    if told is None:
+        return dict.fromkeys(REGION)
+    below, above = bool(told.open_below[k]), bool(told.open_above[k])
+    low, high = None if below else float(told.low[k]), None if above else float(told.high[k])
+    cells = (low, high, below, above, bool(told.closed[k]))
+    return dict(zip(REGION, cells, strict=True))
 
 
 def _rows(who: Volunteer, tier: str, found: Mapping[str, Computed]) -> Iterator[Row]:

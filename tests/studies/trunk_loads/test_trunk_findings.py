@@ -149,10 +149,26 @@ def test_pressures_that_do_not_count_and_unsettled_ones_are_told() -> None:
 
 def test_fitted_numbers_and_their_bounds_are_told() -> None:
     found = told(ONE)
-    assert "area of the disc 2.00 instead of 1.00, at the end of its range." in found
+    assert "area of the disc 2.00 instead of 1.00 (1.4 or more), at the end of its range." in found
     assert "is no finding" in found
     rows = tables_of(ONE)["tuning"].assign(at_bound=False)
     assert "end of its range" not in told(ONE, tuning=rows)
+
+
+def test_fitted_numbers_that_pressures_leave_open_are_nothing_known() -> None:
+    found = told(ONE)
+    assert "0.700 instead of 1.00 (0.40 to 1.1)" in found
+    assert "Measured pressures do not tell area of the disc: its region is open" in found
+    rows = tables_of(ONE)["tuning"]
+    tuned = rows["tier"] == "tuned"
+    shut = rows.assign(open_above=False, identifiable=True)
+    assert "Measured pressures do not tell" not in told(ONE, tuning=shut)
+    rows.loc[tuned, ["open_below", "open_above"]] = True
+    rows.loc[tuned, "identifiable"] = False
+    both = told(ONE, tuning=rows)
+    assert "(open on both sides)" in both
+    assert "pressures tell neither " in both
+    assert "nothing known of the volunteer" in both
 
 
 def test_tasks_are_told_by_how_they_ended() -> None:

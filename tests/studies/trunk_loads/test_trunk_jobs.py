@@ -113,6 +113,41 @@ def test_numbers_that_made_the_pressures_are_found_again() -> None:
     np.testing.assert_allclose(found, list(hidden.values()), atol=0.02)
 
 
+class Straight:
+    """A volunteer whose errors (6,) MPa grow evenly with two numbers."""
+
+    def __init__(self, slopes: np.ndarray, at_zero: np.ndarray) -> None:
+        self.slopes, self.at_zero = slopes, at_zero
+
+    def errors(self, values: Mapping[str, float], wanted: object) -> np.ndarray:
+        return self.slopes @ np.array(list(values.values())) + self.at_zero
+
+
+def test_a_fitted_number_goes_as_far_as_the_errors_of_a_straight_line_allow() -> None:
+    """Least squares' own t intervals; a number that moves no pressure is open on both sides."""
+    rng, names = np.random.default_rng(1), ("passive_rotation", "disc_area")
+    slopes = np.column_stack([np.linspace(-1.0, 1.0, 6), np.linspace(0.2, 1.0, 6) ** 2])
+    at_zero = -slopes @ [1.0, 1.1] + 0.02 * rng.normal(size=6)
+    best = np.linalg.lstsq(slopes, -at_zero, rcond=None)[0]
+    line: Any = Straight(slopes, at_zero)
+    tasks: Any = [None] * 6
+    found = tune.regions(line, names, tasks, best)
+    assert found is not None
+    assert found.closed.all()
+    left = slopes @ best + at_zero
+    sds = np.sqrt(left @ left / 4.0 * np.diag(np.linalg.inv(slopes.T @ slopes)))
+    reach = 2.776445 * sds  # Student's t of 4 degrees of freedom, 97.5 %
+    np.testing.assert_allclose(found.high - best, reach, rtol=0.03)
+    np.testing.assert_allclose(best - found.low, reach, rtol=0.03)
+    slopes[:, 1] = 0.0
+    best = np.array([np.linalg.lstsq(slopes[:, :1], -at_zero, rcond=None)[0][0], 1.0])
+    blind: Any = Straight(slopes, at_zero)
+    found = tune.regions(blind, names, tasks, best)
+    assert found is not None
+    assert (found.open_below[1], found.open_above[1]) == (True, True)
+    assert tune.regions(line, names, tasks[:2], best) is None
+
+
 def additive(weights: Mapping[str, float]) -> pd.DataFrame:
     """Answers that add up their inputs, standardised: shares of variance are weights squared."""
     design = design_of(ASKED)
