@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.studies.global_sensitivity.failed import Ends, failed_rows, of_runs, rows_of
+from spinepipe.status import Status
+from spinepipe.studies.global_sensitivity.failed import WAYS, Ends, failed_rows, of_runs, rows_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.soundness import doubts
 from spinepipe.studies.global_sensitivity.tables import FAILED_RUNS, RESPONSES
@@ -23,7 +24,7 @@ def drawn(method: str, seed: int = 1) -> Design:
 
 
 def ended(failed: "np.ndarray[tuple[int], np.dtype[np.bool_]]", how: str = "unstable") -> Ends:
-    return np.where(failed, how, "converged").astype(object)
+    return np.where(failed, WAYS.index(Status(how)), WAYS.index(Status.CONVERGED)).astype(np.int32)
 
 
 def rows(design: Design, how: Ends) -> pd.DataFrame:
@@ -107,18 +108,19 @@ def test_a_run_counts_once_however_many_steps_and_joints_it_has(tmp_path: Path) 
     path = str(tmp_path / "block.parquet")
     write(from_rows(RESPONSES.without("specimen"), made), path, {})
     found = of_runs([path])
-    assert found["push"].tolist() == ["converged"] * 3
-    assert found["pull"].tolist() == ["converged", "unstable", "converged"]
+    told = {test: [WAYS[way] for way in ways] for test, ways in found.items()}
+    assert told["push"] == ["converged"] * 3
+    assert told["pull"] == ["converged", "unstable", "converged"]
     design = draw("latin_hypercube", FACTORS, 3, 1)
-    told = list(failed_rows(design, design.unit, UNITS, [path], []))
-    assert [(row["test"], row["failed"]) for row in told] == [("push", 0)] * 3 + [("pull", 1)] * 3
+    rows_ = failed_rows(design, design.unit, UNITS, [path], [])
+    assert [(row["test"], row["failed"]) for row in rows_] == [("push", 0)] * 3 + [("pull", 1)] * 3
 
 
 def test_the_sentence_has_the_numbers_of_the_table() -> None:
     design = drawn("sobol")
     failed = (design.unit[:, 0] < 0.3) & (design.unit[:, 1] > 0.6)
     how = ended(failed)
-    how[np.flatnonzero(failed)[:2]] = "not_converged"
+    how[np.flatnonzero(failed)[:2]] = WAYS.index(Status.NOT_CONVERGED)
     table = rows(design, how).reset_index()
     n = int(failed.sum())
     (words,) = said(table)
