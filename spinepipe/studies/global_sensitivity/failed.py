@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.stats import binom
@@ -16,7 +17,7 @@ from scipy.stats import binom
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.indices import kept
-from spinepipe.status import USABLE, Status
+from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.tables import EVERY
 
 THIRDS = ("low", "middle", "high")
@@ -27,14 +28,20 @@ SURE = 0.05
 
 MOSTLY = 0.5
 
+WAYS = tuple(Status)
+"""How a run may end, in the order of their numbers here."""
+
 _AS = {
-    Status.UNSTABLE.value: "tipped",
-    Status.NOT_CONVERGED.value: "not_converged",
-    Status.REFUSED.value: "refused",
+    Status.UNSTABLE: "tipped",
+    Status.NOT_CONVERGED: "not_converged",
+    Status.REFUSED: "refused",
 }
 """How a run failed."""
 
-Ends = NDArray[np.object_]
+_USABLE = np.array([way.usable for way in WAYS])
+
+Ends = NDArray[np.int32]
+"""(n,) place of each run's end among `WAYS`."""
 
 
 def failed_rows(
@@ -53,7 +60,7 @@ def failed_rows(
     """
     ended = dict(of_runs(responses))
     if calibrated:
-        ended[EVERY] = _read(calibrated, ["status"])["status"].to_numpy(zero_copy_only=False)
+        ended[EVERY] = _ways(_read(calibrated, ["status"]))
     for test, how in ended.items():
         for row in rows_of(design, values, units, how):
             yield {"test": test, **row}
@@ -62,15 +69,21 @@ def failed_rows(
 def of_runs(blocks: Sequence[str]) -> Mapping[str, Ends]:
     """How each sample ended in each test: the first load step that failed, else the last."""
     rows = _read(blocks, ["sample", "test", "status"])
-    samples, tests = rows["sample"].to_numpy(), rows["test"].to_numpy(zero_copy_only=False)
-    status = rows["status"].to_numpy(zero_copy_only=False)
-    first = tests[samples == samples[0]]
+    head = rows.filter(pc.equal(rows["sample"], rows["sample"][0]))["test"].to_pylist()
+    ended = _ways(rows).reshape(-1, len(head))
     found = {}
-    for test in dict.fromkeys(first.tolist()):
-        each = status[tests == test].reshape(-1, int((first == test).sum()))
-        bad = ~np.isin(each, USABLE)
+    for test in dict.fromkeys(head):
+        each = ended[:, [at for at, name in enumerate(head) if name == test]]
+        bad = ~_USABLE[each]
         found[test] = each[np.arange(len(each)), np.where(bad.any(1), bad.argmax(1), -1)]
     return found
+
+
+def _ways(rows: pa.Table) -> Ends:
+    """(n,) how each row ended."""
+    known = pa.array([way.value for way in WAYS])
+    ways: Ends = pc.index_in(rows["status"], value_set=known).to_numpy()
+    return ways
 
 
 def rows_of(
@@ -80,10 +93,10 @@ def rows_of(
 
     Parameters
     ----------
-    values : (n, D). ended : (n,) status of each run.
+    values : (n, D).
     """
-    failed = ~np.isin(ended, USABLE)
-    counts = {name: int((ended == status).sum()) for status, name in _AS.items()}
+    failed = ~_USABLE[ended]
+    counts = {name: int((ended == WAYS.index(way)).sum()) for way, name in _AS.items()}
     out = int((~kept(design, ~failed).rows).sum())
     common = {"runs": design.n, "failed": int(failed.sum()), **counts, "left_out": out}
     for column, factor in enumerate(design.factors):

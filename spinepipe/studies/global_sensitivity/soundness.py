@@ -251,7 +251,7 @@ def _where(part: pd.DataFrame) -> str:
         column, which = _THIRD[row["mostly"]]
         n, of = int(row[column]), int(row["failed"])
         told.append(f"{n} of {of} in the {which} third of {plain(row['factor'])}")
-    return f"{listed(told, MOST)}, whose effect is then understated"
+    return f"{listed(told, MOST)}, whose effect may then be understated"
 
 
 def _names(column: pd.Series) -> str:

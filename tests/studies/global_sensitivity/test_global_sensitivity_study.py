@@ -106,7 +106,7 @@ def test_what_is_left_out_has_defaults(tmp_path: Path) -> None:
     )
     assert (study.bootstraps, study.confidence, study.most_failed) == (1000, 0.95, 0.2)
     # Gould 2024b, table 2, uniform: 51 N m/rad in flexion-extension
-    assert study.stiffness.extension_nm_per_rad == 51.0
+    assert study.start_stiffness.extension_nm_per_rad == 51.0
 
 
 def test_the_dummy_is_last_and_can_be_left_out(tmp_path: Path) -> None:
@@ -220,6 +220,12 @@ CASES = [
     Case("unknown test", None, "tests: [flexon]", 17, "tests.0", "did you mean 'flexion'?"),
     Case("unknown specimen", None, "specimens: [a, c]", 17, "specimens.1", "unknown specimen 'c'"),
     Case("unknown level", None, "level_stiffness: {L4L5: {extension_nm_per_rad: 1, right_bending_nm_per_rad: 1, left_rotation_nm_per_rad: 1}}", 17, "level_stiffness.L4L5", "unknown joint 'L4L5'"),
+    Case("word for a stiffness", None, "stiffness: fited", 17, "stiffness", "did you mean 'fitted'?"),
+    Case("list for a stiffness", None, "stiffness: [1]", 17, "stiffness", "a valid dictionary"),
+    Case("unknown key of stiffness", None, "stiffness: {extensoin_nm_per_rad: 20}", 17, "stiffness.extensoin_nm_per_rad", "did you mean 'extension_nm_per_rad'?"),
+    Case("stiffness of zero", None, "stiffness: {extension_nm_per_rad: 0}", 17, "stiffness.extension_nm_per_rad", "greater than or equal to 0.0001"),
+    Case("levels beside fitted", None, "stiffness: fitted\nlevel_stiffness: {L3L4: {extension_nm_per_rad: 1, right_bending_nm_per_rad: 1, left_rotation_nm_per_rad: 1}}", 18, "level_stiffness", "which all joints of a specimen share"),
+    Case("unknown key of a start", None, "calibration: {start: {extension: 20}}", 17, "calibration.start.extension", "did you mean 'extension_nm_per_rad'?"),
     Case("unknown joint", "joints: [L3L4]", "joints: [L3L4, L4L5]", 6, "factors.0.joints.1", "unknown joint 'L4L5'"),
     Case("unknown vertebra", "vertebra: L3, landmark: left", "vertebra: L9, landmark: left", 7, "factors.1.vertebra", "one of L4, L3, L2"),
     Case("unknown landmark", "landmark: left_pedicle_base", "landmark: left_pedicl", 7, "factors.1.landmark", "did you mean 'left_pedicle_base'?"),
@@ -332,6 +338,19 @@ def test_a_specimen_without_a_load_in_the_chosen_tests(tmp_path: Path) -> None:
     (problem,) = complaints(tmp_path / "both", study, *changes, *unread)
     assert (problem.column, "specimen 'b'" in problem.found) == ("tests", True)
     sound(tmp_path / "one", study + "specimens: [a]\n", *changes, *unread)
+
+
+def test_fitted_stiffness_needs_motion(tmp_path: Path) -> None:
+    study = only(FIRST, POINT) + "stiffness: fitted\n"
+    (problem,) = complaints(tmp_path, study, without("motion.csv"))
+    assert (problem.row, problem.column) == (8, "stiffness")
+    assert "give `stiffness` as a mapping" in str(problem)
+    other = sound(tmp_path / "with", study)
+    assert other.is_fitted
+    assert other.start_stiffness.in_order()[3] == 51.0
+    given = sound(tmp_path / "given", only(FIRST, POINT) + "stiffness: {extension_nm_per_rad: 20}")
+    assert not given.is_fitted
+    assert given.start_stiffness.in_order()[3] == 20.0
 
 
 def test_calibrated_stiffness_needs_motion(tmp_path: Path) -> None:

@@ -245,6 +245,11 @@ def labels(axis: Axes) -> list[str]:
     return [label.get_text() for label in axis.get_yticklabels()][::-1]
 
 
+def name_colors(axis: Axes) -> dict[str, Any]:
+    """Colour of each row's name."""
+    return {label.get_text(): label.get_color() for label in axis.get_yticklabels()}
+
+
 def test_a_bar_for_each_index_of_each_factor_in_order(cohort: Cohort) -> None:
     figure = drawn("factor_indices", cohort, indices=indices())
     assert len(titles(figure)) == 12, "2 outputs x 2 tests x 3 joints"
@@ -290,6 +295,27 @@ def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> N
     assert "grey names: negligible in every panel" in said(sobol)
     bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1]))
     assert "no dummy, so no noise floor" in said(bare)
+
+
+def test_what_is_negligible_is_grey_beside_its_line(cohort: Cohort) -> None:
+    """Mass has an ST of 0.2 %: its name is black while its interval reaches over 1 %."""
+    wide = drawn("factor_indices", cohort, indices=indices()).axes[0]
+    assert [0.01, 0.01] in [list(x_of(line)) for line in wide.lines]
+    assert name_colors(wide)["mass"] == "#000000"
+    assert name_colors(wide)["damping"] == "#767676"
+    narrow = indices()
+    of_mass = narrow["factor"].eq("mass") & narrow["index"].eq("ST")
+    narrow.loc[of_mass, ["ci_high", "negligible"]] = [0.004, True]
+    axis = drawn("factor_indices", cohort, indices=narrow).axes[0]
+    assert name_colors(axis)["mass"] == "#767676"
+
+
+def test_panels_that_lack_failed_runs_have_a_dagger(cohort: Cohort) -> None:
+    figure = drawn("factor_indices", cohort, indices=indices(failed=3))
+    assert all("\u2020\n" in title for title in titles(figure))
+    assert "3 failed; \u2020: indices of inputs at which runs stand" in said(figure)
+    whole = drawn("factor_indices", cohort, indices=indices())
+    assert not any("\u2020" in title for title in titles(whole))
 
 
 def test_effects_have_the_unit_of_their_output(cohort: Cohort) -> None:
@@ -405,6 +431,12 @@ def test_runs_over_the_leading_factors(cohort: Cohort) -> None:
     dots = first[0].lines[0]
     assert len(x_of(dots)) == 595, "5 of 600 runs have no equilibrium"
     assert "595 runs with an equilibrium" in said(figure)
+    assert "5 runs without" in said(figure)
+    (crosses,) = [line for line in first[0].lines if line.get_marker() == "x"]
+    lost = design[design["factor"].eq("load_size") & design["sample"].lt(5)]["value"]
+    assert sorted(x_of(crosses)) == sorted(lost), "of the samples that failed, at their values"
+    none = top_factors(cohort, *runs(lost=0), indices())
+    assert not [line for line in none.axes[0].lines if line.get_marker() == "x"]
 
 
 def test_a_group_is_shown_by_the_member_that_the_output_follows(cohort: Cohort) -> None:
@@ -464,6 +496,8 @@ def test_the_sentence_of_an_output_has_its_numbers(cohort: Cohort) -> None:
     assert "hardly any interaction" in words
     assert "overlap" not in words
     assert "Not above the dummy: mass and damping." in words
+    assert "Negligible (interval below 1 % at every joint): damping." in words
+    assert "Small, but not shown to be negligible: mass." in words
     effects = told(cohort, indices("morris"), place=2)
     assert "load size 4.00 N m [3.97 to 4.03 N m]" in effects
     pawn = told(cohort, indices("latin_hypercube"))
