@@ -292,17 +292,34 @@ def test_lowering_of_the_load_by_hand() -> None:
 
 
 def test_reasons_name_the_landmark_sd_from_the_table() -> None:
-    """The range grows by 3.8 deg per mm: the printed 8.44 deg stand for 2.2 mm."""
+    """The range grows by 3.8 deg per mm, give or take a tenth: 8.44 deg stand for 2.2 mm."""
     name = "joint_orientation.complete.L1L2.extension.iqr"
     at = {"joint": "L1L2", "quantity": "orientation", "coordinate": "extension"}
-    spread = pd.DataFrame([{**at, "sd_mm": sd, "iqr": 3.8 * sd} for sd in (1.0, 2.0, 4.0)])
+    ends = {"iqr_low": 0.9, "iqr": 1.0, "iqr_high": 1.1}
+    spread = pd.DataFrame(
+        [
+            {**at, "sd_mm": sd, **{end: 3.8 * sd * share for end, share in ends.items()}}
+            for sd in (1.0, 2.0, 4.0)
+        ]
+    )
     where = {"part": "poses", "loading": "equilibrium", "dataset": "all"}
     summary = pd.DataFrame([{**at, **where, "iqr": 3.8}])
     landmarks = pd.DataFrame({"sd_mm": [1.0, 1.0]})
     tables = {"spread_over_landmark_sd": spread, "summary": summary, "landmarks": landmarks}
     found = claim(name, tables)
     assert found["verdict"] == "outside"
-    assert "a landmark SD of 2.2 mm per axis gives 8.44, the study's is 1 mm" in found["reason"]
+    told = "a landmark SD of 2.2 mm per axis (2.0 to 2.5) gives 8.44, the study's is 1 mm"
+    assert told in found["reason"]
+    assert "origins" not in found["reason"]
+    origins = [
+        {**one, "joint": joint, "quantity": "origin", "coordinate": way, "iqr": one["sd_mm"]}
+        for one in spread.to_dict("records")
+        for joint in ("L1L2", "L2L3", "L3L4")
+        for way in ("anterior", "superior", "right")
+    ]
+    whole = pd.concat([spread, pd.DataFrame(origins)])
+    both = claim(name, tables | {"spread_over_landmark_sd": whole})
+    assert "origins then scatter by up to 2.2 mm, printed are 1.04 at most" in both["reason"]
     narrow = tables | {"spread_over_landmark_sd": spread[spread["sd_mm"] < 2.0]}
     assert "even a landmark SD of 1 mm per axis gives 3.8 only" in claim(name, narrow)["reason"]
     assert "landmark SD of" not in claim(name, {"summary": summary})["reason"]

@@ -5,13 +5,18 @@ the assumption would have to be for the printed number, read off fits and frames
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.comparison.claim import Claim, NotComputed, Ours, Range, Run
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import PAPER, STIFFNESS_KEY
-from spinepipe.units import STIFFNESS_UNITS
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
+    JOINTS,
+    PAPER,
+    STIFFNESS_KEY,
+)
+from spinepipe.units import STIFFNESS_UNITS, TRANSLATIONS
 
 FLEXION = STIFFNESS_KEY["extension"]
 
@@ -52,36 +57,68 @@ def with_sd(
 
 
 def _sd(run: Run, printed: float, cells: tuple[Cell, ...]) -> str:
-    """``ours: with a landmark SD of 2.2 mm per axis ...``; nothing without the table."""
+    """``ours: a landmark SD of 2.2 mm (2.0 to 2.5) per axis ...``; nothing without the table."""
     try:
-        sds, ranges = spreads(run, cells)
+        found = spreads(run, cells)
     except NotComputed:
         return ""
-    if printed > ranges[-1]:
-        return f"ours: even a landmark SD of {sds[-1]:g} mm per axis gives {ranges[-1]:.3g} only"
-    sd = float(np.interp(printed, np.r_[0.0, ranges], np.r_[0.0, sds]))
-    return f"ours: a landmark SD of {sd:.2g} mm per axis gives {printed:g}{_own_sd(run)}"
+    if printed > found.iqr[-1]:
+        least = (
+            f"even a landmark SD of {found.sds[-1]:g} mm per axis gives {found.iqr[-1]:.3g} only"
+        )
+        return f"ours: {least}"
+    sd = _at(printed, found.iqr, found.sds)
+    ends = " to ".join(f"{_at(printed, end, found.sds):.1f}" for end in (found.high, found.low))
+    then = _origins_then(run, sd) if cells[0][1] == "orientation" else ""
+    gives = f"ours: a landmark SD of {sd:.1f} mm per axis ({ends}) gives {printed:g}"
+    return f"{gives}{_own_sd(run)}{then}"
 
 
-def spreads(run: Run, cells: Iterable[Cell]) -> tuple[np.ndarray, np.ndarray]:
-    """Landmark SDs, mm, rising, and the largest interquartile range of the cells at each.
+def _at(x: float, xs: np.ndarray, ys: np.ndarray) -> float:
+    """Straight between points and from 0, 0."""
+    return float(np.interp(x, np.r_[0.0, xs], np.r_[0.0, ys]))
+
+
+def _origins_then(run: Run, sd: float) -> str:
+    """How far origins would scatter with the SD that an orientation asks for."""
+    printed = PAPER["joint_origin"]["complete"]
+    largest = max(float(iqr) for joint in JOINTS for iqr in printed[joint]["iqr"].values())
+    try:
+        found = spreads(run, [(j, "origin", name) for j in JOINTS for name in TRANSLATIONS])
+    except NotComputed:
+        return ""
+    then = _at(sd, found.sds, found.iqr)
+    return f"; origins then scatter by up to {then:.1f} mm, printed are {largest:g} at most"
+
+
+@dataclass(frozen=True)
+class Spreads:
+    """Landmark SDs, mm, rising; at each the largest interquartile range of some cells, its ends."""
+
+    sds: np.ndarray
+    iqr: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def spreads(run: Run, cells: Iterable[Cell]) -> Spreads:
+    """The ranges of these cells, the largest of them at each SD.
 
     Raises
     ------
     NotComputed
         Where the run has no such table.
     """
-    sds: np.ndarray = np.zeros(0)
-    ranges = []
+    parts = []
     for joint, quantity, name in cells:
         where = {"joint": joint, "quantity": quantity, "coordinate": name}
-        rows = run.rows("spread_over_landmark_sd", **where).dropna(subset=["iqr"])
-        if rows.empty:
-            raise NotComputed("no landmark set defines a frame")
-        rows = rows.sort_values("sd_mm")
-        sds = rows["sd_mm"].to_numpy(float)
-        ranges.append(rows["iqr"].to_numpy(float))
-    return sds, np.maximum.accumulate(np.max(ranges, axis=0))
+        parts.append(run.rows("spread_over_landmark_sd", **where))
+    known = pd.concat(parts).dropna(subset=["iqr"])
+    if known.empty:
+        raise NotComputed("no landmark set defines a frame")
+    largest = known.groupby("sd_mm")[["iqr", "iqr_low", "iqr_high"]].max().cummax()
+    columns = (largest[name].to_numpy(float) for name in largest)
+    return Spreads(largest.index.to_numpy(float), *columns)
 
 
 def _own_sd(run: Run) -> str:
