@@ -4,6 +4,7 @@ import pandas as pd
 
 from spinepipe.comparison.claim import Run, judged
 from spinepipe.jobs.digest import provenance
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.assumed import claims_of_load_point
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.best_models import (
     claims_of_best_model,
     claims_of_ten_best,
@@ -55,6 +56,7 @@ CLAIMS = (
     *claims_of_datasets(),
     *claims_of_precision(),
     *claims_of_closed_forms(),
+    *claims_of_load_point(),
 )
 """All claims of the paper (doi 10.3389/fbioe.2024.1304334), in its order."""
 

@@ -16,6 +16,7 @@ from spinepipe.comparison.claim import (
     half_width,
     normal_iqr,
 )
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.assumed import with_sd
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a.paper import (
     JOINTS,
     MOTION_KEY,
@@ -48,10 +49,10 @@ _FRAME_RULE = (
     "the paper's construction of frames (A21)"
 )
 
-_NO_SD = "landmark SDs per landmark and axis are not published"
+_NO_SD = "the landmarks' SD decides it, and none per landmark and axis is published"
 _SCATTER = {
     "origin": f"{_NO_SD}; closed_form.origin_iqr has what this study's SD gives",
-    "orientation": f"{_NO_SD}, and neither is the construction of frames (A21)",
+    "orientation": f"{_NO_SD}, nor the construction of frames (A21)",
 }
 
 _CHOSEN = "circular: the cohort's own landmark SD and pedicles were chosen for it"
@@ -101,7 +102,7 @@ def _coordinate(quantity: str, table: str, dataset: str, joint: str, name: str) 
         unit,
         iqr,
         normal_iqr(iqr, n),
-        summary_cell("iqr", **where),
+        with_sd(summary_cell("iqr", **where), iqr, [(joint, quantity, name)]),
         _spread(quantity, dataset),
         _CHOSEN if _chosen(quantity, joint, name) else "",
         _copied(quantity, dataset, joint, name),
@@ -225,7 +226,11 @@ def _bounds() -> Iterator[Claim]:
             unit,
             value,
             at_most(value),
-            _largest_iqr(quantity, names),
+            with_sd(
+                _largest_iqr(quantity, names),
+                value,
+                [(joint, quantity, name) for joint, name in product(JOINTS, names)],
+            ),
             _NO_SDS,
         )
 
