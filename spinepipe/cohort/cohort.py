@@ -62,6 +62,11 @@ class CohortHeader(BaseModel):
     source: str = Field(
         min_length=1, description="citation, how the numbers were obtained, licence"
     )
+    made_up: bool = Field(
+        default=False,
+        description="true: nobody was measured; what was put in comes out again, and findings say "
+        "that it is no evidence",
+    )
     vertebrae: tuple[VertebraName, ...] = Field(
         strict=False,
         description="names from caudal to cranial, the first is fixed to ground",
@@ -104,6 +109,7 @@ class Cohort:
     motion : ``cycle`` is int64, 1 where the file says nothing.
     supports : joint coordinates that rigs fix; names may be ``*``.
     preload : loads that act before step 0 and all along; specimen and test may be ``*``.
+    made_up : whether nobody was measured.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
     digest : sha256 over the names and bytes of the files that were read.
@@ -127,6 +133,7 @@ class Cohort:
     further: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     supports: pd.DataFrame | None = None
     preload: pd.DataFrame | None = None
+    made_up: bool = False
 
     @property
     def joint_names(self) -> tuple[str, ...]:

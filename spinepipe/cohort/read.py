@@ -135,6 +135,7 @@ def _cohort(
         motion=motion,
         supports=final.get("supports"),
         preload=final.get("preload"),
+        made_up=header.made_up,
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )

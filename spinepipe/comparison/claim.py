@@ -304,6 +304,10 @@ def binomial(count: int, of: int) -> Range:
     return Range(*wilson_percent(count, of), f"95 % Wilson interval of the paper's {count} of {of}")
 
 
+FEWEST_OF_A_RATE = 10
+"""Trials of which a rate is told: all of 3 leave 44 to 100 %, all of 10 leave 72 to 100 %."""
+
+
 def wilson_percent(count: int, of: int) -> tuple[float, float]:
     """Ends of the 95 % Wilson interval of a share, percent."""
     low, high = proportion_confint(count, of, alpha=1.0 - LEVEL, method="wilson")

@@ -411,6 +411,7 @@ title: Made-up scoliotic spines filmed in five positions, {noise}
 source: >-
   Made by tests/generators/ais_films.py. Sex, age, Lenke class and Cobb angle are those of Jalalian
   2017, Table 1 (doi 10.1007/s11517-016-1576-8); all else is drawn, the truth is in truth.json.
+made_up: true
 vertebrae: [{", ".join(LEVELS)}]
 gravity: false
 """

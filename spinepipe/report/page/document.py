@@ -42,6 +42,13 @@ _UNITS: Mapping[str, str] = {
 _MOST_NAMES = 12
 
 
+CIRCULAR = (
+    "Circular: this cohort is made up, nobody was measured. What was put into it comes out again. "
+    "What follows tests the method and is no evidence about people."
+)
+"""What stands above all findings of a made-up cohort."""
+
+
 @dataclass(frozen=True)
 class Headline:
     """The answer in one sentence, how sure it is, and what casts doubt on it."""
@@ -166,6 +173,7 @@ class Document:
             question=self.question,
             headline=self.headline,
             specimens=_specimens(cohort),
+            circular=CIRCULAR if cohort.made_up else "",
             findings=self.findings,
             pictures=self.pictures,
             tables=self.tables,

@@ -12,7 +12,13 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, DECIDED, UNDECIDED, Row
+from spinepipe.studies.cohort_stiffness.claims import (
+    BY_CONSTRUCTION,
+    CIRCULAR,
+    DECIDED,
+    UNDECIDED,
+    Row,
+)
 from spinepipe.studies.cohort_stiffness.claims_of_errors import error_findings, error_spreads
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     load_case_findings,
@@ -23,6 +29,11 @@ from spinepipe.studies.cohort_stiffness.tables import FINDINGS
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.tables.shared import joined
 
+PUT_IN = ("stiffness_differs_between_", "literature_overpredicts_", "wrong_level_ratio_")
+"""How claims begin that are about the stiffness that was put into a made-up cohort."""
+
+MADE_UP = "put in: nobody was measured, the cohort is made up"
+
 FEWEST = 3
 """Specimens that a verdict needs; the scatter of two is that of one difference."""
 
@@ -31,6 +42,8 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``findings.parquet``."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     rows = list(finding_rows(read_frames(tables), settings.significance))
+    if cohort.made_up:
+        rows = [put_in(row) for row in rows]
     origin = provenance("findings", settings, cohort)
     write(from_rows(FINDINGS, rows), output, origin)
 
@@ -51,6 +64,13 @@ def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Ite
         *error_spreads(statistics, significance),
     )
     yield from together(by_themselves, stiffness["specimen"].nunique(), significance)
+
+
+def put_in(row: Row) -> Row:
+    """The row in a made-up cohort: that specimens and levels differ as drawn is no finding."""
+    if row["holds"] != "yes" or not str(row["finding"]).startswith(PUT_IN):
+        return row
+    return row | {"holds": CIRCULAR, "message": joined(MADE_UP, row["message"])}
 
 
 def together(rows: Sequence[Row], specimens: int, significance: float) -> Iterator[Row]:

@@ -21,7 +21,7 @@ _VERDICTS = {
     "yes": ("hold", "Holds here"),
     "no": ("do not hold", "Does not hold here"),
     "undecided": ("cannot be decided", "Cannot be decided with this cohort"),
-    "circular": ("true by construction", "True by construction, and no test"),
+    "circular": ("circular", "True by construction or put into a made-up cohort, and no test"),
     "not_asked": ("not asked", "Not asked in this study"),
 }
 

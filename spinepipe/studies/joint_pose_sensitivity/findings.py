@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
+from spinepipe.comparison.claim import FEWEST_OF_A_RATE
 from spinepipe.report.page.document import Results, judged
 from spinepipe.report.words import count, fixed, number, percent, tick
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
@@ -197,7 +198,9 @@ def _methods(results: Results) -> str:
     ]
     if set(sums.index) <= set(why):
         return f"Methods of fitting were not compared: {'; '.join(dict.fromkeys(why.values()))}."
-    return f"Successful fits of the same poses by method: {'; '.join(parts)}."
+    fits = int(sums["fits"].max())
+    few = f" {count(fits, 'fit')} of each tell no rate." if fits < FEWEST_OF_A_RATE else ""
+    return f"Successful fits of the same poses by method: {'; '.join(parts)}.{few}"
 
 
 def _bootstraps(study: JointPoseSensitivity, results: Results) -> str:

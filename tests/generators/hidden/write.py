@@ -34,6 +34,7 @@ COHORT_YAML = """\
 cohort: "{name}"
 title: Made-up {ends} specimens
 source: no measurement; tests/generators/hidden, seed {seed}
+made_up: true
 vertebrae: [{vertebrae}]
 gravity: {gravity}
 zeroed_at_step_0: {zeroed}

@@ -40,6 +40,7 @@ source: >-
   Normal noise on every reading before zeroing: {rotation_sd} deg, {translation_sd} mm. truth.csv
   holds the true stiffness; no study reads it.
   Reasons and limits are in docs/decisions/0006-t12s1-phantom.md.
+made_up: true
 vertebrae: [{vertebrae}]
 gravity: true
 zeroed_at_step_0: {zeroed}

@@ -127,7 +127,7 @@ def write(wanted: Wanted, subjects: Sequence[Subject], folder: Path) -> None:
         f"cohort: {folder.name}\n"
         f"title: Made-up people bending with markers on their backs ({wanted.generator})\n"
         f"source: >-\n  No measurement. {wanted.command}\n"
-        f"vertebrae: [{', '.join(BODIES)}]\ngravity: true\n"
+        f"made_up: true\nvertebrae: [{', '.join(BODIES)}]\ngravity: true\n"
     )
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, Claim, Row
-from spinepipe.studies.cohort_stiffness.findings import together
+from spinepipe.studies.cohort_stiffness.findings import put_in, together
 
 SIGNIFICANCE = 0.05
 
@@ -99,3 +99,22 @@ def test_what_is_not_asked_stays_so_with_few_specimens() -> None:
     claim = Claim("name", "Statement.", "quantity", "deg")
     (found,) = judged(claim.not_asked("neither was computed"), specimens=1)
     assert (found["holds"], found["message"]) == ("not_asked", "neither was computed")
+
+
+@pytest.mark.parametrize(
+    ("finding", "holds", "told"),
+    [
+        ("stiffness_differs_between_levels_extension", "yes", "circular"),
+        ("stiffness_differs_between_levels_extension", "no", "no"),
+        ("wrong_level_ratio_worse_than_uniform", "yes", "circular"),
+        ("per_joint_beats_per_specimen_left_out_case", "yes", "yes"),
+        ("stiffness_is_load_case_specific", "yes", "yes"),
+    ],
+)
+def test_what_was_put_into_a_made_up_cohort_is_no_finding(
+    finding: str, holds: str, told: str
+) -> None:
+    """What the method makes of it may be one: load cases must not differ where truth is linear."""
+    found = put_in(Claim(finding, "Statement.", "quantity", "").row(holds, "told", 1.0))
+    assert found["holds"] == told
+    assert ("made up" in found["message"]) == (told == "circular")

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from math import radians
 
 from spinepipe.comparison.claim import (
+    FEWEST_OF_A_RATE,
     Claim,
     NotComputed,
     Ours,
@@ -40,9 +41,6 @@ METHODS = {
     "forward_run_sane_step": "forward runs, differences with a step chosen with care",
     "forward_run_raw_units": "forward runs, default step, on stiffness in N/m and N m/rad",
 }
-
-FEWEST_OF_A_RATE = 10
-"""As many as the paper's smallest part has, its sets of damping; of fewer no rate is told."""
 
 FORCE_N = float(PAPER["load"]["largest_compression_n"])
 
