@@ -164,13 +164,19 @@ class Written:
         pool.run(str(self.root), STUDY, representation, fitted_to, without, **files)
         return _read(files)
 
-    def experiment(self, specimen: str, representation: str | None = "per_joint") -> Tables:
+    def experiment(
+        self,
+        specimen: str,
+        representation: str | None = "per_joint",
+        fitted: Sequence[str] = (),
+    ) -> Tables:
         """Tables of the job ``experiment`` and, before it, of the fit that it simulates."""
         if representation is not None:
-            self.fit(specimen, representation)
-        fitted = [] if representation is None else [str(self.root / "stiffness.parquet")]
+            tests = pd.read_csv(self.root / "config/cohorts/chains/motion.csv")["test"].unique()
+            self.fit(specimen, representation, "all" if len(tests) > 1 else tests[0])
+            fitted = [str(self.root / "stiffness.parquet")]
         files = self._files("load_displacement", "helical_axes")
-        experiment.run(str(self.root), STUDY, fitted, specimen, **files)
+        experiment.run(str(self.root), STUDY, list(fitted), specimen, **files)
         return _read(files)
 
     def _files(self, *names: str) -> dict[str, str]:

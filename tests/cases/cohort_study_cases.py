@@ -11,8 +11,8 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
+from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import TABLES
 from spinepipe.tables import Tables, from_rows
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, STIFFNESS_UNITS
 
@@ -103,6 +103,8 @@ def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
         "pooling": _pooling(size),
         "ranking": _ranking(size),
         "mae": _mae(size),
+        "load_displacement": _curves(size),
+        "helical_axes": _axes(size),
         "findings": iter(()),
         "statistics": iter(()),
     }
@@ -112,7 +114,7 @@ def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
 
 def frame(name: str, rows: list[Row]) -> pd.DataFrame:
     """Rows as they come out of the file of a table."""
-    (shape,) = (table for table in TABLES if table.name == name)
+    (shape,) = (table for table in KIND.tables if table.name == name)
     empty = dict.fromkeys(column.name for column in shape.columns)
     return from_rows(shape, [{**empty, **row} for row in rows]).to_pandas()
 
@@ -255,3 +257,41 @@ def _mae(size: Size) -> Iterator[Row]:
             "unit": "deg",
         }
         yield row | ({"mae": 2.0, "mae_percent": 25.0} if size.solved else {})
+
+
+def _sources(size: Size) -> Iterator[Row]:
+    """Keys of curves and axes: whole loops, measured and simulated."""
+    for specimen, test, joint, cycle in product(size.specimens, size.tests, size.joints, (2, 3)):
+        key = {"specimen": specimen, "joint": joint, "test": test, "cycle": cycle}
+        yield key | {"source": "measured", "representation": ""}
+        yield key | {"source": "simulated", "representation": size.representations[0]}
+
+
+def _curves(size: Size) -> Iterator[Row]:
+    for number, key in enumerate(_sources(size)):
+        measured = key["source"] == "measured"
+        row = {**key, "coordinate": DRIVES.get(key["test"], "extension"), "readings": 41}
+        row |= {"least_load_nm": -7.5, "largest_load_nm": 7.5, "elastic_zone": "upper_half"}
+        if not size.solved and not measured:
+            yield row | _ended(size) | {"neutral_zone": "not_read", "elastic_zone": "none"}
+            continue
+        turned = 10.0 + number % 7 + (0.0 if measured else 0.5)
+        ends = {"range_of_motion_low_deg": turned - 0.3, "range_of_motion_high_deg": turned + 0.3}
+        row |= {"range_of_motion_deg": turned, **ends, "status": "converged", "message": ""}
+        work = {"hysteresis_area_low_j": 0.15, "hysteresis_area_high_j": 0.25}
+        row |= {"hysteresis_area_j": 0.2, **work} if measured else {"hysteresis_area_j": 0.0}
+        zone = {"neutral_zone_low_deg": 3.5, "neutral_zone_high_deg": 4.5}
+        found = {"neutral_zone": "found", "neutral_zone_deg": 4.0, **zone}
+        yield row | (found if measured else {"neutral_zone": "not_meaningful"})
+
+
+def _axes(size: Size) -> Iterator[Row]:
+    for key in _sources(size):
+        row = {**key, "from_nm": -7.5, "to_nm": 7.5, "status": "found", "message": ""}
+        if not size.solved and key["source"] == "simulated":
+            yield row | {"status": "no_pose", "message": "it tips <over>"}
+            continue
+        sds = {"centre_anterior_sd_mm": 0.6, "centre_superior_sd_mm": 0.8}
+        yield (
+            row | {"angle_deg": 12.0, "centre_anterior_mm": -3.0, "centre_superior_mm": -8.0} | sds
+        )

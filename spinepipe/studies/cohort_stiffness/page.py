@@ -18,6 +18,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
+from spinepipe.tables.schema import Column, Table
 from spinepipe.tables.shared import against_as_shown
 
 QUESTION = (
@@ -48,8 +49,24 @@ _CLAIM_ORDER = (
     *("p", "p_holm", "quantity", "message"),
 )
 
+_NOT_SHOWN = ("representation", "readings", "least_load_nm", "largest_load_nm", "from_nm", "to_nm")
+"""Columns of curves and axes that are left to the files, beside ends of zones and SDs of axes."""
+
+
+def _shown(table: Table) -> tuple[Column, ...]:
+    """Columns of a table of an experiment that fit on a page."""
+    inner = ("neutral_zone_from", "neutral_zone_to", "neutral_zone_stiffness_", "direction_")
+    return tuple(
+        column
+        for column in table.columns
+        if column.name not in _NOT_SHOWN
+        and not (column.name.startswith(inner) and column.name.endswith(("_sd", "rad", "_nm")))
+    )
+
+
 _COLUMNS = {
     FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
+    **{table.name: _shown(table) for table in TABLES_OF_EXPERIMENTS},
     AGAINST_GOULD_2024B.name: against_as_shown(AGAINST_GOULD_2024B),
 }
 """What a reader compares stands first; short names are left to the files."""

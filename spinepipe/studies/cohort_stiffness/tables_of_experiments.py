@@ -94,9 +94,9 @@ LOAD_DISPLACEMENT = Table(
             "neutral_zone",
             "text",
             "whether there is one: not_meaningful: no S-shaped curve fits better than a straight "
-            "line, or it softens nowhere between the ends; not_described: softer in the middle, but "
-            "sigmoids leave more than noise, so that they tell no ends; too_few: loads from side to "
-            "side; one_side: only one side was loaded; not_read: no rotation",
+            "line, or it softens nowhere between the ends; not_described: softer in the middle, "
+            "but sigmoids leave more than noise, so that they tell no ends; too_few: loads from "
+            "side to side; one_side: only one side was loaded; not_read: no rotation",
             allowed=tuple(Zone),
         ),
         *_with_ends(

@@ -17,6 +17,7 @@ from spinepipe.report.words import short
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
 from spinepipe.studies.cohort_stiffness.figures.held_out_error import motion_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
+from spinepipe.studies.cohort_stiffness.figures.range_of_motion import compared
 from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
 from spinepipe.tables import Tables
 
@@ -91,13 +92,15 @@ def test_no_words_leave_the_page_or_stand_on_each_other(name: str, size: Size) -
 
 @pytest.mark.parametrize("name", DRAW)
 def test_tables_without_rows_are_told_not_drawn(name: str) -> None:
-    empty = {table: frame(table, []) for table in ("stiffness", "errors", "sign_checks")}
+    names = ("stiffness", "errors", "sign_checks", "load_displacement")
+    empty = {table: frame(table, []) for table in names}
     figure = draw(name, Size(), **empty)
     told = {
         "stiffness_by_level": "No stiffness was found for any specimen.",
         "error_map": "none of 0 rows has one",
         "held_out_error": "no fit has a result",
         "load_case_stiffness": "One load case",
+        "range_of_motion": "No range of motion was both measured and simulated.",
     }
     assert told[name] in words(figure)
     assert not figure.axes
@@ -312,3 +315,20 @@ def test_nested_test_is_told_where_there_is_one() -> None:
 def test_long_names_keep_both_ends() -> None:
     assert short("specimen_with_a_long_name_7", 12) == "speci…name_7"
     assert short("s01", 12) == "s01"
+
+
+def test_curves_stand_beside_the_model_where_they_were_read() -> None:
+    size = Size(("a", "b"), tests=("flexion", "left_lateral_bending"))
+    rows = tables_of(size)["load_displacement"]
+    titles = [panel.title for panel in compared(rows)]
+    assert titles == ["Flexion", "Left lateral bending", "Neutral zone", "Work lost in a cycle"]
+    ranges, _, zones, work = compared(rows)
+    here = ranges.points
+    np.testing.assert_allclose(here["measured_way"], 0.3)
+    np.testing.assert_allclose((here["simulated"] - here["measured"]).abs() % 1.0, 0.5)
+    assert set(zones.points["simulated"]) == {0.0}, "a straight curve of the model has none"
+    np.testing.assert_allclose(work.points["measured"], 200.0)
+    figure = draw("range_of_motion", size)
+    drawn = [axis for axis in figure.axes if axis.get_visible()]
+    assert [axis.get_title(loc="left")[4:] for axis in drawn] == titles
+    assert compared(rows[rows["source"] == "measured"]) == []

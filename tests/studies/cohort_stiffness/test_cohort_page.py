@@ -197,7 +197,8 @@ def test_claims_are_counted_and_told_with_their_numbers() -> None:
 
 def test_shown_rows_are_chosen_and_the_choice_is_told() -> None:
     shown = {table.name: table for table in shown_tables(results(Size()))}
-    assert set(shown) == {"ranking", "mae", "pooling", "sign_checks", "fits", "stiffness"}
+    of_fits = {"ranking", "mae", "pooling", "sign_checks", "fits", "stiffness"}
+    assert set(shown) == of_fits | {"load_displacement", "helical_axes"}
     assert len(shown["stiffness"].rows) == 3 * 4 * 2 * 3
     assert "own fits to all load cases; the others are in stiffness.parquet" in (
         shown["stiffness"].about
