@@ -142,6 +142,13 @@ SPECIMENS = TableForm(
         Column("age_years", "age", low=0, high=130),
         Column("height_m", "standing height", low=0.2, high=2.8),
         Column("mass_kg", "body mass", low=0, high=500, open_low=True),
+        Column(
+            "degeneration_grade",
+            "grade of disc degeneration, 1 to 5 (Pfirrmann or Thompson), the mean over the tested "
+            "discs where each was graded",
+            low=1,
+            high=5,
+        ),
     ),
     keys=("specimen",),
     carries=True,

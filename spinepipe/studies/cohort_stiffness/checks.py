@@ -16,6 +16,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     ALL_BUT,
     NOBODY,
     NOTHING,
+    SEXES,
     CohortStiffness,
 )
 from spinepipe.studies.cohort_stiffness.stiffening import EFFECT
@@ -39,6 +40,7 @@ def check_cohort_stiffness(
     yield from _specimens(cohort)
     yield from _levels(document, study, cohort)
     yield from _cost(document, study, cohort)
+    yield from _covariates(document, study, cohort)
 
 
 def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
@@ -121,6 +123,24 @@ def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterato
         allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
         remedy = "free rotations only, or choose cost: measurement_sd"
         yield Problem(*at(document, "free"), ", ".join(others), allowed, remedy)
+
+
+def _covariates(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+    """Covariates must be known of someone, and sexes be written so that they are known."""
+    for index, name in enumerate(study.covariates or ()):
+        known = cohort.specimens[name].dropna()
+        if known.empty:
+            found = f"'{name}', which {cohort.folder.name}/specimens.csv has of no specimen"
+            allowed = "covariates that are known of the specimens"
+            remedy = "fill in the column, or delete it here"
+            yield Problem(*at(document, f"covariates.{index}"), found, allowed, remedy)
+    if "sex" not in (study.covariates or ()):
+        return
+    for specimen, sex in zip(cohort.specimens["specimen"], cohort.specimens["sex"], strict=True):
+        if isinstance(sex, str) and sex.strip() and sex.strip().lower() not in SEXES:
+            place = (f"{cohort.folder.name}/specimens.csv", None, "sex")
+            remedy = "write one of them, or leave the cell empty"
+            yield Problem(*place, f"'{sex}' of specimen '{specimen}'", one_of(SEXES), remedy)
 
 
 def check_one_stiffening(

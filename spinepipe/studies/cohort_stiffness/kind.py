@@ -33,6 +33,7 @@ OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling", *OF_EXPERIME
 _ANALYSES = (
     Job("mae", "", ("errors",), ("mae",)),
     Job("ranking", "", ("errors", "fits", "pooling"), ("ranking",)),
+    Job("covariates", "", ("stiffness",), ("covariates",)),
     Job("statistics", "significance", ("errors", "fits"), ("statistics",)),
     Job("findings", "", ("stiffness", "errors", "statistics", "pooling"), ("findings",)),
     Job(
@@ -119,11 +120,14 @@ class CohortLayout(StudyFiles):
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
         pooled = ("pooling",) if self._pooled_ones else ()
-        analysed = (
-            job.name for job in _ANALYSES if self.rebuilt or not job.name.startswith("against")
-        )
         own = ("stiffness", "fits", "errors", "sign_checks", *pooled, *OF_EXPERIMENTS)
-        return (*own, *analysed)
+        return (*own, *(job.name for job in _ANALYSES if self._asked(job.name)))
+
+    def _asked(self, analysis: str) -> bool:
+        """Whether this study has a table that is computed from tables."""
+        if analysis == "covariates":
+            return bool(self.study.covariates)
+        return self.rebuilt or not analysis.startswith("against")
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -237,7 +241,7 @@ def _simulated_fit(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [expected.of_part("stiffness", file) for file in files]
 
 
-_HELD_OUT = ("representations", "cross_validation", "significance")
+_HELD_OUT = ("representations", "cross_validation", "covariates", "significance")
 _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
 

@@ -31,6 +31,7 @@ SHOWN = {
     "ranking": "Representations in order",
     "mae": "Mean absolute errors in the loaded direction",
     "pooling": "How stiffness is spread over the cohort",
+    "covariates": "What of the specimens stiffness goes with",
     "against_gould_2024b": "Beside Gould et al. 2024b",
     "sign_checks": "Does each joint move with the load?",
     "load_displacement": "Range of motion, neutral zone, stiffness and lost work of each curve",

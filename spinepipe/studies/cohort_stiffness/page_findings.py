@@ -9,6 +9,7 @@ import pandas as pd
 from spinepipe.report.page.document import Results, judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
+from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, POOLED, PUBLISHED
@@ -308,6 +309,6 @@ def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
 
 MAKERS: tuple[Finding, ...] = (
     *(signs, failed, bounds, optima, identifiable),
-    *(ranking, stiffening, claims, loaded_errors, spreads),
+    *(ranking, stiffening, claims, loaded_errors, spreads, covariates),
     *(ranges, zones, hysteresis, axes, beside_the_paper),
 )

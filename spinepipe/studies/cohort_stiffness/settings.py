@@ -23,10 +23,18 @@ from spinepipe.units import COORDINATE_COLUMNS, ROTATIONS
 
 _PAPER = published("gould_2024b")
 
+COVARIATES = ("age_years", "sex", "height_m", "mass_kg", "degeneration_grade")
+"""Columns of specimens.csv that stiffness may go with."""
+
+SEXES = {"female": 0.0, "male": 1.0}
+"""What the column sex may say, and the number it is regressed on."""
+
 if TYPE_CHECKING:
     Fitted = str
+    Covariate = str
 else:
     Fitted = Literal[FITTED]
+    Covariate = Literal[COVARIATES]
 
 
 def _published_levels() -> dict[str, LevelStiffness]:
@@ -110,6 +118,11 @@ class CohortStiffness(Study):
     )
     cross_validation: CrossValidation = Field(
         default_factory=CrossValidation, description="what is held out"
+    )
+    covariates: EachOnce[Covariate] | None = Field(
+        default=None,
+        description="columns of specimens.csv that stiffness is regressed on, all together; k of "
+        "them need k + 4 specimens; null: it is not asked",
     )
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"

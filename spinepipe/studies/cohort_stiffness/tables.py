@@ -2,6 +2,7 @@
 
 from spinepipe.studies.cohort_stiffness.claims import HOLDS
 from spinepipe.studies.cohort_stiffness.representations import EVERY, NAMES, POOLED
+from spinepipe.studies.cohort_stiffness.tables_of_covariates import COVARIATES_TABLE
 from spinepipe.studies.cohort_stiffness.tables_of_laws import GROWTH, GROWTH_SPREADS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table, status
 from spinepipe.tables.shared import STATISTICS, against_paper
@@ -459,5 +460,6 @@ IN_FOLDERS = ("specimen", "representation", "fitted_to")
 TABLES = (
     *(STIFFNESS, FITS, ERRORS, POOLING, SIGN_CHECKS),
     *(MAE, RANKING, STATISTICS, FINDINGS, AGAINST_GOULD_2024B),
+    COVARIATES_TABLE,
 )
 """All tables of the kind."""
