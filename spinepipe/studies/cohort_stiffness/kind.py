@@ -217,4 +217,5 @@ KIND = Kind(
         ),
         *_ANALYSES,
     ),
+    exports="export:exported",
 )

@@ -138,4 +138,5 @@ KIND = Kind(
         Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_size_of_batch),
         Job("analyse"),
     ),
+    exports="export:exported",
 )
