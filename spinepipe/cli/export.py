@@ -8,6 +8,7 @@ from spinepipe.cli.find import specimen_of, study_names, unknown
 from spinepipe.files import appearing
 from spinepipe.problems import InputError, Problem, one_of
 from spinepipe.studies import read as studies
+from spinepipe.studies.kind import Wanted
 from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
 
 
@@ -22,6 +23,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a sampled joint pose of the study's results (default: the nominal one)",
     )
     parser.add_argument(
+        "--start",
+        action="store_true",
+        help="with the stiffness where fits start (default: the fitted one)",
+    )
+    parser.add_argument(
+        "--representation",
+        metavar="NAME",
+        help="representation of stiffness, of a cohort study (default: best on held-out motion)",
+    )
+    parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE.osim", help="file to write"
     )
 
@@ -33,19 +44,25 @@ def run(options: argparse.Namespace) -> int:
     if options.study not in study_names(options.root):
         raise InputError([unknown("study", options.study, study_names(options.root))])
     study, cohort = studies.check(options.root, options.study)
-    exports = kind_of(study.kind).exports
-    if exports is None:
-        able = one_of([name for name, kind in every_kind().items() if kind.exports])
-        allowed, remedy = f"a study of kind {able}", "choose such a study"
-        raise InputError([_problem("STUDY", f"kind {study.kind}", allowed, remedy)])
-    specimen = specimen_of(cohort, options.specimen)
-    results = options.root / "results" / study.study
-    module, _, function = exports.partition(":")
+    kind = kind_of(study.kind)
+    if kind.exports is None:
+        able = one_of([name for name, other in every_kind().items() if other.exports])
+        why = kind.why_no_export or "choose such a study"
+        raise InputError([_problem("STUDY", f"kind {study.kind}", f"a study of kind {able}", why)])
+    wanted = Wanted(
+        root=options.root,
+        results=options.root / "results" / study.study,
+        specimen=specimen_of(cohort, options.specimen),
+        pose=options.pose,
+        start=options.start,
+        representation=options.representation,
+    )
+    module, _, function = kind.exports.partition(":")
     exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
-    document, words = exported(study, cohort, specimen, options.pose, results)
+    document, words = exported(study, cohort, wanted)
     with appearing(options.output) as temporary:
         temporary.write_text(document, encoding="utf-8")
-    print(f"{options.output}: specimen {specimen}, {words}")
+    print(f"{options.output}: specimen {wanted.specimen}, {words}")
     return 0
 
 

@@ -97,8 +97,9 @@ def provenance(
 ) -> dict[str, str]:
     """Metadata of a file that a job of the study's kind writes, its mark among it.
 
-    ``config_digest`` covers the settings that the job depends on, no others; ``specimens_digest``
-    stands for ``cohort_digest`` where not all of the cohort is read. Parameters as in `digest_of`.
+    ``config_digest`` covers the settings that the job depends on, no others; ``data_digest`` what
+    it reads of the cohort, which is also told as ``cohort_digest`` where that is all of it and as
+    ``specimens_digest`` where not. Parameters as in `digest_of`.
     """
     settings = settings_of(study, kind_of(study.kind).job(job).ignores)
     name = "cohort_digest" if specimens is None else "specimens_digest"
@@ -106,6 +107,7 @@ def provenance(
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
+        "data_digest": _data_digest(cohort, specimens),
         name: _data_digest(cohort, specimens),
         "config_digest": value_digest(settings),
         "code_digest": _code(study, job),

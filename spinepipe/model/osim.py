@@ -5,6 +5,7 @@ stand in the file as the model has them.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
@@ -17,6 +18,8 @@ from spinepipe.frames import Pose
 from spinepipe.model import osim_parts as parts
 from spinepipe.model.osim_parts import NAME, listed, numbers, told
 from spinepipe.model.spine import Body, LoadCase, RefusedModel, SpineModel
+
+BUSHING = "linear_bushing"
 
 BUSHING_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(3, 3) columns: x, y, z of a bushing's frames in joint axes, which are the joint's z, x, y.
@@ -33,7 +36,17 @@ TOKEN_INERTIA_KG_M2 = 1e-6 * np.eye(3)
 """OpenSim cannot move a body without mass or inertia; at rest neither of these loads a joint."""
 
 
-def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
+def expressible(model: SpineModel) -> tuple[SpineModel, tuple[str, ...]]:
+    """The model as far as an .osim file can say it, and the names of the effects that it cannot.
+
+    Said are linear bushings that act in all tests.
+    """
+    said = [e for e in model.effects if e.effect.name == BUSHING and e.tests == ("*",)]
+    unsaid = dict.fromkeys(e.effect.name for e in model.effects if e not in said)
+    return replace(model, effects=tuple(said)), tuple(unsaid)
+
+
+def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[str] = ()) -> str:
     """OpenSim document of a model, readable by OpenSim 4.0 and later.
 
     Coordinates are named after joint and coordinate, e.g. ``L3L4_anterior`` (m, rad); the lowest
@@ -44,6 +57,7 @@ def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
     ----------
     loads : written as prescribed forces: constant for one step, else piecewise linear through the
         steps at their recorded times, or at one second per step number when not all are recorded.
+    left_out : what the model has beside what is written, see `expressible`; told in ``credits``.
 
     Raises
     ------
@@ -54,7 +68,7 @@ def osim(model: SpineModel, loads: LoadCase | None = None) -> str:
     _check_names(model)
     document = parts.document()
     root = SubElement(document, "Model", name=model.specimen)
-    told(root, "credits", _credits(model))
+    told(root, "credits", _credits(model, left_out))
     told(root, "gravity", numbers(model.gravity))
     bodies, joints, forces = (listed(root, kind) for kind in ("Body", "Joint", "Force"))
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
@@ -89,7 +103,7 @@ def _stiffness(model: SpineModel, loads: LoadCase | None) -> Array:
             )
         if loads is not None and not scoped.in_scope(loads.test):
             continue
-        if name != "linear_bushing":
+        if name != BUSHING:
             raise RefusedModel(
                 f"{model.specimen}: effect {name} has no counterpart in an .osim file; "
                 "only linear_bushing can be exported"
@@ -107,7 +121,7 @@ def _check_names(model: SpineModel) -> None:
             )
 
 
-def _credits(model: SpineModel) -> str:
+def _credits(model: SpineModel, left_out: Sequence[str]) -> str:
     massless = [body.name for body in model.bodies if body.mass == 0.0]
     inertialess = [body.name for body in model.bodies if not body.inertia.any()]
     text = "Written by spinepipe. Units: m, kg, s, N, rad."
@@ -115,6 +129,8 @@ def _credits(model: SpineModel) -> str:
         text += f" Without mass in the model, 1 g here: {', '.join(massless)}."
     if inertialess:
         text += f" Without inertia in the model, 1e-6 kg m2 here: {', '.join(inertialess)}."
+    if left_out:
+        text += f" In the model and not in this file: {', '.join(left_out)}."
     return text
 
 

@@ -70,6 +70,27 @@ class Job:
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """Which model of a study is asked for.
+
+    Attributes
+    ----------
+    root : folder of the Snakefile. results : of the study.
+    specimen : whose model.
+    pose : number of a sampled joint pose; None for the cohort's own.
+    start : whether with the stiffness where fits start, and not with a fitted one.
+    representation : of stiffness, by name; None for the one that the study's results recommend.
+    """
+
+    root: Path
+    results: Path
+    specimen: str
+    pose: int | None = None
+    start: bool = False
+    representation: str | None = None
+
+
+@dataclass(frozen=True)
 class Kind:
     """All that the core asks a kind of study.
 
@@ -85,8 +106,8 @@ class Kind:
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
     exports : ``file:function`` of what makes OpenSim's document of a specimen; called with study,
-        cohort, specimen, number of a joint pose or None, and the folder of the results, it returns
-        the document, and in words what it is.
+        cohort and what is `Wanted`, it returns the document, and in words what it is.
+    why_no_export : where it has none, why, as a sentence.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).
     settled : gives the study with what its file leaves to the cohort in place; asked before the
@@ -106,6 +127,7 @@ class Kind:
     ignored_by_figures: tuple[str, ...] = ()
     makes_models: str | None = None
     exports: str | None = None
+    why_no_export: str = ""
     forms: tuple[TableForm, ...] = ()
     holds: bool = False
     settled: Callable[[Any, Cohort], Any] | None = None

@@ -5,17 +5,19 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
 import pytest
-from chain_cases import Chains
+from chain_cases import JOINTS, Chains
 from cohort_cases import swap, text, without, write
 from cohort_edge_cases import A
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
 from spinepipe.cli.engine import relative_error
+from spinepipe.studies.registry import every_kind
 from tests.generators import ais_films
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -164,18 +166,114 @@ def test_show_of_what_is_not_there(
     assert says in err
 
 
+def bushing(file: Path, joint: str) -> list[float]:
+    """Rotational stiffness of a joint in an OpenSim file: axial rotation, extension, bending... as
+    the bushing's own axes have them: those of the joint's z, x, y.
+    """
+    found = ElementTree.parse(file).find(f".//BushingForce[@name='{joint}_bushing']")
+    return [float(word) for word in found.findtext("rotational_stiffness").split()]
+
+
 def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("spinepipe.model.osim")
+    """1 N m turns each joint by 1.5 degrees: fitted it has about 38.2 N m/rad."""
     results(project(tmp_path, Size()), Size())
     file = tmp_path / "out" / "a.osim"
     code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "-o", file)
     assert code == 0
+    assert "joint pose nominal, stiffness: fitted in this pose" in out
+    fitted = bushing(file, "V2V3")
+    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "--start", "-o", file)
+    assert code == 0
     assert "joint pose nominal, stiffness: start of the study" in out
+    assert bushing(file, "V2V3")[0] == 37.0 != fitted[0]
+    assert fitted[0] == pytest.approx(1.0 / np.deg2rad(1.5), rel=0.1)  # 20 N turn it a little too
     nominal = file.read_text()
     code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "--pose", 3, "-o", file)
     assert code == 0
     assert "joint pose 0003, stiffness: calibrated for this pose" in out
     assert file.read_text() != nominal
+
+
+@pytest.mark.parametrize("kind", ["range_of_motion", "global_sensitivity"])
+def test_export_of_studies_that_fit_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    more = (
+        "factors:\n  - {of: load_size, times: {sd: 0.02}}\n"
+        "  - {of: joint_axes, axis: extension, offset_deg: {sd: 2}}\n"
+        if kind == "global_sensitivity"
+        else "poses: 1\n"
+    )
+    Chains({"a": A}).write(tmp_path)
+    body = f"study: given\nkind: {kind}\ncohort: chains\nstiffness: {{extension_nm_per_rad: 44}}\n"
+    (tmp_path / "config/studies/given.yaml").write_text(body + more)
+    file = tmp_path / "a.osim"
+    code, out, err = run(capsys, "--root", tmp_path, "export", "given", "a", "-o", file)
+    assert (code, err) == (0, "")
+    assert "the study's own, nothing is fitted" in out
+    assert bushing(file, "L4L5")[0] == 44.0
+    code, _, err = run(capsys, "--root", tmp_path, "export", "given", "a", "--pose", 1, "-o", file)
+    assert code == 1
+    assert "exports no sampled joints" in err
+
+
+def test_export_of_a_cohort_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each joint is as stiff as it was made; without results it is told what makes them."""
+    chains = Chains({"a": A}).write(tmp_path)
+    file, asked = tmp_path / "a.osim", ["--root", tmp_path, "export", "probe", "a", "-o"]
+    code, _, err = run(capsys, *asked, file)
+    assert code == 1
+    assert "run `snakemake -j2 results/probe/ranking.parquet` first, or add --start" in err
+    rows = chains.fit("a", "per_joint")["stiffness"]
+    rows = rows.assign(specimen="a", representation="per_joint", fitted_to="all")
+    (tmp_path / "results/probe").mkdir(parents=True)
+    rows.to_parquet(tmp_path / "results/probe/stiffness.parquet")
+    ranked = {"criterion": "left_out_case", "representation": ["per_specimen", "per_joint"]}
+    pd.DataFrame({**ranked, "rank": [2, 1]}).to_parquet(tmp_path / "results/probe/ranking.parquet")
+    code, out, _ = run(capsys, *asked, file)
+    assert code == 0
+    assert "fitted, each joint its own (first by left-out-case error)" in out
+    for joint, (extension, bending, rotation) in zip(JOINTS, A, strict=True):
+        told = bushing(file, joint)
+        assert told == pytest.approx([extension, bending, rotation], rel=1e-3)
+    code, _, err = run(capsys, *asked, file, "--representation", "per_specimen")
+    assert code == 1
+    assert "no fit of a by per_specimen" in err
+    code, _, _ = run(capsys, *asked, file, "--start")
+    assert (code, bushing(file, "L4L5")[0]) == (0, 51.0)
+
+
+def test_export_of_a_model_with_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Bushings are written, and what OpenSim cannot say is named, outside and inside the file."""
+    Chains({"a": A}).write(tmp_path)
+    study = "study: lack\nkind: discrepancy\ncohort: chains\nbase: {stiffness: per_joint}\n"
+    (tmp_path / "config/studies/lack.yaml").write_text(study)
+    found = tmp_path / "results/lack/discrepancy/model_with_effects.yaml"
+    found.parent.mkdir(parents=True)
+    found.write_text(
+        "model: lack\ncohort: chains\neffects:\n"
+        "  - {effect: linear_bushing, values: [{extension_nm_per_rad: 33}]}\n"
+        "  - {effect: neutral_zone}\n"
+    )
+    file = tmp_path / "a.osim"
+    code, out, _ = run(capsys, "--root", tmp_path, "export", "lack", "a", "-o", file)
+    assert code == 0
+    assert "not in the file, as OpenSim has no counterpart: neutral_zone" in out
+    assert "In the model and not in this file: neutral_zone." in file.read_text()
+    assert bushing(file, "L4L5")[0] == 33.0
+
+
+def test_export_says_why_a_kind_has_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kinds = every_kind()
+    assert {name for name, kind in kinds.items() if not kind.exports} == {
+        name for name, kind in kinds.items() if kind.why_no_export
+    }
+    arguments = ("--root", ROOT, "export", "ais18_scoliosis", "p01", "-o", tmp_path / "a.osim")
+    code, _, err = run(capsys, *arguments)
+    assert code == 1
+    assert "films show rotations in one plane" in err
 
 
 @pytest.mark.parametrize(

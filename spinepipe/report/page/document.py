@@ -22,7 +22,7 @@ from spinepipe.tables import Tables
 from spinepipe.tables.schema import Column
 
 _VERSION = "version_"
-_OF_A_TABLE = ("code_digest", "config_digest", "specimens_digest", KEY)
+_OF_A_TABLE = ("code_digest", "config_digest", "data_digest", "specimens_digest", KEY)
 """What differs from table to table."""
 
 MOST_ROWS = 400

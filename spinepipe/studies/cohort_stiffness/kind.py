@@ -268,4 +268,5 @@ KIND = Kind(
         ),
         *_ANALYSES,
     ),
+    exports="export:exported",
 )

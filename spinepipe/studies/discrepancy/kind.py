@@ -110,4 +110,5 @@ KIND = Kind(
     jobs=(Job("search", at="job", reads_base=True),),
     makes_models="search",
     holds=True,
+    exports="export:exported",
 )

@@ -164,4 +164,5 @@ KIND = Kind(
         Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_of_batch),
         Job("analyse"),
     ),
+    exports="export:exported",
 )

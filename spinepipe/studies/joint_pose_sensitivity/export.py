@@ -4,47 +4,68 @@ from pathlib import Path
 
 import numpy as np
 
+from spinepipe.calibrate import fit
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model.osim import osim
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError
+from spinepipe.statics import moved
 from spinepipe.status import Status
+from spinepipe.studies.exports import needed, problem, refuse, written
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
     start_stiffness,
 )
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.kind import Wanted
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def exported(
-    study: JointPoseSensitivity, cohort: Cohort, specimen: str, pose: int | None, results: Path
-) -> tuple[str, str]:
+def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
     """OpenSim's document of the model, and in words which frames and which stiffness it has.
 
-    Parameters
-    ----------
-    pose : number of a sampled joint pose; None for the nominal one. results : of the study.
+    Of the cohort's own pose the fit is made here; those of sampled poses are results.
 
     Raises
     ------
     InputError
-        Where there is no such pose.
+        Where there is no such pose, or no stiffness that fits it.
     """
-    stiffness, origin = start_stiffness(study), "start of the study"
+    refuse(wanted, poses=True)
+    specimen, pose = wanted.specimen, wanted.pose
     if pose is None:
         frames, name = joint_frames(cohort, specimen), "nominal"
     else:
-        frames, name = _sampled(results, specimen, pose), f"{pose:04d}"
-        calibrated = _calibrated(results, specimen, pose)
-        if calibrated is not None:
-            stiffness, origin = calibrated, "calibrated for this pose"
+        frames, name = _sampled(wanted.results, specimen, pose), f"{pose:04d}"
+    if wanted.start:
+        stiffness, origin = start_stiffness(study), "start of the study"
+    elif pose is None:
+        stiffness, origin = _fitted(study, wanted, frames), "fitted in this pose"
+    else:
+        stiffness, origin = _calibrated(wanted.results, specimen, pose), "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
-    return osim(model), f"joint pose {name}, stiffness: {origin}"
+    return written(model, f"joint pose {name}, stiffness: {origin}")
+
+
+def _fitted(study: JointPoseSensitivity, wanted: Wanted, frames: tuple[Pose, ...]) -> Array:
+    """(J, 6) stiffness fitted in these frames, as the study fits.
+
+    Raises
+    ------
+    InputError
+        Where there is no fit to use.
+    """
+    asked = calibration_problem(str(wanted.root), study, wanted.specimen, frames)
+    found = fit(asked, study.calibration.starts, study.seed)
+    if not found.status.usable:
+        allowed, remedy = "a fit in the cohort's own joint pose", "add --start for the start"
+        raise InputError([problem("SPECIMEN", f"no fit: {found.message}", allowed, remedy)])
+    values: Array = moved(asked.model, asked.free, found.x).effects[0].values
+    return values
 
 
 def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
@@ -58,35 +79,38 @@ def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
     path = results / "poses.parquet"
     if not path.is_file():
         remedy = f"run `snakemake {_relative(path)}` first, or leave --pose out"
-        raise InputError([_problem("--pose", f"no {_relative(path)}", "a computed study", remedy)])
+        raise InputError([problem("--pose", f"no {_relative(path)}", "a computed study", remedy)])
     poses = sampled_poses(str(path))
     frames, reason = poses.of(specimen, pose)
     if frames is None:
         known = [number for name, number in poses.frames if name == specimen]
         allowed = f"0 to {max(known)}" if known else "none"
         found = f"pose {pose}" + (f", refused: {reason}" if reason else "")
-        raise InputError([_problem("--pose", found, allowed, "choose another pose")])
+        raise InputError([problem("--pose", found, allowed, "choose another pose")])
     return frames
 
 
-def _calibrated(results: Path, specimen: str, pose: int) -> Array | None:
-    """(1 or J, 6) stiffness fitted for a pose, or None where there is none to use."""
+def _calibrated(results: Path, specimen: str, pose: int) -> Array:
+    """(1 or J, 6) stiffness fitted for a pose.
+
+    Raises
+    ------
+    InputError
+        Where there is none to use.
+    """
     whole = results / "calibrations.parquet"
     single = results / "calibrations" / f"specimen={specimen}" / f"pose={pose:04d}.parquet"
-    path = next((path for path in (single, whole) if path.is_file()), None)
-    if path is None:
-        return None
+    path = single if single.is_file() else needed(whole, "a computed study")
     rows = read_frame(path)
     rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]
-    if not len(rows) or not Status(rows["status"].iloc[0]).usable:
-        return None
     values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
-    return values if np.isfinite(values).all() else None
+    usable = len(rows) and Status(rows["status"].iloc[0]).usable and np.isfinite(values).all()
+    if not usable:
+        found = f"no stiffness: {rows['message'].iloc[0]}" if len(rows) else "no fit of it"
+        remedy = "choose another pose, or add --start for the start"
+        raise InputError([problem("--pose", found, "a pose whose fit ended", remedy)])
+    return values
 
 
 def _relative(path: Path) -> str:
     return "/".join(path.parts[-3:])
-
-
-def _problem(column: str, found: str, allowed: str, remedy: str) -> Problem:
-    return Problem("command line", None, column, found, allowed, remedy)

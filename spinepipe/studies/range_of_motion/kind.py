@@ -111,4 +111,5 @@ KIND = Kind(
         Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
         Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),
+    exports="export:exported",
 )

@@ -4,7 +4,6 @@ Bodies are slices of the trunk, without head and arms. Names that OpenSim cannot
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +13,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import KEY, read_mark, write_marked
 from spinepipe.motion.export import mot, osim, usable
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.problems import InputError, Problem
+from spinepipe.studies.exports import refuse
+from spinepipe.studies.kind import Wanted
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.moved import motions
 from spinepipe.studies.tracking.persons import Person, person_of
@@ -55,22 +55,16 @@ def document(person: Person) -> str:
     return osim(person.skeleton, markers, name)
 
 
-def exported(
-    study: Tracking, cohort: Cohort, specimen: str, pose: int | None, _results: Path
-) -> tuple[str, str]:
-    """OpenSim's model of a person, and in words what it is.
+def exported(study: Tracking, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+    """OpenSim's model of a person, and in words what it is: a skeleton, without stiffness.
 
     Raises
     ------
     InputError
-        Where a joint pose is asked for: nothing of such a study is sampled.
+        Where a joint pose or a representation is asked for.
     """
-    if pose is not None:
-        place = ("command line", None, "--pose", f"pose {pose}")
-        raise InputError(
-            [Problem(*place, "none: joints of this study are not sampled", "leave it out")]
-        )
-    person = person_of(cohort, specimen, cohort.folder, study.scaling)
+    refuse(wanted)
+    person = person_of(cohort, wanted.specimen, cohort.folder, study.scaling)
     size = "made as large as markers say" if study.scaling == "markers" else "of the cohort"
     count = len(person.markers)
     return document(person), f"skeleton {size}, {count} markers, without head and arms"

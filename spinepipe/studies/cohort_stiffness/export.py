@@ -1,0 +1,102 @@
+"""The model of a specimen with its fitted stiffness, as `spinepipe export` writes it."""
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames
+from spinepipe.effects.contract import Array
+from spinepipe.problems import InputError, one_of
+from spinepipe.status import USABLE
+from spinepipe.studies.cohort_stiffness.problem import base_effects, start_stiffness, stiff_model
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
+from spinepipe.studies.cohort_stiffness.settings import (
+    ALL,
+    CohortStiffness,
+    representations_of,
+    tests_of,
+)
+from spinepipe.studies.exports import needed, problem, refuse, written
+from spinepipe.studies.kind import Wanted
+from spinepipe.tables import read_frame
+from spinepipe.units import COORDINATES
+
+CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
+"""What recommends a representation: motion that no fit has seen, as far as any was held out."""
+
+
+def exported(study: CohortStiffness, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+    """OpenSim's document of the model, and in words which stiffness it has.
+
+    Coordinates that were not fitted keep the published value.
+
+    Raises
+    ------
+    InputError
+        Where the study has no such representation, no results, or no fit of the specimen.
+    """
+    refuse(wanted, representations=True)
+    known = representations_of(study, cohort.joint_names)
+    name = wanted.representation
+    if name is not None and name not in known:
+        remedy = "choose one of them, or leave the option out"
+        raise InputError([problem("--representation", name, one_of(known), remedy)])
+    why = ""
+    if name is None:
+        name, why = (known[0], "") if wanted.start else _recommended(wanted, known)
+    k = start_stiffness(study, cohort, name)
+    told = "start of the study" if wanted.start else f"fitted, {IN_WORDS[name]}{why}"
+    if not wanted.start:
+        k = _fitted(study, cohort, wanted, name, k)
+    others = base_effects(str(wanted.root), study, cohort, wanted.specimen)
+    frames = joint_frames(cohort, wanted.specimen)
+    model = stiff_model(cohort, wanted.specimen, frames, k, others)
+    return written(model, f"the cohort's own joints, stiffness: {told}")
+
+
+def _recommended(wanted: Wanted, known: tuple[str, ...]) -> tuple[str, str]:
+    """The representation that is best on held-out motion, and why it is taken, in words."""
+    ranking = read_frame(needed(wanted.results / "ranking.parquet", "a computed study"))
+    own = ranking[ranking["representation"].isin(known)]
+    for criterion in CRITERIA:
+        rows = own[own["criterion"] == criterion].dropna(subset=["rank"])
+        if len(rows):
+            best = rows.sort_values("rank", kind="stable").iloc[0]
+            words = criterion.replace("_", "-")
+            return str(best["representation"]), f" (first by {words} error)"
+    return known[-1], ""
+
+
+def _fitted(
+    study: CohortStiffness, cohort: Cohort, wanted: Wanted, name: str, start: Array
+) -> Array:
+    """(J, 6) the specimen's own fit to all its load cases, not fitted coordinates as at the start.
+
+    Raises
+    ------
+    InputError
+        Where there is no fit to use.
+    """
+    rows = read_frame(needed(wanted.results / "stiffness.parquet", "a computed study"))
+    tests = tests_of(study, cohort)
+    own = rows[
+        (rows["specimen"] == wanted.specimen)
+        & (rows["representation"] == name)
+        & (rows["source"] == "own")
+        & (rows["fitted_to"] == (ALL if len(tests) > 1 else tests[0]))
+    ]
+    fitted = own[own["status"].isin(USABLE) & own["stiffness"].notna()]
+    if fitted.empty or len(fitted) < len(own):
+        found = f"no fit of {wanted.specimen} by {name}{_because(own)}"
+        remedy = "choose another --representation, or add --start"
+        raise InputError([problem("SPECIMEN", found, "a specimen that was fitted", remedy)])
+    k = start.copy()
+    for joint, coordinate, value in fitted[["joint", "coordinate", "stiffness"]].itertuples(
+        index=False
+    ):
+        k[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = value
+    return k
+
+
+def _because(rows: pd.DataFrame) -> str:
+    messages = [str(text) for text in rows["message"].unique() if text]
+    return f": {'; '.join(messages)}" if messages else ""

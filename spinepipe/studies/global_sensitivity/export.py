@@ -1,0 +1,26 @@
+"""The model of a specimen before anything is varied, as `spinepipe export` writes it."""
+
+import numpy as np
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames, on_bushings
+from spinepipe.studies.exports import refuse, written
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.kind import Wanted
+from spinepipe.studies.parts import stiffness_of_joints
+
+
+def exported(study: GlobalSensitivity, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+    """OpenSim's document of the model, and in words what it is.
+
+    Raises
+    ------
+    InputError
+        Where a joint pose or a representation is asked for.
+    """
+    refuse(wanted)
+    frames = joint_frames(cohort, wanted.specimen)
+    stiffness = stiffness_of_joints(cohort, study.stiffness, study.level_stiffness)
+    damping = np.array(study.damping.in_order(), dtype=float)
+    model = on_bushings(cohort, wanted.specimen, frames, stiffness, damping)
+    return written(model, "the cohort's own joints, stiffness: the study's own, nothing is fitted")
