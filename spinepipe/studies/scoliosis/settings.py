@@ -116,7 +116,7 @@ class Scoliosis(Study):
     film_regions: bool = Field(
         default=True,
         description="whether tangent_fitted looks for how far a patient's films let each ratio go; "
-        "some 5 s a patient",
+        "takes longer than all else of a patient",
     )
     tilt_sd_deg: float | None = Field(
         default=None, gt=0, le=20, description="SD of a vertebra's tilt, where no repeats tell it"
