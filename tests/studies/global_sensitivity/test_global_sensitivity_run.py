@@ -77,7 +77,7 @@ def test_the_base_is_the_lever_too(computed: Project) -> None:
     """2 N at 20 mm less 1 N at 30 mm over 51 N m/rad; 0.01 deg were measured."""
     rows = table(computed, "known", "base_motion")
     row = rows[(rows["joint"] == "*") & (rows["specimen"] == "b")].iloc[0]
-    assert row["predicted"] == pytest.approx(57.29578 * 0.01 / 51.0, rel=1e-3)
+    assert row["predicted"] == pytest.approx(57.29578 * 0.01 / 51.0, rel=2e-3)
     assert row["measured"] == MEASURED_DEG
     assert row["verdict"] == "near"
     failed = table(computed, "known", "failed_runs")
