@@ -140,18 +140,23 @@ def _far(study: GlobalSensitivity, motion: pd.DataFrame) -> Iterator[str]:
             f"{listed(worst, MOST)}. Near is half to twice. The indices are those of another "
             f"spine: {remedy}."
         )
-    gone = _of_tests(motion, "no_equilibrium")
-    if len(gone):
-        where = listed(
-            [f"{row['specimen']} {plain(row['test'])}" for _, row in gone.iterrows()], MOST
-        )
-        yield f"The base itself has no equilibrium: {where}."
+    gone = _without_equilibrium(motion)
+    if gone:
+        yield f"The base itself has no equilibrium: {listed(gone, MOST)}."
+
+
+def _without_equilibrium(motion: pd.DataFrame) -> list[str]:
+    """Specimens and tests in which the base does not stand."""
+    if motion.empty:
+        return []
+    rows = motion[motion["verdict"] == "no_equilibrium"].drop_duplicates(["specimen", "test"])
+    return [f"{row['specimen']} {plain(row['test'])}" for _, row in rows.iterrows()]
 
 
 def _near(motion: pd.DataFrame) -> Iterator[str]:
     """Tests in which the base moves like the specimen."""
     near, far = _of_tests(motion, "near"), _of_tests(motion, "far")
-    if motion.empty:
+    if motion.empty or (near.empty and far.empty and _without_equilibrium(motion)):
         return
     if near.empty and far.empty:
         yield (
@@ -246,11 +251,13 @@ def _where(part: pd.DataFrame) -> str:
     sure = part[part["mostly"] != "nowhere"].sort_values("p", kind="stable")
     if sure.empty:
         return "at no end of a factor more often than by chance"
+    several = part["specimen"].nunique() > 1
     told = []
     for row in sure.head(MOST).to_dict("records"):
         column, which = _THIRD[row["mostly"]]
         n, of = int(row[column]), int(row["failed"])
-        told.append(f"{n} of {of} in the {which} third of {plain(row['factor'])}")
+        whose = f" of {row['specimen']}" if several else ""
+        told.append(f"{n} of {of}{whose} in the {which} third of {plain(row['factor'])}")
     return f"{listed(told, MOST)}, whose effect may then be understated"
 
 

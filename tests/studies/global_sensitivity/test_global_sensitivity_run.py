@@ -15,6 +15,7 @@ from small_project import Project, Shared
 
 pytestmark = pytest.mark.slow
 
+RESTS_ON = ("base_stiffness", "base_motion", "failed_runs")
 SHARES = {"load_point_x": 0.8, "load_point_y": 0.2, "bending": 0.0, "dummy": 0.0}
 
 
@@ -35,7 +36,7 @@ def build(folder: Path) -> Project:
 
 def tables(study: str) -> list[str]:
     """All tables of a study."""
-    names = ("design", "responses", "indices", "convergence")
+    names = ("design", "responses", "indices", "convergence", *RESTS_ON)
     return [f"results/{study}/{name}.parquet" for name in names]
 
 
@@ -72,6 +73,18 @@ def test_motion_is_the_lever_s(computed: Project) -> None:
     assert (motion - 57.29578 * found / 51.0).abs().max() < 1e-9
 
 
+def test_the_base_is_the_lever_too(computed: Project) -> None:
+    """2 N at 20 mm less 1 N at 30 mm over 51 N m/rad; 0.01 deg were measured."""
+    rows = table(computed, "known", "base_motion")
+    row = rows[(rows["joint"] == "*") & (rows["specimen"] == "b")].iloc[0]
+    assert row["predicted"] == pytest.approx(57.29578 * 0.01 / 51.0, rel=2e-3)
+    assert row["measured"] == MEASURED_DEG
+    assert row["verdict"] == "near"
+    failed = table(computed, "known", "failed_runs")
+    assert set(failed["factor"]) == set(SHARES)
+    assert (failed["failed"] == 0).all()
+
+
 def test_samples_per_target_change_no_row(computed: Project) -> None:
     jobs = "jobs/responses/specimen=a"
     count = {
@@ -79,7 +92,7 @@ def test_samples_per_target_change_no_row(computed: Project) -> None:
         for name in ("single", "batches")
     }
     assert count == {"single": 48, "batches": 7}
-    for name in ("design", "responses", "indices", "convergence"):
+    for name in ("design", "responses", "indices", "convergence", *RESTS_ON):
         one, other = (table(computed, study, name) for study in ("single", "batches"))
         pd.testing.assert_frame_equal(one, other)
 
@@ -109,7 +122,12 @@ def test_calibrated_stiffness_is_the_lever_s(tmp_path: Path) -> None:
     project = lever(tmp_path / "project", ("fitted", 16, more))
     project.edit("config/studies/fitted.yaml", "sd: 5", "sd: 0.5")
     project.edit("config/studies/fitted.yaml", "joint_load: [extension]}", "stiffness: true}")
+    project.edit("config/studies/fitted.yaml", "bootstraps: 200", "stiffness: fitted")
     project.run()
+    base = table(project, "fitted", "base_stiffness").query("coordinate == 'extension'")
+    by_hand = 0.01 / np.deg2rad(MEASURED_DEG)  # N m over rad, without factors
+    assert base["stiffness"].to_numpy() == pytest.approx([by_hand, by_hand], rel=0.01)
+    assert set(base["source"]) == {"fitted"}
     design = table(project, "fitted", "design").pivot(
         index="sample", columns="factor", values="value"
     )
