@@ -271,11 +271,14 @@ def test_parts_that_were_left_out_are_named(study: JointPoseSensitivity) -> None
     }
     for part, name in parts.items():
         settings[part][name] = 3
+    settings["load_point"]["superior_mm"] = (0.0, 3.0)
     assert left_out(JointPoseSensitivity.model_validate(settings)) == ()
     settings["start_bootstrap"]["sets"] = settings["methods"]["poses"] = 0
+    settings["load_point"]["superior_mm"] = (0.0,)
     assert left_out(JointPoseSensitivity.model_validate(settings)) == (
         "bootstrap over start values (start_bootstrap: sets: 0)",
         "comparison of ways of fitting (methods: poses: 0)",
+        "stiffness over load points (load_point: one point and no SD)",
     )
 
 
