@@ -269,8 +269,16 @@ def _zone(curve: Curve) -> Array | None:
     at = int(np.argmax(second)), int(np.argmin(second))
     if at[0] >= at[1] or at[0] == 0 or at[1] == len(x) - 1:
         return None
-    third = [lambda p: float(_value(curve.theta, p, 3))] * 2
-    return np.array([brentq(f, x[n - 1], x[n + 1]) for f, n in zip(third, at, strict=True)])
+    third = _value(curve.theta, x, 3)
+    if third[at[0] - 1] <= 0.0 or third[at[1] - 1] >= 0.0:
+        return None
+    if third[at[0] + 1] >= 0.0 or third[at[1] + 1] <= 0.0:
+        return None
+
+    def slope(place: float) -> float:
+        return float(_value(curve.theta, np.asarray(place), 3))
+
+    return np.array([brentq(slope, x[one - 1], x[one + 1]) for one in at])
 
 
 def _measured(curve: Curve, places: Array) -> NeutralZone:

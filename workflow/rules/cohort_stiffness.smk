@@ -80,7 +80,9 @@ rule experiment:
     input:
         base_model,
         # The specimen's own fit to all load cases, with which its tests are simulated.
-        fitted=lambda wildcards: layout(wildcards.study).simulated_fit(wildcards.specimen),
+        fitted=lambda wildcards: layout(wildcards.study).simulated_fit(
+            wildcards.specimen
+        ),
     output:
         load_displacement=f"{COHORTS}/experiment/specimen={{specimen}}/load_displacement.parquet",
         helical_axes=f"{COHORTS}/experiment/specimen={{specimen}}/helical_axes.parquet",

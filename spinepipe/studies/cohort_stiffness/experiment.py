@@ -258,8 +258,7 @@ class _Read:
     def curve(self, motion: Array, spread: Spread | None) -> Row:
         """Row of the curve of motion (T, 6), without its source."""
         row = displacement_row(Seen(self.loop(motion), spread, self.sd))
-        ended = {"coordinate": self.cycle.coordinate, "status": Status.CONVERGED.value}
-        return row | ended
+        return row | {"coordinate": self.cycle.coordinate}
 
     def axis(
         self, motion: Array, root: Array | None, free: Array | None, source: str, name: str

@@ -10,6 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.experiment.double_sigmoid import NeutralZone, Zone, neutral_zone
 from spinepipe.experiment.loop import Loop, Measure, Spread, stiffness_interval
 from spinepipe.experiment.screw import SMALLEST_ANGLE, derivatives, screw_between
+from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
     BEYOND,
     DIRECTION,
@@ -59,7 +60,7 @@ class Seen:
 
 
 def displacement_row(seen: Seen) -> Row:
-    """What is read off a curve of two steps at least; without key, coordinate and status."""
+    """What is read off a curve of two steps at least; without key and coordinate."""
     loop = seen.loop
     row = empty(LOAD_DISPLACEMENT) | {
         "readings": len(loop.load),
@@ -67,9 +68,10 @@ def displacement_row(seen: Seen) -> Row:
         "largest_load_nm": float(loop.load.max()),
         "neutral_zone": Zone.NOT_READ.value,
         "elastic_zone": NOWHERE,
+        "status": Status.CONVERGED.value,
     }
     if not loop.goes_round_once:
-        return row | {"message": MANY}
+        return row | {"status": Status.REFUSED.value, "message": MANY}
     row |= _in_deg(seen, "range_of_motion", loop.range_of_motion())
     zones, found, why = _zones(seen)
     row["neutral_zone"] = found.value

@@ -42,7 +42,7 @@ def ranges(study: CohortStiffness, results: Results) -> Iterator[str]:
         return
     differences = found["simulated"] - found["measured"]
     low, middle, high = (float(differences.quantile(share)) for share in (0.25, 0.5, 0.75))
-    name = rows.loc[rows["source"] == SIMULATED, "representation"].iloc[0]
+    name = max(rows["representation"])  # of readings there is none
     told = (
         f"Range of motion, the model ({IN_WORDS[name]}) less the joint: median {number(middle, 2)}°"
         f" over {count(len(found), 'curve')}, middle half {number(low, 2)}° to {number(high, 2)}°"

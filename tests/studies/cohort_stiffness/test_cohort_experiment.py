@@ -10,12 +10,18 @@ from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
+from spinepipe.cohort import read
+from spinepipe.cohort.measured import measured_specimen
+from spinepipe.experiment.loop import Loop
 from spinepipe.report.page.document import Results
+from spinepipe.studies.cohort_stiffness.loops import cycles_of
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
+from spinepipe.units import COORDINATES
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 KEY = ["joint", "test", "cycle", "source"]
 SD_DEG = 0.1
+ROOT = Path(__file__).parents[3]
 
 
 def curve(found: Tables, joint: str, test: str, source: str = "measured") -> pd.Series:
@@ -187,6 +193,31 @@ def test_tests_without_a_moment_are_rows_without_a_curve(tmp_path: Path) -> None
     assert row["status"] == "refused"
     assert "no moment" in row["message"]
     assert set(found["helical_axes"]["test"]) == {"left_lateral_bending"}
+
+
+def test_cycles_that_were_not_numbered_are_refused(tmp_path: Path) -> None:
+    moment = np.tile([0.0, 4.0, 0.0, -4.0], 3)
+    chains = looped(Chains({"a": A}, ["flexion"]), moment, moment)
+    row = curve(chains.write(tmp_path).experiment("a", None), "L4L5", "flexion")
+    assert row["status"] == "refused"
+    assert "number its cycles" in row["message"]
+    assert pd.isna(row["range_of_motion_deg"])
+
+
+def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
+    """Heuer et al. 2007, L4-L5 disc: -10.11 and 10.28 deg at 7.5 N m, -8.38 and 7.92 at 5."""
+    cohort = read(ROOT / "config/cohorts/l4l5_disc")
+    tested = measured_specimen(cohort, "heuer_2007", cohort.tests).tested
+    (cycle,) = (one for one in cycles_of(tested) if one.test == "flexion+extension")
+    assert cycle.coordinate == "extension"
+    place = COORDINATES.index("extension")
+    loop = Loop(cycle.load, cycle.measured[:, 0, place])
+    assert np.rad2deg(loop.range_of_motion().value) == pytest.approx(10.11 + 10.28)
+    slopes = [loop.elastic_compliance(side, None) for side in (-1, 1)]
+    found = [1.0 / one.value for one in slopes if one is not None]
+    assert found == pytest.approx([2.5 / np.deg2rad(10.11 - 8.38), 2.5 / np.deg2rad(10.28 - 7.92)])
+    sides = {one.test for one in cycles_of(tested)}
+    assert {"right_bending", "left_rotation"} < sides, "one side of each was tested"
 
 
 def told(**changed: pd.DataFrame) -> list[str]:
