@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.descent import Settled, descend, descend_along, once
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import uncertainty
@@ -273,7 +273,10 @@ def _refitted(
         ):
             return cost, whole(moved)
         size, scale = len(optimum.residual), problem.scale[others]
-        ended = descend(once(point), begin, bounds, scale, size, ENOUGH)
+        if problem.along_bounds:
+            ended = descend_along(point, begin, bounds, scale, ENOUGH)
+        else:
+            ended = descend(once(point), begin, bounds, scale, size, ENOUGH)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, optimum.x
 
