@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.decomposition import bounded_least_squares
+from spinepipe.decomposition import bounded_least_squares, bounded_lstsq
 from spinepipe.effects.contract import Array
 
 Point = Callable[[Array], tuple[Array, Array] | None]
@@ -101,3 +101,60 @@ def descend(
         max_nfev=settled.evaluations,
     )
     return Descent(result.x, float(result.cost), bool(result.success), int(result.nfev))
+
+
+DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e9
+"""Of a step along bounds, in squares of the Jacobian's columns: at first, and its ends."""
+
+EASED, STIFFENED = 0.1, 5.0
+"""Factors of the damping after a step that kept its promise, and after one that did not."""
+
+PROMISE = 1e-3
+"""Share of the gain that the linearised cost promises, below which a step is not taken."""
+
+
+def descend_along(
+    point: Point, start: Array, bounds: tuple[Array, Array], scale: Array, settled: Settled
+) -> Descent:
+    """The same where optima lie on bounds: each step is a damped linear fit inside the bounds.
+
+    `descend` keeps strictly inside and crawls once some unknowns are where they end. Levenberg and
+    Marquardt's method with the bounds in its linear problem; parameters as of `descend`.
+    """
+    x, found, damping = start, point(start), DAMPING
+    if found is None:
+        return Descent(start, np.inf, False, 1)
+    for number in range(1, settled.evaluations):
+        residual, jacobian = found
+        cost = float(residual @ residual)
+        step = _damped(
+            residual, jacobian * scale, damping, np.array([bounds[0] - x, bounds[1] - x]) / scale
+        )
+        left = residual + jacobian @ (step * scale)
+        promised = cost - float(left @ left)
+        if promised <= settled.cost * cost or np.abs(step).max() <= settled.step:
+            return Descent(x, 0.5 * cost, True, number)
+        trial = np.clip(x + step * scale, *bounds)
+        new = point(trial)
+        gained = -np.inf if new is None else cost - float(new[0] @ new[0])
+        if new is not None and gained >= PROMISE * promised:
+            x, found, damping = trial, new, max(damping * EASED, LEAST_DAMPING)
+        elif damping < MOST_DAMPING:
+            damping *= STIFFENED
+        else:
+            break
+    return Descent(x, 0.5 * float(found[0] @ found[0]), False, settled.evaluations)
+
+
+def _damped(residual: Array, jacobian: Array, damping: float, reach: Array) -> Array:
+    """(m,) step within ``reach`` (2, m) of least linearised cost, damped by the columns' sizes."""
+    sizes = np.linalg.norm(jacobian, axis=0)
+    sizes = np.maximum(sizes, 1e-6 * max(float(sizes.max(initial=0.0)), 1e-300))
+    rows = np.vstack([jacobian, np.diag(np.sqrt(damping) * sizes)])
+    targets = np.append(-residual, np.zeros(len(sizes)))
+    low, high = np.minimum(reach[0], -INSIDE), np.maximum(reach[1], INSIDE)
+    return bounded_lstsq(rows, targets, (low, high))
+
+
+INSIDE = 1e-12
+"""Bounds of a step lie at least this far apart, in the unknowns' scale."""

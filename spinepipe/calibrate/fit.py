@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
+from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend, descend_along
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.profile import Profile, Reach, profile
@@ -224,14 +224,13 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
             return None
         return found.residual, found.jacobian
 
-    ended = descend(
-        point,
-        np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9),
-        (problem.lower, problem.upper),
-        problem.scale,
-        len(evaluator.coordinate),
-        _settled(problem),
-    )
+    begin = np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9)
+    bounds, settled = (problem.lower, problem.upper), _settled(problem)
+    if problem.along_bounds:
+        ended = descend_along(point, begin, bounds, problem.scale, settled)
+    else:
+        size = len(evaluator.coordinate)
+        ended = descend(point, begin, bounds, problem.scale, size, settled)
     x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)

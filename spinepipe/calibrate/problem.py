@@ -49,6 +49,8 @@ class Problem:
     correlated : whether the readings of a zeroed case share the error of step 0, and the cost
         allows for it: its residuals are then whitened, each with the SD of one reading before it
         was zeroed, and least squares is generalised least squares.
+    along_bounds : whether optima are expected on bounds, as of strengths that may be off: fits then
+        go along them.
     """
 
     model: SpineModel
@@ -59,6 +61,7 @@ class Problem:
     upper: Array
     course: Course | None = None
     correlated: bool = False
+    along_bounds: bool = False
 
     @cached_property
     def scale(self) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from spinepipe.calibrate.descent import Point, Settled, descend, once
+from spinepipe.calibrate.descent import Point, Settled, descend, descend_along, once
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import UNSEEN_SHARE, uncertainty
@@ -108,7 +108,7 @@ class Best:
     x : (m,), residual (N,), jacobian (N, m). lower, upper : (m,) bounds.
     scale : (m,) size of a typical change. bent : (m,) whether an unknown is the logarithm of a
         stiffness: what is read grows with one over it.
-    enough : when the others have been fitted well enough.
+    enough : when the others have been fitted well enough. along_bounds : as of `Problem`.
     """
 
     x: Array
@@ -119,6 +119,7 @@ class Best:
     scale: Array
     bent: NDArray[np.bool_]
     enough: Settled = ENOUGH
+    along_bounds: bool = False
 
     def others(self, unknown: int) -> Indices:
         """All but one."""
@@ -164,7 +165,7 @@ def profile(
         return Profile(problem.lower.copy(), problem.upper.copy(), nothing[0], nothing[1], False)
     bent = np.array([parameter.logarithmic for parameter in problem.free])
     measured, limits = (evaluation.residual, evaluation.jacobian), (problem.lower, problem.upper)
-    best = Best(x, *measured, *limits, problem.scale, bent)
+    best = Best(x, *measured, *limits, problem.scale, bent, along_bounds=problem.along_bounds)
     rises = _rises(problem, evaluation, at_bound, noise, level)
 
     def together(searches: Sequence[_Search]) -> list[_End]:
@@ -361,7 +362,10 @@ def _refitted(
         ):
             return cost, whole(moved)
         size, scale = len(best.residual), best.scale[others]
-        ended = descend(once(held), begin, bounds, scale, size, best.enough)
+        if best.along_bounds:
+            ended = descend_along(held, begin, bounds, scale, best.enough)
+        else:
+            ended = descend(once(held), begin, bounds, scale, size, best.enough)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, best.x
 

@@ -12,7 +12,12 @@ from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
-from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, POOLED, PUBLISHED
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    POOLED,
+    PUBLISHED,
+    STIFFENING,
+)
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 
@@ -119,8 +124,9 @@ def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
         f"{len(places)} to all load cases: {_some(places)}" if places else "",
         f"{fewer} to fewer load cases, which say too little about it" if fewer else "",
     ]
+    what = "stiffness or a growth" if at["representation"].isin(STIFFENING).any() else "stiffness"
     yield (
-        f"{count(len(at), 'fit')} of {len(rows)} ended with a stiffness at a bound, where the data "
+        f"{count(len(at), 'fit')} of {len(rows)} ended with a {what} at a bound, where the data "
         f"only say that it is beyond: {'; '.join(part for part in parts if part)}."
     )
 

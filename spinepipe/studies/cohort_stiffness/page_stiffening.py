@@ -30,12 +30,26 @@ def stiffening(study: CohortStiffness, results: Results) -> Iterator[str]:
     rows = results.table("findings")
     for better, worse in CONTESTS:
         if len(rows) and better in STIFFENING and worse not in STIFFENING:
-            yield from _worth(better, worse, rows.set_index("finding"))
+            criterion = _akaike(better, worse, results.table("ranking"))
+            yield from _worth(better, worse, rows.set_index("finding"), criterion)
     yield from _held(results.table("stiffness"))
 
 
-def _worth(better: str, worse: str, claims: pd.DataFrame) -> Iterator[str]:
-    """What held-out motion says of one law against the linear one."""
+def _akaike(better: str, worse: str, ranking: pd.DataFrame) -> str:
+    """Which of the two Akaike's criterion prefers, of what was fitted; empty without values."""
+    if ranking.empty:
+        return ""
+    values = ranking[ranking["criterion"] == "aicc"].set_index("representation")["value"].dropna()
+    if not {better, worse} <= set(values.index):
+        return ""
+    less = float(values[worse] - values[better])
+    name = "the law that stiffens" if less > 0.0 else "the linear one"
+    by = number(abs(less), 2)
+    return f" Of the motion that was fitted Akaike's criterion prefers {name}, by {by}."
+
+
+def _worth(better: str, worse: str, claims: pd.DataFrame, criterion: str) -> Iterator[str]:
+    """What held-out motion says of one law against the linear one, and a criterion beside it."""
     names = {stage: f"{better}_beats_{worse}_{stage}" for stage in _HELD_OUT}
     asked = {
         stage: claims.loc[name].to_dict()
@@ -45,15 +59,16 @@ def _worth(better: str, worse: str, claims: pd.DataFrame) -> Iterator[str]:
     if not asked:
         return
     holds = {row["holds"] for row in asked.values()}
-    verdict = "not shown"
+    verdict = "Not shown"
     if "no" in holds:
-        verdict = "no" if "yes" not in holds else "it hangs on what is held out"
+        verdict = "No" if "yes" not in holds else "It hangs on what is held out"
     elif "yes" in holds:
-        verdict = "yes"
+        verdict = "Yes"
     told = "; ".join(f"{_HELD_OUT[stage]} {_told(row)}" for stage, row in asked.items())
+    names_of = f"\u201c{IN_WORDS[better]}\u201d against \u201c{IN_WORDS[worse]}\u201d"
     yield (
-        f"Are joints that stiffen worth their parameters? {verdict[0].upper()}{verdict[1:]}. "
-        f"With \u201c{IN_WORDS[better]}\u201d against \u201c{IN_WORDS[worse]}\u201d {told}."
+        f"Do joints that stiffen predict better what was not fitted? {verdict}. With {names_of} "
+        f"{told}.{criterion}"
     )
 
 

@@ -129,7 +129,7 @@ def calibration_problem(
     )
     shared = study.cost == "measurement_sd" and cohort.zeroed_at_step_0
     weights = _weights(study, cohort)
-    return Problem(model, cases, free, weights, -reach, reach, correlated=shared)
+    return Problem(model, cases, free, weights, -reach, reach, None, shared, one.stiffens)
 
 
 def _in_cost(study: CohortStiffness, one: MeasuredCycle) -> Array:

@@ -56,7 +56,8 @@ def held_out_error_figure(
         axis.set_xlim(low, high)
         log_ticks(axis.xaxis, low, high, 5)
         axis.set_xlabel(f"root mean square error of {MOTIONS[unit]} ({SIGNS[unit]})")
-        axis.set_yticks(range(len(rows)), [IN_WORDS[row].replace(" of ", "\nof ") for row in rows])
+        names = [IN_WORDS[row].replace(" of ", "\nof ").replace(", ", ",\n") for row in rows]
+        axis.set_yticks(range(len(rows)), names)
         axis.set_ylim(-0.55, len(rows) - 0.35)
         axis.spines["left"].set_visible(False)
         for representation, value in published.items():
