@@ -3,6 +3,7 @@
 import argparse
 
 from spinepipe.reference.pages import outdated, refreshed
+from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -10,10 +11,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check", action="store_true", help="write nothing; fail where a page is out of date"
     )
+    parser.add_argument(
+        "--figures",
+        action="store_true",
+        help="copy the pictures of README and tutorial from results instead",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the pages that are out of date, or name them."""
+    """Write the pages that are out of date, or name them; or copy pictures."""
+    if options.figures:
+        return _pictures(options)
     pages = outdated(options.root)
     for path in pages:
         name = path.relative_to(options.root)
@@ -25,3 +33,13 @@ def run(options: argparse.Namespace) -> int:
     if not pages:
         print("ok    every generated part of docs/ is up to date")
     return 1 if pages and options.check else 0
+
+
+def _pictures(options: argparse.Namespace) -> int:
+    """Copy what was computed, and name what was not."""
+    found = renewed(options.root)
+    for name, there in found.items():
+        source = PICTURES[name]
+        told = f"wrote {FOLDER / name} from {source}"
+        print(told if there else f"FAIL  {FOLDER / name}: no {source}; run `make all` first")
+    return 0 if all(found.values()) else 1

@@ -1,0 +1,121 @@
+"""Numbers and pictures of README and tutorial are those of the files that come along.
+
+Counts are taken from settings, schemas and tables of the repository, times from the results of
+`make bench`. What only a run of studies can tell is compared where their results are there.
+"""
+
+import json
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from spinepipe.anatomy import published
+from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def text(name: str) -> str:
+    """A page in one line, as it is read."""
+    return " ".join((ROOT / name).read_text().split())
+
+
+README, TUTORIAL = text("README.md"), text("docs/tutorial.md")
+CITING = {"README.md": README, "docs/tutorial.md": TUTORIAL}
+
+
+def numbers(pattern: str, page: str) -> set[float]:
+    """All numbers that a page states in such a place."""
+    found = {float(number) for number in re.findall(pattern, page)}
+    assert found, f"no page states {pattern}"
+    return found
+
+
+def bench(name: str) -> dict:
+    """Results of `make bench`."""
+    return json.loads((ROOT / f"benchmarks/results/{name}.json").read_text())
+
+
+def test_counts_are_those_of_the_study_that_comes_along() -> None:
+    study = yaml.safe_load((ROOT / "config/studies/l1l4_joint_pose.yaml").read_text())
+    poses = {float(study["poses"])}
+    for page in (README, TUTORIAL):
+        assert numbers(r"(\d+) plausible", page) == poses
+    assert numbers(r"stiffness over (\d+) joint poses", README) == poses
+    assert numbers(r"All (\d+) fits end", README) == poses
+    assert numbers(r"calibrate \d+/(\d+)", TUTORIAL) == poses
+    paper = published("gould_2024a")["counts"]
+    kept = paper["pose_samples_successful"]
+    assert numbers(r"the paper kept (\d+) of \d+", README) == {float(kept)}
+
+
+def test_published_numbers_are_counted() -> None:
+    """Each claim of the comparison is a row of its table."""
+    assert numbers(r"sets (\d+) published numbers", README) == {float(len(CLAIMS))}
+
+
+def test_the_phantoms_of_the_coverage_are_counted() -> None:
+    told = (ROOT / "tests/validation/results/coverage.md").read_text()
+    phantoms = int(re.findall(r"(\d+) phantoms of six specimens", told)[0])
+    assert numbers(r"over (\d+) such phantoms", README) == {float(phantoms)}
+    rows = pd.read_csv(ROOT / "tests/validation/results/coverage.csv")
+    inside = rows[rows["centre_error_mm"] == 0]["coverage_percent"].mean()
+    assert numbers(r"hold \[(\d+) % of the true values", README) == {round(inside)}
+    names = pd.read_csv(ROOT / "config/cohorts/t12s1_phantom/specimens.csv")["specimen"]
+    assert len(names) == 6
+    assert "fits each of six specimens" in README
+
+
+def test_times_are_those_that_were_measured() -> None:
+    (cold,) = [row for row in bench("whole_study")["study"] if "cold" in row["what"]]
+    for page in (README, TUTORIAL):
+        assert numbers(r"took (\d+) s on two cores", page) == {round(cold["wall_s"])}
+    assert numbers(r"(\d+) unknowns, ", README) == {18.0}
+    fitted = bench("cohort")["specimen"]
+    assert "fit of 18 stiffnesses" in fitted["what"]
+    assert numbers(r"unknowns, \[([\d.]+) s\]", README) == {round(fitted["ours_s"], 2)}
+
+
+def test_no_other_time_is_told() -> None:
+    """Minutes and hours of a run are told with what measured them, or not at all."""
+    told = r"[^.]*\b(?:minutes|quarter of an hour|hours)\b[^.]*\."
+    for name, page in CITING.items():
+        runs = [one for one in re.findall(told, page) if "a minute or two" not in one]
+        assert [one for one in runs if "core" in one or "take" in one] == [], name
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_a_picture_is_a_copy_of_the_result_that_its_caption_names(picture: str) -> None:
+    """And each picture of the folder is shown, by one page at least."""
+    assert {path.name for path in (ROOT / FOLDER).iterdir()} == set(PICTURES)
+    shown = [page for page in CITING.values() if f"figures/{picture}" in page]
+    assert shown
+    for page in shown:
+        caption = page.partition(f"figures/{picture}")[2][:1500]
+        assert f"`{PICTURES[picture]}`" in caption
+
+
+def test_pictures_are_copied_from_results(tmp_path: Path) -> None:
+    (tmp_path / FOLDER).mkdir(parents=True)
+    name, source = next(iter(PICTURES.items()))
+    (tmp_path / source).parent.mkdir(parents=True)
+    (tmp_path / source).write_bytes(b"drawn")
+    assert renewed(tmp_path) == {other: other == name for other in PICTURES}
+    assert (tmp_path / FOLDER / name).read_bytes() == b"drawn"
+
+
+def test_gaps_of_the_search_that_comes_along() -> None:
+    file = ROOT / "results/stiffening_spines/discrepancy/verdict.json"
+    if not file.is_file():
+        pytest.skip("the study stiffening_spines was not run here")
+    verdict = json.loads(file.read_text())
+    gap = verdict["gap"]
+    told = re.search(r"falls from ([\d.]+) noise SD to ([\d.]+), .*? (\d+) % of it", README)
+    assert told is not None
+    stated = [float(number) for number in told.groups()]
+    closed = 100.0 * gap["held_out_closed"]
+    assert stated == [round(gap["base"], 1), round(gap["with_effects"], 1), round(closed)]
