@@ -1,7 +1,9 @@
 """What it takes to be inside a range of a paper, worked out anew from the rows themselves."""
 
+import csv
 import importlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -19,6 +21,7 @@ from spinepipe.comparison.claim import (
 )
 from spinepipe.report.page.document import judged as told
 from spinepipe.tables.shared import LIMITS
+from tests.validation import comparisons
 
 PAPERS = {
     "gould_2024a": "joint_pose_sensitivity",
@@ -139,3 +142,64 @@ def test_the_page_says_what_inside_took() -> None:
         "agreement, 3 are on the right side of a single limit or of zero, 4 are the same yes, no "
         "or count."
     )
+
+
+# --- counts that documents tell -------------------------------------------------------------------
+
+ROOT = Path(__file__).parents[2]
+COUNTS = ROOT / "tests" / "validation" / "results" / "comparisons.csv"
+
+
+def counted() -> dict[str, dict[str, int]]:
+    with COUNTS.open() as file:
+        return {
+            row["study"]: {key: int(row[key]) for key in row if key not in ("study", "paper")}
+            | {"claims": len(claims(row["paper"]))}
+            for row in csv.DictReader(file)
+        }
+
+
+def test_counts_are_of_all_claims_and_add_up() -> None:
+    for study, row in counted().items():
+        assert row["rows"] == row["claims"], study
+        assert row["inside"] == sum(row[key] for key in row if key.startswith("inside_")), study
+        verdicts = ("inside", "outside", "circular", "recomputed", "contradicted", "not_computed")
+        assert row["rows"] == sum(row[name] for name in verdicts), study
+
+
+def test_documents_tell_the_counts() -> None:
+    found = counted()["t12s1_as_published"]
+    words = " ".join((ROOT / "docs" / "studies" / "cohort_stiffness.md").read_text().split())
+    assert (
+        f"of {found['rows']} rows the study as published is inside for {found['inside']}, of which "
+        f"{found['inside_two_sided']} lie in a range with two ends whose width the paper gives, "
+        f"and outside for {found['outside']} "
+    ) in words
+    readme = (ROOT / "README.md").read_text()
+    assert f"sets {len(claims('gould_2024a'))} published numbers beside ours" in readme
+
+
+@pytest.mark.parametrize("study", ["l1l4_joint_pose", "t12s1_as_published"])
+def test_counts_by_hand_where_the_study_was_run(study: str) -> None:
+    paths = sorted((ROOT / "results" / study).glob("against_*.parquet"))
+    if not paths:
+        pytest.skip(f"study {study} was not run here")
+    rows = pd.read_parquet(paths[0]).to_dict("records")
+    numbers = ("paper_low", "paper_high")
+    plain = [row | {n: None if pd.isna(row[n]) else row[n] for n in numbers} for row in rows]
+    inside = [by_hand(row) for row in plain if row["verdict"] == "inside"]
+    asked = {"two_sided", "binary", "wide", "one_sided", "chosen"}
+    assert {one: inside.count(one) for one in asked} == {
+        one: counted()[study][f"inside_{one}"] for one in asked
+    }
+
+
+def test_a_table_is_counted_by_verdict_and_limit(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    rows = [("inside", "wide"), ("inside", "binary"), ("outside", "wide"), ("circular", "binary")]
+    frame = pd.DataFrame(rows, columns=["verdict", "limit"])
+    frame.to_parquet(tmp_path / "a" / "against_b.parquet")
+    (row,) = comparisons.table(tmp_path).to_dict("records")
+    assert (row["study"], row["paper"], row["rows"], row["inside"]) == ("a", "b", 4, 2)
+    assert (row["inside_wide"], row["inside_binary"], row["inside_two_sided"]) == (1, 1, 0)
+    assert (row["outside"], row["circular"], row["not_computed"]) == (1, 1, 0)

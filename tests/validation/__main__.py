@@ -13,6 +13,7 @@ import pandas as pd
 from spinepipe.studies.cohort_stiffness.claims import HOLDS
 from spinepipe.studies.tracking.tables import LIMIT
 from tests.validation import (
+    comparisons,
     coverage,
     engines,
     film_ratios,
@@ -34,6 +35,7 @@ def main() -> None:
         discrepancy.main(sys.argv[2:])
         return
     parts = {
+        "comparisons": _comparisons,
         "coverage": _coverage,
         "engines": _engines,
         "film_ratios": _film_ratios,
@@ -50,6 +52,20 @@ def main() -> None:
         if name not in parts:
             sys.exit(f"no validation {name!r}: {', '.join(parts)}")
         parts[name]()
+
+
+def _comparisons() -> None:
+    found = comparisons.table()
+    if found.empty:
+        print("comparisons: no study with a paper was run here, see `make all` and `make full`")
+        return
+    head = (
+        "Published numbers beside ours, study by study, as `against_<paper>.parquet` has them. "
+        "Inside a range counts for little unless it has two ends whose width the paper gives "
+        "(`inside_two_sided`): `wide` ranges, half to twice or more, exclude hardly anything, "
+        "`one_sided` ones are an order or a sign, `binary` ones a yes, a no or a count."
+    )
+    _write("comparisons", head, found)
 
 
 def _coverage() -> None:
