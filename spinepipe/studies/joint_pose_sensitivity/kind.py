@@ -13,6 +13,9 @@ from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+    TABLES as TABLES_OF_POSTERIOR,
+)
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
 
@@ -46,7 +49,10 @@ _JOBS = {
 }
 """Folder of the job files of each table that is made of them."""
 
-BY_SPECIMEN = ("landmarks", "poses")
+POSTERIOR = ("posterior", "posterior_motion", "pose_weights")
+"""Tables that the job of the posterior writes."""
+
+BY_SPECIMEN = ("landmarks", "poses", *POSTERIOR)
 """Tables joined from one file per specimen."""
 
 OF_JOBS = (*_JOBS, *BY_SPECIMEN)
@@ -60,6 +66,7 @@ _MADE_BY = {
     "bootstrap": "bootstrap",
     "method_fits": "fit_by_method",
     "precision_errors": "landmark_errors",
+    **dict.fromkeys(POSTERIOR, "posterior"),
 }
 """The job that writes the files of each of them."""
 
@@ -162,6 +169,7 @@ class Layout(StudyFiles):
             ("precision_errors", "landmark_precision", "required_precision"): self._count(
                 "precision_errors"
             ),
+            POSTERIOR: self.study.posterior.draws,
             ("against_gould_2024a",): int(self.rebuilt),
         }
         return (*ALWAYS, *(name for names, count in parts.items() if count for name in names))
@@ -178,7 +186,7 @@ class Layout(StudyFiles):
     @property
     def by_specimen(self) -> tuple[str, ...]:
         """What is sampled."""
-        return BY_SPECIMEN
+        return tuple(name for name in BY_SPECIMEN if name in self.tables)
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -257,7 +265,7 @@ _GROUPING = ("best_models", "block")
 _MODEL = ("tests", "load_point_shift_mm", "stiffness", "damping", "calibration")
 _BOOTSTRAPS = ("start_bootstrap", "damping_bootstrap", "dynamic")
 _JUDGING = ("success", "significance")
-_PARTS = ("methods", "landmark_precision", *_BOOTSTRAPS, *_JUDGING)
+_PARTS = ("methods", "landmark_precision", "posterior", *_BOOTSTRAPS, *_JUDGING)
 """Settings by what they decide; the last were added to the sampled poses, whose fits and
 simulations do not hang on them."""
 
@@ -294,7 +302,7 @@ _ADDED = (
         "bootstrap",
         many=True,
         ignores=ignoring(
-            *("poses", "landmark_sd_mm", "loading", "methods", "landmark_precision"),
+            *("poses", "landmark_sd_mm", "loading", "methods", "landmark_precision", "posterior"),
             *(*_GROUPING, *_JUDGING),
             start_bootstrap={"loadings"},
             damping_bootstrap={"loadings"},
@@ -303,7 +311,8 @@ _ADDED = (
     Job(
         "landmark_errors",
         ignores=ignoring(
-            *("poses", "landmark_sd_mm", "damping", "methods", *_SOLVING, *_GROUPING),
+            *("poses", "landmark_sd_mm", "damping", "methods", "posterior"),
+            *(*_SOLVING, *_GROUPING),
             *(*_BOOTSTRAPS, *_JUDGING),
             landmark_precision={"sd_mm", "translation_limit_mm", "rotation_limit_deg", "share"},
         ),
@@ -311,10 +320,17 @@ _ADDED = (
     Job(
         "fit_by_method",
         ignores=ignoring(
-            *("poses", "loading", "landmark_precision", "significance"),
+            *("poses", "loading", "landmark_precision", "posterior", "significance"),
             *(*_GROUPING, *_BOOTSTRAPS),
             methods={"poses"},
             success={"failed_when", "outlier_times_start"},
+        ),
+    ),
+    Job(
+        "posterior",
+        ignores=ignoring(
+            *("damping", "methods", "landmark_precision", *_SOLVING, *_GROUPING),
+            *(*_BOOTSTRAPS, *_JUDGING),
         ),
     ),
 )
@@ -359,7 +375,7 @@ KIND = Kind(
     settings=JointPoseSensitivity,
     files=Layout,
     checks=(check_joint_pose_sensitivity,),
-    tables=(*TABLES, *TABLES_OF_FITS),
+    tables=(*TABLES, *TABLES_OF_FITS, *TABLES_OF_POSTERIOR),
     jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
     ignored_by_figures=("block",),
     makes_models="start_model",
