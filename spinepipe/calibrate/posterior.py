@@ -24,7 +24,7 @@ from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.units import BORDER_PER_SI
 
-ARRIVED = 1e-7
+ARRIVED = 1e-5
 """A mode is reached where a Newton step would lower the energy by less."""
 
 MOST_STEPS = 200

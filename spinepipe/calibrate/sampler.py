@@ -36,6 +36,9 @@ A trajectory that doubles until it turns back (no-U-turn) needs three times as m
 are no freer: in these coordinates it is known how long a turn is.
 """
 
+ACCEPTED = 0.7
+"""Share of trajectories whose end is to be taken; the step size is fitted to it."""
+
 FARTHEST = 30.0
 """A point of a trajectory that runs away is held so far out: nothing is likely there."""
 
@@ -195,7 +198,7 @@ def _chain(
     found = sampler.sample_chains(
         *length,
         [_start(rng, len(chart.mode), slope)],
-        adapters=[DualAveragingStepSizeAdapter()],
+        adapters=[DualAveragingStepSizeAdapter(ACCEPTED)],
         trace_funcs=[_position],
         display_progress=False,
     )
