@@ -27,6 +27,12 @@ from spinepipe.units import BORDER_PER_SI
 ARRIVED = 1e-5
 """A mode is reached where a Newton step would lower the energy by less."""
 
+EASED, HARDENED = 0.5, 4.0
+"""What damping is multiplied by after a step that went down, and after one that did not.
+
+It is eased slowly: towards a bound Gauss and Newton see too little curvature, and step too far.
+"""
+
 MOST_STEPS = 200
 
 DIFFERENCE = 1e-3
@@ -224,9 +230,9 @@ def _climbed(target: Target, starts: Array) -> list[tuple[Point | None, str]]:
             assert point is not None
             if trial is not None and trial.energy < point.energy:
                 here[number] = trial
-                damping[number] *= 0.2
+                damping[number] *= EASED
             else:
-                damping[number] = max(damping[number], 1e-2) * 4.0
+                damping[number] = max(damping[number], 1e-2) * HARDENED
         going = left
     return ended
 

@@ -14,6 +14,7 @@ from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import 
     required_words,
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
+from spinepipe.studies.joint_pose_sensitivity.findings_of_posterior import posterior
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
@@ -36,6 +37,7 @@ def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
     told = (
         _fits(study, results),
         stiffness(study, results),
+        *posterior(results),
         settling(study),
         _dominant(results),
         _precision(study, results),

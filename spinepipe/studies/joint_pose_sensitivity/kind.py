@@ -116,6 +116,12 @@ class Layout(StudyFiles):
             ("variance_shares", "importance"),
         ),
         Figure(
+            "posterior",
+            "What the data make likely",
+            "figures.posterior:posterior_figure",
+            ("posterior", "posterior_motion", "pose_weights"),
+        ),
+        Figure(
             "landmark_precision",
             "Landmark precision needed",
             "figures.landmark_precision:landmark_precision_figure",

@@ -19,6 +19,9 @@ from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivi
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
+from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+    TABLES as TABLES_OF_POSTERIOR,
+)
 from spinepipe.tables.schema import Column
 from spinepipe.tables.shared import STATISTICS, against_as_shown
 
@@ -31,6 +34,8 @@ SHOWN = {
     "counts": "Fits and filters",
     "summary": "Medians and spreads",
     "against_gould_2024a": "Beside Gould et al. 2024",
+    "posterior": "Posterior of stiffness and landmarks",
+    "posterior_motion": "Motion that the posterior predicts",
     "success_by_method": "Success by method",
     "variance_shares": "Variance shares of joint pose and stiffness",
     "importance": "Importance in the regression tree, by factor",
@@ -40,7 +45,7 @@ SHOWN = {
 }
 """Tables of the page in their order, with their titles."""
 
-READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
+READ = ("poses", "calibrations", "success", "method_fits", "pose_weights", *SHOWN)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _SIMULATED = ("errors", "agreement")
@@ -87,7 +92,7 @@ FOLDED = (
 
 _AGAINST = against_as_shown(AGAINST_GOULD_2024A)
 
-_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS)}
+_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS, *TABLES_OF_POSTERIOR)}
 
 
 def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
@@ -115,6 +120,7 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
         ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
         ("comparison of ways of fitting", "methods: poses", study.methods.poses),
         ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+        ("posterior of stiffness and landmarks", "posterior: draws", study.posterior.draws),
     )
     return tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
 
