@@ -24,8 +24,8 @@ from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.units import BORDER_PER_SI
 
-ARRIVED = 1e-5
-"""A mode is reached where a Newton step would lower the energy by less."""
+ARRIVED = 1e-3
+"""A mode is reached where a Newton step would lower the energy by less: a twentieth of an SD."""
 
 EASED, HARDENED = 0.5, 4.0
 """What damping is multiplied by after a step that went down, and after one that did not.
