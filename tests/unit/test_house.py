@@ -262,7 +262,7 @@ SOLVING = {
     "discrepancy": {"search"},
     "global_sensitivity": {"respond", "calibrate"},
     "joint_pose_sensitivity": {
-        *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
+        *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method", "posterior"),
     },
     "range_of_motion": {"simulate"},
     "scoliosis": {"personalise", "population", "variants"},
