@@ -2,13 +2,13 @@
 
 The chains are Mici's (trajectories of a random number of steps, Neal 2011, arXiv:1206.1901; the
 step size by dual averaging, Hoffman and Gelman 2014). They move in coordinates y in which the
-density is nearly round: as the normal density at the mode is, and where it falls faster to one
-side than to the other, skewed as Tukey's g is (`_Chart`). R-hat and effective sizes are ArviZ's,
+density is nearly round: turned as the normal density at the mode is, and each unknown that the
+data tell of a function of a normal number (`_Chart`). R-hat and effective sizes are ArviZ's,
 rank-normalised and split (Vehtari 2021, doi:10.1214/20-BA1221).
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,6 +20,8 @@ from mici.integrators import LeapfrogIntegrator
 from mici.samplers import RandomMetropolisHMC
 from mici.states import ChainState
 from mici.systems import EuclideanMetricSystem
+from scipy.interpolate import PchipInterpolator
+from scipy.special import ndtr
 
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.posterior import Mode, Point, Target
@@ -51,16 +53,23 @@ MOST_HALVINGS = 8
 _ARVIZ: Any = array_stats  # it has no types
 _AXES = {"chain_axis": 0, "draw_axis": 1}
 
-FALL = 1.0
-"""Of the logarithm of the density, at which its two sides are compared."""
+LOOKS = np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0])
+"""How far to either side of the mode the density is looked at, in SDs of the normal one there."""
 
-LOOKS = np.array([0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0])
-"""How far from the mode that fall is looked for, in SDs of the normal density there."""
+PRIOR_LOOKS = np.array([-4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
+"""And over all of the prior."""
+
+FOLLOWED = 2.0
+"""SDs up to which the other unknowns go along; further out they stay."""
+
+FINE, KNOTS = 2001, 41
+"""Points at which the density is integrated, and at which its quantiles are kept."""
+
+OUTERMOST = 4.0
+"""The last quantiles that are kept, as standard normal numbers."""
 
 TOLD_BY_DATA = 0.9
-"""Unknowns whose SD at the mode is less than this share of the prior's may be skewed."""
-
-LEAST_SKEW = 1e-6
+"""Unknowns whose SD at the mode is less than this share of the prior's are made normal."""
 
 Ask = Callable[[Array], Point | None]
 
@@ -122,64 +131,77 @@ def sample(target: Target, mode: Mode, chains: int, warm_up: int, draws: int, se
 
 @dataclass(frozen=True)
 class _Chart:
-    """Coordinates y (m,): ``z = mode + width (exp(skew t) - 1) / skew`` with ``t = root y``.
+    """Coordinates y (m,) of points z: ``t = root y``, and z a rising function of each t.
 
     Attributes
     ----------
-    root : (m, m), of the normal density at the mode in units of ``width`` (m,).
+    origin : (m,) of the unknowns that are only shifted, ``z = origin + t``.
+    quantiles : of the others, by number.
     """
 
-    mode: Array
-    width: Array
-    skew: Array
+    origin: Array
     root: Array
+    quantiles: Mapping[int, PchipInterpolator]
 
     def z(self, y: Array) -> Array:
         """(m,) of y (m,)."""
-        t = self._straight(y)
-        level = np.abs(self.skew) < LEAST_SKEW
-        skew = np.where(level, 1.0, self.skew)
-        found: Array = self.mode + self.width * np.where(level, t, np.expm1(skew * t) / skew)
-        return np.clip(found, -FARTHEST, FARTHEST)
-
-    def _straight(self, y: Array) -> Array:
-        found: Array = np.clip(self.root @ y, -FARTHEST, FARTHEST)
-        return found
+        return self._at(y)[0]
 
     def density(self, y: Array, point: Point) -> tuple[Array, float]:
         """Gradient (m,) by y, and value, of the energy of y at the point that it is."""
-        t = self._straight(y)
-        by_t = self.width * np.exp(self.skew * t) * point.gradient - self.skew
-        return self.root.T @ by_t, point.energy - float(self.skew @ t)
+        _, slope, bend = self._at(y)
+        by_t = slope * point.gradient - bend / slope
+        return self.root.T @ by_t, point.energy - float(np.sum(np.log(slope)))
+
+    def _at(self, y: Array) -> tuple[Array, Array, Array]:
+        """z (m,), and its first and second derivatives by t; straight beyond the last quantiles."""
+        t = np.clip(self.root @ y, -FARTHEST, FARTHEST)
+        z, slope, bend = self.origin + t, np.ones(len(t)), np.zeros(len(t))
+        for unknown, rising in self.quantiles.items():
+            inside = float(np.clip(t[unknown], -OUTERMOST, OUTERMOST))
+            slope[unknown] = rising(inside, 1)
+            z[unknown] = rising(inside) + slope[unknown] * (t[unknown] - inside)
+            bend[unknown] = rising(inside, 2) if inside == t[unknown] else 0.0
+        return z, slope, bend
 
 
 def _chart(target: Target, mode: Mode) -> _Chart:
-    """The coordinates that a mode and what lies to both sides of it ask for."""
+    """The coordinates that a mode and the density over each unknown ask for."""
     top = mode.point
     assert top is not None
     sd = np.sqrt(np.diagonal(mode.covariance))
-    width, skew = np.ones(len(sd)), np.zeros(len(sd))
-    for unknown in np.flatnonzero(sd < TOLD_BY_DATA):
-        way = mode.covariance[:, unknown] / sd[unknown]
-        sides = [_reach(target, top, side * way) for side in (-1.0, 1.0)]
-        bent = np.log(sides[1] / sides[0]) / np.sqrt(2.0 * FALL)
-        width[unknown], skew[unknown] = sd[unknown], np.clip(bent, -1.0, 1.0)
-    return _Chart(top.z, width, skew, mode.root / width[:, None])
+    told = np.flatnonzero(sd < TOLD_BY_DATA).tolist()
+    quantiles = {unknown: _quantiles(target, mode, unknown) for unknown in told}
+    scale = np.where(sd < TOLD_BY_DATA, sd, 1.0)
+    return _Chart(top.z, mode.root / scale[:, None], quantiles)
 
 
-def _reach(target: Target, top: Point, way: Array) -> float:
-    """How many times one must go that way from the top for the density to have fallen by `FALL`."""
-    seen = target.together([(0, top.z + look * way) for look in LOOKS])
-    falls = np.array([np.inf if one is None else one.energy - top.energy for one in seen])
-    beyond = np.flatnonzero(falls >= FALL)
-    if not len(beyond):
-        return float(LOOKS[-1])
-    after = int(beyond[0])
-    near, low = (LOOKS[after - 1], max(falls[after - 1], 0.0)) if after else (0.0, 0.0)
-    if not np.isfinite(falls[after]):
-        return float(0.5 * (near + LOOKS[after]))
-    share = (np.sqrt(FALL) - np.sqrt(low)) / (np.sqrt(falls[after]) - np.sqrt(low))
-    return float(near + share * (LOOKS[after] - near))
+def _quantiles(target: Target, mode: Mode, unknown: int) -> PchipInterpolator:
+    """An unknown as a function of standard normal numbers, as the density beside the mode has it.
+
+    No approximation enters the draws by it: it only decides in which coordinates chains move.
+    """
+    top = mode.point
+    assert top is not None
+    sd = float(np.sqrt(mode.covariance[unknown, unknown]))
+    far = np.concatenate([-sd * LOOKS, [0.0], sd * LOOKS, PRIOR_LOOKS - top.z[unknown]])
+    away = np.unique(far[np.abs(far + top.z[unknown]) <= PRIOR_LOOKS[-1] + 1e-9])
+    way = mode.covariance[:, unknown] / sd**2
+    points = top.z + np.clip(away, -FOLLOWED * sd, FOLLOWED * sd)[:, None] * way
+    points[:, unknown] = top.z[unknown] + away
+    seen = target.together([(0, point) for point in points])
+    stands = np.array([one is not None for one in seen])
+    energy = np.array([one.energy - top.energy for one in seen if one is not None])
+    z = points[stands, unknown]
+    fine = np.linspace(z[0], z[-1], FINE)
+    fine = np.unique(np.concatenate([fine, np.linspace(-6, 6, FINE) * sd + top.z[unknown]]))
+    fine = fine[(fine >= z[0]) & (fine <= z[-1])]
+    density = np.exp(-np.maximum(PchipInterpolator(z, energy)(fine), -5.0))
+    share = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
+    share /= share[-1]
+    t = np.linspace(-OUTERMOST, OUTERMOST, KNOTS)
+    rising = np.maximum.accumulate(np.interp(ndtr(t), share, fine))
+    return PchipInterpolator(t, rising + 1e-6 * sd * t)
 
 
 def _chain(
@@ -197,7 +219,7 @@ def _chain(
     sampler = RandomMetropolisHMC(system, LeapfrogIntegrator(system), rng, STEPS)
     found = sampler.sample_chains(
         *length,
-        [_start(rng, len(chart.mode), slope)],
+        [_start(rng, len(chart.origin), slope)],
         adapters=[DualAveragingStepSizeAdapter(ACCEPTED)],
         trace_funcs=[_position],
         display_progress=False,
