@@ -80,9 +80,10 @@ def _posterior_coverage() -> None:
     head = (
         f"How often 95 % intervals of the posterior hold the truth: {posterior_coverage.PHANTOMS} "
         "single joints with a stiffness drawn from the prior (a factor of 100 in all, from well "
-        "seen to not seen at all), landmarks felt with SD 1 mm, and the declared noise. The sampler "
-        f"with {posterior_coverage.CHAINS} short chains of {posterior_coverage.DRAWS} draws, whose "
-        "ends are rough. Goal: 92-98 %, of the sampler. Ends of coverage: Wilson's interval. Little known: the SD is "
+        "seen to not seen at all), landmarks felt with SD 1 mm, and the declared noise. The "
+        f"sampler with {posterior_coverage.CHAINS} short chains of {posterior_coverage.DRAWS} "
+        "draws, whose ends are rough. Goal: 92-98 %, of the sampler. Ends of coverage: Wilson's "
+        "interval. Little known: the SD is "
         f"above {posterior_coverage.LITTLE_KNOWN:g} of the prior's. sd_over_prior: median, by "
         "Laplace."
     )

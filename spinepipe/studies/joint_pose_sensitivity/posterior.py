@@ -26,6 +26,7 @@ from spinepipe.statics import FreeParameter
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
+    PREDICTIONS,
     Quantity,
     motion_rows,
     posterior_row,
@@ -116,15 +117,17 @@ def _sampled(own: SpecimenPosterior, mode: Mode, chains: Chains, seed: int) -> t
     found = convergence([quantity.draws for quantity in quantities])
     ended = Status.NOT_CONVERGED if found.message else Status.CONVERGED
     told = {"status": ended.value, "message": found.message}
+    believed = ended.usable
     rows = [
-        {**posterior_row(quantity, *numbers), **told}
+        {**posterior_row(quantity, *numbers, believed=believed), **told}
         for quantity, numbers in zip(quantities, _numbers(found), strict=True)
     ]
     marks, free = own.landmarks, own.unknowns.free
     for place in np.setdiff1d(np.arange(len(marks.names)), free).tolist():
         for axis in "xyz":
             rows.append(prior_row(marks.names[place], axis, float(marks.sd[place] * MM_PER_M)))
-    return rows, [{**row, **told} for row in _motion(own, chains.z, seed)]
+    nothing = {} if believed else dict.fromkeys(PREDICTIONS)
+    return rows, [{**row, **nothing, **told} for row in _motion(own, chains.z, seed)]
 
 
 def _numbers(found: Convergence) -> list[tuple[float, float, float]]:

@@ -35,6 +35,9 @@ NEAR_BOUND = 0.05
 OPEN = 0.5 * NEAR_BOUND
 """Share of draws there at which the bound decides, not the data: half of what the prior puts."""
 
+PREDICTIONS = ("median", "low", "high", "reading_low", "reading_high", "inside")
+"""Columns of predicted motion that are made of draws."""
+
 _MIDS = (np.arange(1000) + 0.5) / 1000.0
 """Shares of a distribution at which a function of a normal number is averaged."""
 
@@ -105,29 +108,32 @@ class Quantity:
 
 
 def posterior_row(
-    quantity: Quantity, r_hat: float, ess_bulk: float, ess_tail: float
+    quantity: Quantity, r_hat: float, ess_bulk: float, ess_tail: float, *, believed: bool
 ) -> dict[str, Any]:
-    """What is told of a quantity, but for specimen and status."""
+    """What is told of a quantity, but for specimen and status; draws only where ``believed``."""
     draws = quantity.draws.ravel()
     low, median, high = np.percentile(draws, [ENDS[0], 50.0, ENDS[1]]).tolist()
     near_low, near_high = np.percentile(quantity.near, ENDS).tolist()
     below, above = quantity.open or (None, None)
-    return {
-        **quantity.place,
-        "unit": quantity.unit,
+    drawn: dict[str, Any] = {
         "mean": float(draws.mean()),
         "sd": float(draws.std(ddof=1)),
         "median": median,
         "low": low,
         "high": high,
-        "laplace_mean": float(quantity.near.mean()),
-        "laplace_sd": float(quantity.near.std()),
-        "laplace_low": near_low,
-        "laplace_high": near_high,
         "sd_over_prior": quantity.share,
         "prior_dominated": quantity.share > LITTLE_TOLD,
         "open_below": below,
         "open_above": above,
+    }
+    return {
+        **quantity.place,
+        "unit": quantity.unit,
+        **(drawn if believed else dict.fromkeys(drawn)),
+        "laplace_mean": float(quantity.near.mean()),
+        "laplace_sd": float(quantity.near.std()),
+        "laplace_low": near_low,
+        "laplace_high": near_high,
         "r_hat": r_hat,
         "ess_bulk": ess_bulk,
         "ess_tail": ess_tail,

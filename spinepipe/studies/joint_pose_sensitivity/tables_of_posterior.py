@@ -3,6 +3,7 @@
 from spinepipe.tables.schema import JOINT, MESSAGE, POSE, SPECIMEN, Column, Table, status
 
 NONE = "there is no posterior"
+NOT_BELIEVED = "there is no posterior, or the sampler has not converged"
 NOT_SAMPLED = "not sampled: the posterior is the prior, or there is none"
 NOT_A_STIFFNESS = "not a stiffness"
 SEE_UNIT = "see unit"
@@ -10,8 +11,8 @@ SEE_UNIT = "see unit"
 QUANTITIES = ("stiffness", "landmark", "joint_centre", "joint_axes")
 
 
-def _number(name: str, meaning: str) -> Column:
-    return Column(name, "number", meaning, SEE_UNIT, null=NONE)
+def _number(name: str, meaning: str, null: str = NOT_BELIEVED) -> Column:
+    return Column(name, "number", meaning, SEE_UNIT, null=null)
 
 
 POSTERIOR = Table(
@@ -37,23 +38,23 @@ POSTERIOR = Table(
         _number("median", "their median"),
         _number("low", "lower end of their 95 % interval"),
         _number("high", "upper end of their 95 % interval"),
-        _number("laplace_mean", "mean by Laplace"),
-        _number("laplace_sd", "standard deviation by Laplace"),
-        _number("laplace_low", "lower end of the 95 % interval by Laplace"),
-        _number("laplace_high", "upper end of the 95 % interval by Laplace"),
+        _number("laplace_mean", "mean by Laplace", NONE),
+        _number("laplace_sd", "standard deviation by Laplace", NONE),
+        _number("laplace_low", "lower end of the 95 % interval by Laplace", NONE),
+        _number("laplace_high", "upper end of the 95 % interval by Laplace", NONE),
         Column(
             "sd_over_prior",
             "number",
             "standard deviation as a share of the one before the data were seen; of a stiffness on "
             "the scale on which its prior is normal, of a joint to first order",
-            null=NONE,
+            null=NOT_BELIEVED,
             low=0.0,
         ),
         Column(
             "prior_dominated",
             "flag",
             "that share is above 0.9: the data tell next to nothing of this",
-            null=NONE,
+            null=NOT_BELIEVED,
         ),
         *(
             Column(
@@ -61,7 +62,7 @@ POSTERIOR = Table(
                 "flag",
                 f"the {which} bound of the prior decides the {which} end, not the data: 2.5 % of "
                 "the draws or more lie in the outermost 5 % of the prior",
-                null=f"{NOT_A_STIFFNESS}, or {NONE}",
+                null=f"{NOT_A_STIFFNESS}, or {NOT_BELIEVED}",
             )
             for side, which in (("below", "lower"), ("above", "upper"))
         ),
@@ -75,6 +76,7 @@ POSTERIOR = Table(
     ),
 )
 
+_LOST = "the sampler has not converged"
 _MOTION = f"{SEE_UNIT}, from step 0 where the cohort is zeroed there"
 
 POSTERIOR_MOTION = Table(
@@ -91,16 +93,16 @@ POSTERIOR_MOTION = Table(
         Column("coordinate", "text", "coordinate"),
         Column("unit", "text", "unit of the numbers", allowed=("mm", "deg")),
         Column("measured", "number", "measured", _MOTION, null="not measured"),
-        Column("median", "number", "median of the predicted motion", _MOTION),
-        Column("low", "number", "lower end of its 95 % band", _MOTION),
-        Column("high", "number", "upper end of its 95 % band", _MOTION),
+        Column("median", "number", "median of the predicted motion", _MOTION, null=_LOST),
+        Column("low", "number", "lower end of its 95 % band", _MOTION, null=_LOST),
+        Column("high", "number", "upper end of its 95 % band", _MOTION, null=_LOST),
         *(
             Column(
                 f"reading_{end}",
                 "number",
                 f"{which} end of the 95 % band of a new reading, with error and scatter",
                 _MOTION,
-                null="the coordinate has no weight",
+                null=f"the coordinate has no weight, or {_LOST}",
             )
             for end, which in (("low", "lower"), ("high", "upper"))
         ),
@@ -108,7 +110,7 @@ POSTERIOR_MOTION = Table(
             "inside",
             "flag",
             "whether the reading lies in that band",
-            null="not measured, or the coordinate has no weight",
+            null=f"not measured, the coordinate has no weight, or {_LOST}",
         ),
         Column("draws", "integer", "draws it is made of", low=0),
         status("sampler"),
