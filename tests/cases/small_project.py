@@ -36,6 +36,7 @@ damping_bootstrap: {{sets: 2, loadings: [equilibrium]}}
 settle_time_s: 0.05
 methods: {{poses: 1, sane_step: 0.01, accuracy: 0.1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
+posterior: {{draws: 10, warm_up: 20, chains: 2, stiffness_factor: 10}}
 """
 _NOT_PASSED_ON = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
 _HANGS_S = 3600
