@@ -37,12 +37,12 @@ def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
     told = (
         _fits(study, results),
         stiffness(study, results),
-        *posterior(results),
         settling(study),
         _dominant(results),
         _precision(study, results),
         _methods(results),
         _bootstraps(study, results),
+        *posterior(results),
         judged(results.table("against_gould_2024a")),
     )
     return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]
