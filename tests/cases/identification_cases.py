@@ -42,6 +42,9 @@ def identification(folder: Path, size: Size) -> list[Path]:
         "agreement": _agreement,
         "variance_shares": _variance_shares,
         "importance": _importance,
+        "posterior": _posterior,
+        "posterior_motion": _posterior_motion,
+        "pose_weights": _pose_weights,
     }
     return [write_table(folder, name, list(make(size, rng))) for name, make in makers.items()]
 
@@ -262,3 +265,61 @@ def _importance(size: Size, rng: np.random.Generator) -> Iterator[Row]:
         row = {**cell, "predictor": predictor, "factor": factor, "n": 24, **_ended(size)}
         share = 0.8 if factor == "pose" else 0.2
         yield row | ({"importance": share, "leaves": 5, "r2": 0.6} if size.solved else {})
+
+
+def _posterior(size: Size, rng: np.random.Generator) -> Iterator[Row]:
+    place = {"quantity": "stiffness", "joint": "*"}
+    for specimen in size.specimens:
+        if not size.solved:
+            yield {"specimen": specimen, **place, "unknown": "*", "unit": "", **_fit_ended(size)}
+            continue
+        for name in size.free:
+            number = COORDINATES.index(name)
+            middle = START[number] * float(np.exp(rng.normal(0.0, 0.2)))
+            ends = {"low": 0.7 * middle, "high": 1.4 * middle}
+            yield {
+                "specimen": specimen,
+                **place,
+                "unknown": STIFFNESS_COLUMNS[number],
+                "unit": "N/m" if name in TRANSLATIONS else "N m/rad",
+                **{"mean": middle, "sd": 0.2 * middle, "median": middle, **ends},
+                **{"laplace_mean": middle, "laplace_sd": 0.2 * middle},
+                **{f"laplace_{end}": value for end, value in ends.items()},
+                **{"sd_over_prior": 0.1, "prior_dominated": False},
+                **{"open_below": False, "open_above": name == "superior"},
+                **{"r_hat": 1.0, "ess_bulk": 900.0, "ess_tail": 800.0},
+                **_fit_ended(size),
+            }
+
+
+def _posterior_motion(size: Size, rng: np.random.Generator) -> Iterator[Row]:
+    if not size.solved:
+        return
+    for specimen, joint, name in product(size.specimens, size.joints, MEASURED):
+        value = float(rng.normal(-1.0, 0.2))
+        yield {
+            "specimen": specimen,
+            **{"test": "flexion", "cycle": 1, "step": 1, "joint": joint, "coordinate": name},
+            **{"unit": "mm" if name in TRANSLATIONS else "deg", "measured": value},
+            **{"median": value + 0.05, "low": value - 0.2, "high": value + 0.3},
+            **{"reading_low": value - 0.4, "reading_high": value + 0.5, "inside": True},
+            **{"draws": 400, **_fit_ended(size)},
+        }
+
+
+def _pose_weights(size: Size, rng: np.random.Generator) -> Iterator[Row]:
+    for specimen in size.specimens:
+        evidence = rng.normal(0.0, 0.5, size.poses)
+        weights = np.exp(evidence) / np.exp(evidence).sum()
+        for pose, name in product(range(size.poses), size.free):
+            number = COORDINATES.index(name)
+            value = START[number]
+            found = {"value": value, "low": 0.7 * value, "high": 1.4 * value}
+            found |= {"log_evidence": float(evidence[pose])}
+            yield {
+                **{"specimen": specimen, "pose": pose, "joint": "*"},
+                "unknown": STIFFNESS_COLUMNS[number],
+                **(found if size.solved else {}),
+                "weight": float(weights[pose]) if size.solved else 0.0,
+                **_fit_ended(size),
+            }

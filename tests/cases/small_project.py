@@ -37,6 +37,7 @@ settle_time_s: 0.05
 methods: {{poses: 1, sane_step: 0.01, accuracy: 0.1}}
 landmark_precision: {{sd_mm: [1.0, 3.0], poses: 4}}
 load_point: {{superior_mm: [-20, 0, 20], superior_sd_mm: 10}}
+posterior: {{draws: 10, warm_up: 20, chains: 2, stiffness_factor: 10}}
 """
 _NOT_PASSED_ON = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
 _HANGS_S = 3600

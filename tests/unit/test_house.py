@@ -264,7 +264,7 @@ SOLVING = {
     "global_sensitivity": {"base", "respond", "calibrate"},
     "joint_pose_sensitivity": {
         *("calibrate", "simulate", "bootstrap", "landmark_errors", "fit_by_method"),
-        "over_load_point",
+        *("over_load_point", "posterior"),
     },
     "range_of_motion": {"simulate"},
     "scoliosis": {"personalise", "population", "variants"},

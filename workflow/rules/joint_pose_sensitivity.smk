@@ -157,3 +157,20 @@ rule over_load_point:
         digest=digest("over_load_point"),
     run:
         run_job(rule, "over_load_point", wildcards, input, output, log)
+
+
+rule posterior:
+    input:
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+    output:
+        posterior=f"{POSES}/posterior/specimen={{specimen}}.parquet",
+        posterior_motion=f"{POSES}/posterior_motion/specimen={{specimen}}.parquet",
+        pose_weights=f"{POSES}/pose_weights/specimen={{specimen}}.parquet",
+    log:
+        f"{LOGS}/posterior/specimen={{specimen}}.log",
+    resources:
+        tmpdir=TMPDIR,
+    params:
+        digest=digest("posterior"),
+    run:
+        run_job(rule, "posterior", wildcards, input, output, log)

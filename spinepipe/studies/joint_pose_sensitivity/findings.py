@@ -16,6 +16,7 @@ from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import 
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
 from spinepipe.studies.joint_pose_sensitivity.findings_of_load_point import load_point
+from spinepipe.studies.joint_pose_sensitivity.findings_of_posterior import posterior
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
@@ -44,6 +45,7 @@ def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
         _precision(study, results),
         _methods(results),
         _bootstraps(study, results),
+        *posterior(results),
         judged(results.table("against_gould_2024a")),
     )
     return [sentence.replace(" %", _PERCENT) for sentence in told if sentence]

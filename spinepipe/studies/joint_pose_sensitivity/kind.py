@@ -17,6 +17,9 @@ from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TA
 from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
     TABLES as TABLES_OF_LOAD_POINT,
 )
+from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+    TABLES as TABLES_OF_POSTERIOR,
+)
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
 
@@ -51,7 +54,13 @@ _JOBS = {
 }
 """Folder of the job files of each table that is made of them."""
 
-BY_SPECIMEN = ("landmarks", "poses", "spread_over_landmark_sd", "stiffness_over_load_point")
+POSTERIOR = ("posterior", "posterior_motion", "pose_weights")
+"""Tables that the job of the posterior writes."""
+
+BY_SPECIMEN = (
+    *("landmarks", "poses", "spread_over_landmark_sd", "stiffness_over_load_point"),
+    *POSTERIOR,
+)
 """Tables joined from one file per specimen."""
 
 OF_JOBS = (*_JOBS, *BY_SPECIMEN)
@@ -67,6 +76,7 @@ _MADE_BY = {
     "precision_errors": "landmark_errors",
     "spread_over_landmark_sd": "spread_over_landmark_sd",
     "stiffness_over_load_point": "over_load_point",
+    **dict.fromkeys(POSTERIOR, "posterior"),
 }
 """The job that writes the files of each of them."""
 
@@ -114,6 +124,12 @@ class Layout(StudyFiles):
             "Joint pose against stiffness",
             "figures.pose_against_stiffness:pose_against_stiffness_figure",
             ("variance_shares", "importance"),
+        ),
+        Figure(
+            "posterior",
+            "What the data make likely",
+            "figures.posterior:posterior_figure",
+            ("posterior", "posterior_motion", "pose_weights"),
         ),
         Figure(
             "landmark_precision",
@@ -175,6 +191,7 @@ class Layout(StudyFiles):
             ("precision_errors", "landmark_precision", "required_precision"): self._count(
                 "precision_errors"
             ),
+            POSTERIOR: self.study.posterior.draws,
             ("against_gould_2024a",): int(self.rebuilt),
             ("spread_over_landmark_sd",): self.study.landmark_precision.poses,
             ("stiffness_over_load_point", "load_point_effect"): int(self.study.load_point.asked),
@@ -272,7 +289,10 @@ _GROUPING = ("best_models", "block")
 _MODEL = ("tests", "load_point_shift_mm", "stiffness", "damping", "calibration")
 _BOOTSTRAPS = ("start_bootstrap", "damping_bootstrap", "dynamic")
 _JUDGING = ("success", "significance")
-_PARTS = ("methods", "landmark_precision", "load_point", *_BOOTSTRAPS, *_JUDGING)
+_PARTS = (
+    *("methods", "landmark_precision", "load_point", "posterior"),
+    *(*_BOOTSTRAPS, *_JUDGING),
+)
 """Settings by what they decide; the last were added to the sampled poses, whose fits and
 simulations do not hang on them."""
 
@@ -310,7 +330,7 @@ _ADDED = (
         many=True,
         ignores=ignoring(
             *("poses", "landmark_sd_mm", "loading", "methods", "landmark_precision"),
-            "load_point",
+            *("load_point", "posterior"),
             *(*_GROUPING, *_JUDGING),
             start_bootstrap={"loadings"},
             damping_bootstrap={"loadings"},
@@ -320,14 +340,15 @@ _ADDED = (
         "landmark_errors",
         ignores=ignoring(
             *("poses", "landmark_sd_mm", "damping", "methods", *_SOLVING, *_GROUPING),
-            *("load_point", *_BOOTSTRAPS, *_JUDGING),
+            *("load_point", "posterior", *_BOOTSTRAPS, *_JUDGING),
             landmark_precision={"sd_mm", "translation_limit_mm", "rotation_limit_deg", "share"},
         ),
     ),
     Job(
         "fit_by_method",
         ignores=ignoring(
-            *("poses", "loading", "landmark_precision", "load_point", "significance"),
+            *("poses", "loading", "landmark_precision", "load_point", "posterior"),
+            "significance",
             *(*_GROUPING, *_BOOTSTRAPS),
             methods={"poses"},
             success={"failed_when", "outlier_times_start"},
@@ -348,6 +369,13 @@ _ADDED = (
             *("poses", "landmark_sd_mm", *_SOLVING, *_GROUPING),
             *(name for name in _PARTS if name != "load_point"),
             load_point={"anterior_sd_mm", "superior_sd_mm"},
+        ),
+    ),
+    Job(
+        "posterior",
+        ignores=ignoring(
+            *("damping", "methods", "landmark_precision", "load_point", *_SOLVING, *_GROUPING),
+            *(*_BOOTSTRAPS, *_JUDGING),
         ),
     ),
 )
@@ -399,7 +427,7 @@ KIND = Kind(
     settings=JointPoseSensitivity,
     files=Layout,
     checks=(check_joint_pose_sensitivity,),
-    tables=(*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT),
+    tables=(*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT, *TABLES_OF_POSTERIOR),
     jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
     ignored_by_figures=("block",),
     makes_models="start_model",

@@ -22,6 +22,9 @@ from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TA
 from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
     TABLES as TABLES_OF_LOAD_POINT,
 )
+from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+    TABLES as TABLES_OF_POSTERIOR,
+)
 from spinepipe.tables.schema import Column
 from spinepipe.tables.shared import STATISTICS, against_as_shown
 
@@ -34,6 +37,8 @@ SHOWN = {
     "counts": "Fits and filters",
     "summary": "Medians and spreads",
     "against_gould_2024a": "Beside Gould et al. 2024",
+    "posterior": "Posterior of stiffness and landmarks",
+    "posterior_motion": "Motion that the posterior predicts",
     "success_by_method": "Success by method",
     "variance_shares": "Variance shares of joint pose and stiffness",
     "importance": "Importance in the regression tree, by factor",
@@ -45,7 +50,7 @@ SHOWN = {
 }
 """Tables of the page in their order, with their titles."""
 
-READ = ("poses", "calibrations", "success", "method_fits", *SHOWN)
+READ = ("poses", "calibrations", "success", "method_fits", "pose_weights", *SHOWN)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _SIMULATED = ("errors", "agreement")
@@ -92,7 +97,10 @@ FOLDED = (
 
 _AGAINST = against_as_shown(AGAINST_GOULD_2024A)
 
-_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT)}
+_SHAPES = {
+    table.name: table
+    for table in (*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT, *TABLES_OF_POSTERIOR)
+}
 
 
 def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
@@ -120,6 +128,7 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
         ("bootstrap over damping", "damping_bootstrap: sets", study.damping_bootstrap.sets),
         ("comparison of ways of fitting", "methods: poses", study.methods.poses),
         ("landmark precision", "landmark_precision: poses", study.landmark_precision.poses),
+        ("posterior of stiffness and landmarks", "posterior: draws", study.posterior.draws),
     )
     told = tuple(f"{part} ({setting}: 0)" for part, setting, number in parts if not number)
     point = "stiffness over load points (load_point: one point and no SD)"

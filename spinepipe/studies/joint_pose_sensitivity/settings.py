@@ -254,6 +254,33 @@ class Calibration(BaseModel):
     )
 
 
+class Posterior(BaseModel):
+    """What the data make likely of stiffness and landmarks together."""
+
+    model_config = FORM
+
+    draws: int = Field(
+        default=0, ge=0, le=100000, description="draws of each chain; 0 leaves the posterior out"
+    )
+    warm_up: int = Field(
+        default=100, ge=20, le=100000, description="steps of each chain before its draws"
+    )
+    chains: int = Field(default=4, ge=2, le=64, description="chains, each from a start of its own")
+    stiffness_factor: float | None = Field(
+        default=None,
+        gt=1,
+        le=1e9,
+        description="before the data are seen a stiffness is as likely to be of any size (flat in "
+        "its logarithm) from start / factor to start x factor; null: calibration.bound_factor",
+    )
+    noise: Literal["scatter", "declared"] = Field(
+        default="scatter",
+        description="what may part measured motion from the model's; scatter: the declared error "
+        "of readings and the scatter that the fit in the cohort's own pose leaves, shared out as "
+        "the weights do; declared: the declared error alone, for a model that is believed",
+    )
+
+
 class JointPoseSensitivity(Study):
     """Sample landmarks, rebuild the joint poses, calibrate the stiffness for each, compare."""
 
@@ -312,6 +339,9 @@ class JointPoseSensitivity(Study):
     load_point: LoadPoint = Field(
         default_factory=LoadPoint,
         description="stiffness over load points; left out with one shift each way and no SD",
+    )
+    posterior: Posterior = Field(
+        default_factory=Posterior, description="stiffness and landmarks that the data make likely"
     )
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"

@@ -268,6 +268,7 @@ def test_parts_that_were_left_out_are_named(study: JointPoseSensitivity) -> None
         "damping_bootstrap": "sets",
         "methods": "poses",
         "landmark_precision": "poses",
+        "posterior": "draws",
     }
     for part, name in parts.items():
         settings[part][name] = 3

@@ -1,0 +1,254 @@
+"""Job: what the data make likely of stiffness and landmarks of one specimen, and of its poses.
+
+Three tables: the posterior of each unknown, by a sampler and by Laplace's approximation; the motion
+that it predicts; and the weights that the data give to the sampled poses, each with the stiffness
+that suits it.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from spinepipe.calibrate import Fit, fit
+from spinepipe.calibrate.posterior import Mode, Target, between, modes, normal_of
+from spinepipe.calibrate.sampler import Chains, Convergence, convergence, sample
+from spinepipe.calibrate.solvers import AtRest, Seen
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.landmark_frames import displacement
+from spinepipe.designs import specimen_seed
+from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import provenance
+from spinepipe.model import RefusedModel
+from spinepipe.statics import FreeParameter
+from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
+    PREDICTIONS,
+    Quantity,
+    motion_rows,
+    posterior_row,
+    prior_row,
+    refused_row,
+)
+from spinepipe.studies.joint_pose_sensitivity.posterior_target import (
+    SpecimenPosterior,
+    made_of,
+    palpated,
+    problem_of,
+    scatter_of,
+    stiffness_values,
+)
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+    POSE_WEIGHTS,
+    POSTERIOR,
+    POSTERIOR_MOTION,
+)
+from spinepipe.tables import from_rows, write
+from spinepipe.units import MM_PER_M, STIFFNESS_COLUMNS
+
+PREDICTED = 400
+"""Draws from which motion is predicted, evenly taken."""
+
+TOGETHER = 50
+"""Points that are solved at once."""
+
+
+def run(
+    root: str,
+    study: str,
+    poses: str,
+    specimen: str,
+    posterior: str,
+    posterior_motion: str,
+    pose_weights: str,
+) -> None:
+    """Write the three tables of one specimen."""
+    settings, cohort = study_and_cohort(root, study)
+    made_by = provenance("posterior", settings, cohort, [specimen])
+    found = _rows(root, settings, cohort, specimen, poses)
+    shapes = (POSTERIOR, POSTERIOR_MOTION, POSE_WEIGHTS)
+    outputs = (posterior, posterior_motion, pose_weights)
+    for shape, rows, output in zip(shapes, found, outputs, strict=True):
+        nothing: dict[str, Any] = {column.name: None for column in shape.columns}
+        keyed = [{**nothing, "specimen": specimen, **row} for row in rows]
+        write(from_rows(shape, keyed), output, made_by)
+
+
+Rows = list[dict[str, Any]]
+
+
+def _rows(
+    root: str, settings: JointPoseSensitivity, cohort: Cohort, specimen: str, poses: str
+) -> tuple[Rows, Rows, Rows]:
+    """Rows of the three tables; where there is no posterior, one that says why, and none else."""
+    try:
+        alone = problem_of(root, settings, specimen)
+        found = fit(alone, settings.calibration.starts, specimen_seed(settings.seed, specimen))
+        if not found.status.usable:
+            return [refused_row(f"no fit in the cohort's own pose: {found.message}")], [], []
+        marks = palpated(settings, cohort, specimen)
+        own = made_of(settings, cohort, alone, marks, scatter_of(settings, found))
+        target = own.target()
+    except (RefusedModel, ValueError) as error:
+        return [refused_row(str(error))], [], []
+    weights = _weights(own, specimen, poses, _start(own, found))
+    start = np.concatenate([_start(own, found), np.zeros(3 * len(own.unknowns.free))])
+    mode = modes(target, start[None])[0]
+    if mode.point is None:
+        return [refused_row(mode.message)], [], weights
+    asked = settings.posterior
+    seed = specimen_seed(settings.seed, f"posterior/{specimen}")
+    chains = sample(target, mode, asked.chains, asked.warm_up, asked.draws, seed)
+    return *_sampled(own, mode, chains, seed), weights
+
+
+def _start(own: SpecimenPosterior, found: Fit) -> Array:
+    """z (p,) of the stiffnesses of a fit."""
+    return normal_of(*own.bounds, found.x)
+
+
+def _sampled(own: SpecimenPosterior, mode: Mode, chains: Chains, seed: int) -> tuple[Rows, Rows]:
+    """Rows of the posterior and of the motion it predicts."""
+    quantities = list(_quantities(own, mode, chains.z))
+    found = convergence([quantity.draws for quantity in quantities])
+    ended = Status.NOT_CONVERGED if found.message else Status.CONVERGED
+    told = {"status": ended.value, "message": found.message}
+    believed = ended.usable
+    rows = [
+        {**posterior_row(quantity, *numbers, believed=believed), **told}
+        for quantity, numbers in zip(quantities, _numbers(found), strict=True)
+    ]
+    marks, free = own.landmarks, own.unknowns.free
+    for place in np.setdiff1d(np.arange(len(marks.names)), free).tolist():
+        for axis in "xyz":
+            rows.append(prior_row(marks.names[place], axis, float(marks.sd[place] * MM_PER_M)))
+    nothing = {} if believed else dict.fromkeys(PREDICTIONS)
+    return rows, [{**row, **nothing, **told} for row in _motion(own, chains.z, seed)]
+
+
+def _numbers(found: Convergence) -> list[tuple[float, float, float]]:
+    columns = (found.r_hat, found.ess_bulk, found.ess_tail)
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quantity]:
+    """What is told: stiffnesses, landmarks, and where these put the joints."""
+    assert mode.point is not None
+    top, count, unknowns = mode.point.z, len(own.stiffnesses), own.unknowns
+    sd = np.sqrt(np.diagonal(mode.covariance))
+    found = []
+    for place, stiffness in enumerate(own.stiffnesses):
+        bounds = own.bounds[0][place], own.bounds[1][place]
+        found.append(
+            Quantity.stiffness(
+                _where(own, stiffness),
+                z[..., place],
+                (float(top[place]), float(sd[place])),
+                bounds,
+                float(stiffness_values(own.alone, np.zeros(count))[place]),
+            )
+        )
+    for number, (mark, axis) in enumerate(product(unknowns.free.tolist(), "xyz")):
+        place, scale = count + number, float(own.landmarks.sd[mark] * MM_PER_M)
+        names, near = own.landmarks.names[mark], (float(top[place]), float(sd[place]))
+        found.append(Quantity.landmark(names, axis, z[..., place], near, scale))
+    return [*found, *_joints(own, mode, z)]
+
+
+def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quantity]:
+    """Offset and tilt of each joint that landmarks may move."""
+    assert mode.point is not None
+    count, names = len(own.stiffnesses), own.alone.model.joints
+    draws = own.unknowns.placed(z.reshape(-1, z.shape[-1])).by
+    top = own.unknowns.placed(mode.point.z[None])
+    at_home = own.unknowns.placed(np.zeros((1, z.shape[-1])))
+    scale = own.landmarks.sd[own.unknowns.free, None]
+    slope = (top.by_points[0] * scale).reshape(*top.by[0].shape, -1)
+    before = (at_home.by_points[0] * scale).reshape(slope.shape)
+    covariance = mode.covariance[count:, count:]
+    found = []
+    for joint, axis in product(range(len(names)), range(6)):
+        if not before[joint, axis].any():
+            continue
+        here = slope[joint, axis]
+        near = float(top.by[0, joint, axis]), float(np.sqrt(here @ covariance @ here))
+        prior = float(np.linalg.norm(before[joint, axis]))
+        own_draws = draws[:, joint, axis].reshape(z.shape[:2])
+        found.append(Quantity.joint(names[joint], axis, own_draws, near, prior))
+    return found
+
+
+def _where(own: SpecimenPosterior, stiffness: FreeParameter) -> tuple[str, str]:
+    """Joint, or * for all, and coordinate of a stiffness with its unit."""
+    shared = len(stiffness.rows) > 1 or own.settings.calibration.grouping == "per_specimen"
+    joint = "*" if shared else own.alone.model.joints[stiffness.rows[0]]
+    return joint, STIFFNESS_COLUMNS[stiffness.column]
+
+
+def _motion(own: SpecimenPosterior, z: Array, seed: int) -> Rows:
+    """Bands of motion at every load step that was tested."""
+    flat = z.reshape(-1, z.shape[-1])
+    chosen = flat[np.linspace(0, len(flat) - 1, min(PREDICTED, len(flat))).astype(int)]
+    x, _, _ = own.unknowns.at([0] * len(chosen), chosen)
+    problem = own.problem
+    cases = [case.case for case in problem.cases]
+    solver = AtRest(problem.model, cases, problem.free, problem.scale)
+    seen: list[Seen] = []
+    for first in range(0, len(x), TOGETHER):
+        found = solver.solve(list(enumerate(x[first : first + TOGETHER])))
+        seen += [one for one in found if isinstance(one, Seen)]
+    return motion_rows(problem, seen, own.noise, seed) if seen else []
+
+
+def _weights(own: SpecimenPosterior, specimen: str, poses: str, start: Array) -> Rows:
+    """Each sampled pose with the stiffness that suits it, and the weight that the data give it.
+
+    Poses are drawn from the landmarks' prior, so a pose weighs as much as it makes the data likely,
+    whatever its stiffness: the evidence by Laplace's approximation.
+    """
+    sampled, count = sampled_poses(poses), own.settings.poses
+    frames = {number: sampled.of(specimen, number)[0] for number in range(count)}
+    stated = own.alone.model.frames
+    placed = {n: displacement(stated, one) for n, one in frames.items() if one is not None}
+    found: dict[int, Mode] = {}
+    numbers = list(placed)
+    for first in range(0, len(numbers), TOGETHER):
+        some = numbers[first : first + TOGETHER]
+        target: Target = own.target_in(np.array([placed[number] for number in some]))
+        target.evaluator.forget()
+        found |= dict(zip(some, modes(target, np.tile(start, (len(some), 1))), strict=True))
+    evidence = np.array([found[n].log_evidence if n in found else -np.inf for n in range(count)])
+    weights = np.exp(evidence - evidence.max()) if np.isfinite(evidence).any() else 0.0 * evidence
+    total = float(weights.sum()) or 1.0
+    rows: Rows = []
+    for number in range(count):
+        mode = found.get(number)
+        refused = sampled.of(specimen, number)[1] if mode is None else mode.message
+        rows += _pose_rows(own, number, mode, float(weights[number]) / total, refused)
+    return rows
+
+
+def _pose_rows(
+    own: SpecimenPosterior, number: int, mode: Mode | None, weight: float, refused: str
+) -> Rows:
+    """A row per free stiffness of a pose, without numbers where it has none."""
+    places = [dict(zip(("joint", "unknown"), _where(own, k), strict=True)) for k in own.stiffnesses]
+    if mode is None or mode.point is None:
+        why = Status.REFUSED if mode is None else Status.NOT_CONVERGED
+        told = {"weight": 0.0, "status": why.value, "message": refused}
+        return [{"pose": number, **place, **told} for place in places]
+    top, sd = mode.point.z, np.sqrt(np.diagonal(mode.covariance))
+    value, low, high = (
+        stiffness_values(own.alone, between(*own.bounds, top + side * sd)[0])
+        for side in (0.0, *ndtri([0.025, 0.975]))
+    )
+    told = {"log_evidence": mode.log_evidence, "weight": weight}
+    told |= {"status": Status.CONVERGED.value, "message": ""}
+    return [
+        {"pose": number, **place, "value": float(v), "low": float(a), "high": float(b), **told}
+        for place, v, a, b in zip(places, value, low, high, strict=True)
+    ]

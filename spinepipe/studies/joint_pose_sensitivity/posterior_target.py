@@ -1,0 +1,275 @@
+"""What the posterior of a specimen is made of: its problem, priors, and what they stand for.
+
+The joint frames are those in which motion is told, with each joint's laws offset and tilted to
+where landmarks put it (`spinepipe.cohort.landmark_frames`). So landmarks are unknowns with exact
+derivatives, and motion is compared in one frame throughout: components that were not measured need
+not be taken for zero, as fits in sampled poses have to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinepipe.calibrate import Evaluator, Fit, Problem
+from spinepipe.calibrate.posterior import (
+    Noise,
+    Target,
+    between,
+    noise_of,
+)
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.landmark_frames import Displaced, LandmarkFrames
+from spinepipe.effects import create
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.model import ScopedEffect
+from spinepipe.statics import FreeParameter, free_parameters
+from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.units import BORDER_PER_SI, MM_PER_M, TRANSLATIONS
+
+_POINT = ["x_mm", "y_mm", "z_mm"]
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """A specimen's landmarks.
+
+    Attributes
+    ----------
+    names : (vertebra, landmark) of each. points : (L, 3) m, ground. sd : (L,) m, per axis.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    points: Array
+    sd: Array
+
+
+def palpated(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> Landmarks:
+    """The landmarks as the cohort lists them, with the SD that the study gives them."""
+    assert cohort.landmarks is not None
+    rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
+    own = rows["sd_mm"].fillna(0.0).to_numpy(float)
+    sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
+    names = tuple(zip(rows["vertebra"], rows["landmark"], strict=True))
+    return Landmarks(names, rows[_POINT].to_numpy(float) / MM_PER_M, sd / MM_PER_M)
+
+
+@dataclass(frozen=True)
+class StiffnessAndLandmarks:
+    """z: first the stiffnesses, uniform in their logarithm, then landmarks' axes about where felt.
+
+    Attributes
+    ----------
+    low, high : (p,) bounds of the logarithms, as moves from the model's. free : places of the
+        landmarks that move a joint and are not certain.
+    """
+
+    low: Array
+    high: Array
+    landmarks: Landmarks
+    free: Indices
+    frames: LandmarkFrames
+
+    @property
+    def size(self) -> int:
+        """Stiffnesses and three axes of each free landmark."""
+        return len(self.low) + 3 * len(self.free)
+
+    def displaced(self, z: Array) -> Array:
+        """(P, F, 3) displacement of the free landmarks at points z (P, m), m."""
+        moved = z[:, len(self.low) :].reshape(len(z), -1, 3)
+        return moved * self.landmarks.sd[self.free, None]
+
+    def placed(self, z: Array) -> Displaced:
+        """The joints' frames at points z (P, m)."""
+        points = np.tile(self.landmarks.points, (len(z), 1, 1))
+        points[:, self.free] += self.displaced(z)
+        return self.frames.at(points, self.free)
+
+    def at(self, numbers: Sequence[int], z: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Moves of the logarithms, then offsets and tilts, and their derivatives."""
+        count = len(self.low)
+        moves, slopes = between(self.low, self.high, z[:, :count])
+        placed, sd = self.placed(z), self.landmarks.sd[self.free, None]
+        x = np.hstack([moves, _in_order(placed.by).reshape(len(z), -1)])
+        jacobian = np.zeros((*x.shape, z.shape[1]))
+        jacobian[:, np.arange(count), np.arange(count)] = slopes
+        by_z = _in_order(placed.by_points * sd)
+        jacobian[:, count:, count:] = by_z.reshape(len(z), x.shape[1] - count, -1)
+        return x, jacobian, placed.defined
+
+
+@dataclass(frozen=True)
+class StiffnessInPoses:
+    """z: stiffnesses alone; each search has joint frames of its own.
+
+    Attributes
+    ----------
+    by : (P, J, 6) offset in m and tilt in rad of each search's frames.
+    """
+
+    low: Array
+    high: Array
+    by: Array
+
+    @property
+    def size(self) -> int:
+        """Stiffnesses."""
+        return len(self.low)
+
+    def at(self, numbers: Sequence[int], z: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Moves of the logarithms, then the frames of each search."""
+        count = len(self.low)
+        moves, slopes = between(self.low, self.high, z)
+        x = np.hstack([moves, _in_order(self.by[list(numbers)]).reshape(len(z), -1)])
+        jacobian = np.zeros((*x.shape, count))
+        jacobian[:, np.arange(count), np.arange(count)] = slopes
+        return x, jacobian, np.ones(len(z), dtype=bool)
+
+
+def _in_order(by: Array) -> Array:
+    """(P, 6, J, ...) of (P, J, 6, ...): unknowns stand offset by offset, each joint by joint."""
+    return by.swapaxes(1, 2)
+
+
+@dataclass(frozen=True)
+class SpecimenPosterior:
+    """Problem and priors of one specimen.
+
+    Attributes
+    ----------
+    alone : the problem with its stiffnesses alone, in the frames in which motion is told.
+    problem : the same with offset and tilt of each joint as further unknowns, last.
+    scatter : SD of the weighted residuals beyond the declared error, mm and degrees.
+    """
+
+    settings: JointPoseSensitivity
+    cohort: Cohort
+    alone: Problem
+    problem: Problem
+    landmarks: Landmarks
+    scatter: float
+
+    @property
+    def stiffnesses(self) -> tuple[FreeParameter, ...]:
+        """The free stiffnesses."""
+        return self.alone.free
+
+    @cached_property
+    def evaluator(self) -> Evaluator:
+        """Of the problem; a reading that was zeroed shares the error of step 0."""
+        return Evaluator(self.problem)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """(p,) each, of the logarithms of stiffness: the study's, inside those of the fit."""
+        count, drawn_in = len(self.stiffnesses), self.evaluator.problem
+        factor = self.settings.posterior.stiffness_factor
+        reach = np.inf if factor is None else np.log(factor)
+        low, high = drawn_in.lower[:count], drawn_in.upper[:count]
+        return np.maximum(low, -reach), np.minimum(high, reach)
+
+    @property
+    def noise(self) -> Noise:
+        """Of the residuals, as the study says."""
+        return noise_of(self.evaluator, reading_sd(self.cohort), self.scatter)
+
+    @cached_property
+    def unknowns(self) -> StiffnessAndLandmarks:
+        """Stiffnesses, and landmarks that are not certain and move a joint."""
+        marks = self.landmarks
+        frames = LandmarkFrames(self.cohort.vertebrae, marks.names, self.alone.model.frames)
+        moving = frames.moving(marks.points)
+        free = moving[marks.sd[moving] > 0.0]
+        return StiffnessAndLandmarks(*self.bounds, marks, free, frames)
+
+    def target(self) -> Target:
+        """Over stiffnesses and landmarks."""
+        return Target(self.evaluator, self.unknowns, self.noise)
+
+    def target_in(self, by: Array) -> Target:
+        """Over stiffnesses alone, in given frames (P, J, 6), see `StiffnessInPoses`."""
+        return Target(self.evaluator, StiffnessInPoses(*self.bounds, by), self.noise)
+
+
+def reading_sd(cohort: Cohort) -> Array:
+    """(6,) m and rad, declared SD of one reading; zero where the cohort declares none."""
+    declared = cohort.measurement_sd
+    if declared is None:
+        return np.zeros(6)
+    return np.array([declared.translation_mm] * 3 + [declared.rotation_deg] * 3) / BORDER_PER_SI
+
+
+def problem_of(root: str, settings: JointPoseSensitivity, specimen: str) -> Problem:
+    """A specimen's problem with its stiffnesses alone, in the frames in which motion is told.
+
+    Readings that were zeroed are whitened, as noise is told of one reading.
+
+    Raises
+    ------
+    RefusedModel
+        When frames and loads make no model.
+    """
+    _, cohort = study_and_cohort(root, settings.study)
+    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
+    alone = calibration_problem(root, settings, specimen, frames)
+    return replace(alone, correlated=any(case.zeroed for case in alone.cases))
+
+
+def scatter_of(settings: JointPoseSensitivity, found: Fit) -> float:
+    """SD of the weighted residuals that a fit leaves; 0 where the declared error is believed.
+
+    Raises
+    ------
+    ValueError
+        Where a fit leaves none, because it has as many unknowns as readings.
+    """
+    if settings.posterior.noise == "declared":
+        return 0.0
+    freedom = found.uncertainty.degrees_of_freedom
+    if freedom < 1:
+        raise ValueError("a fit with as many unknowns as readings leaves no scatter to go by")
+    return float(np.sqrt(found.cost / freedom))
+
+
+def made_of(
+    settings: JointPoseSensitivity,
+    cohort: Cohort,
+    alone: Problem,
+    landmarks: Landmarks,
+    scatter: float,
+) -> SpecimenPosterior:
+    """The posterior of a problem with its stiffnesses alone."""
+    joints = range(alone.model.n_joints)
+    moved = [
+        ScopedEffect(create(name), tuple(joints), np.zeros((len(joints), 3)))
+        for name in ("joint_centre_offset", "axes_tilt")
+    ]
+    model = alone.model.with_effects((*alone.model.effects, *moved))
+    first = len(alone.model.effects)
+    tilts = [parameter.name for parameter in moved[1].effect.parameters]
+    free = (
+        *alone.free,
+        *free_parameters(model, first, TRANSLATIONS, "per_joint"),
+        *free_parameters(model, first + 1, tilts, "per_joint"),
+    )
+    anywhere = np.full(len(free) - len(alone.free), np.inf)
+    problem = replace(
+        alone,
+        model=model,
+        free=free,
+        lower=np.concatenate([alone.lower, -anywhere]),
+        upper=np.concatenate([alone.upper, anywhere]),
+    )
+    return SpecimenPosterior(settings, cohort, alone, problem, landmarks, scatter)
+
+
+def stiffness_values(alone: Problem, moves: Sequence[Array] | Array) -> Array:
+    """(..., p) N/m and N m/rad of moves (..., p) of the logarithms; of an unknown's first joint."""
+    start = [alone.model.effects[p.effect].values[p.rows[0], p.column] for p in alone.free]
+    found: Array = np.array(start) * np.exp(np.asarray(moves))
+    return found
