@@ -189,7 +189,7 @@ def _alone(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Free = Annotated[
-    tuple[Coordinate | Literal["auto"], ...],
+    tuple[Literal[Coordinate, "auto"], ...],
     BeforeValidator(lambda given: (given,) if given == AUTO else given),
     Field(strict=False, min_length=1),
     AfterValidator(_alone),

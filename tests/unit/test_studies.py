@@ -167,7 +167,7 @@ def test_defaults(tmp_path: Path) -> None:
     assert study.stiffness.in_order() == (24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0)
     assert study.damping.in_order() == (1000.0, 1000.0, 1000.0, 1.4, 1.4, 1.4)
     assert study.calibration.weights.in_order() == (10.0, 100.0, 1.0, 1.0, 0.0, 0.0)
-    assert study.calibration.free == ("anterior", "superior", "extension")
+    assert study.calibration.free == ("auto",)
     assert study.load_point_shift_mm.in_order() == (0.0, 0.0, 0.0)
 
 

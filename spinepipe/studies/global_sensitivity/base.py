@@ -5,6 +5,7 @@ its motion is held against what was measured: indices speak of the spine that th
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -164,19 +165,10 @@ def _fitted_row(
 
 def _region(found: Fit, at: int) -> dict[str, Any]:
     """Value of one unknown and how far the data let it go."""
-    region = found.profile
-    assert region is not None  # of every fit that has a stiffness
     value = float(found.values[at])
-    low, high = value * np.exp(np.array([region.low[at], region.high[at]]) - found.x[at])
-    below, above = bool(region.open_below[at]), bool(region.open_above[at])
-    return {
-        "stiffness": value,
-        "low": None if below else float(low),
-        "high": None if above else float(high),
-        "open_below": below,
-        "open_above": above,
-        "identifiable": bool(found.uncertainty.identifiable[at] and region.closed[at]),
-    }
+    reach = found.reach(at, value)
+    assert reach is not None  # of every fit that has a stiffness
+    return {"stiffness": value, **asdict(reach), "identifiable": found.identifiable(at)}
 
 
 def _beside_measured(
