@@ -74,7 +74,7 @@ def _start(study: GlobalSensitivity, rows: pd.DataFrame) -> str:
 
 
 def _of_coordinate(name: str, rows: pd.DataFrame) -> str:
-    """``extension 21.1 N m/rad (95 % region 18.2 to 59.5)``, or the span over specimens."""
+    """``extension 21.1 N m/rad (95 % region 18.3 to 57.1)``, or the span over specimens."""
     unit, known = STIFFNESS_UNITS[name], int(rows["identifiable"].sum())
     values = rows["stiffness"]
     if len(rows) > 1:
