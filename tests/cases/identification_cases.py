@@ -45,6 +45,8 @@ def identification(folder: Path, size: Size) -> list[Path]:
         "posterior": _posterior,
         "posterior_motion": _posterior_motion,
         "pose_weights": _pose_weights,
+        "stiffness_over_load_point": _stiffness_over_load_point,
+        "load_point_effect": _load_point_effect,
     }
     return [write_table(folder, name, list(make(size, rng))) for name, make in makers.items()]
 
@@ -323,3 +325,30 @@ def _pose_weights(size: Size, rng: np.random.Generator) -> Iterator[Row]:
                 "weight": float(weights[pose]) if size.solved else 0.0,
                 **_fit_ended(size),
             }
+
+
+def _stiffness_over_load_point(size: Size, rng: np.random.Generator) -> Iterator[Row]:
+    """Stiffness grows with height, as under a moment that does."""
+    for specimen, anterior, superior in product(size.specimens, (0.0, 2.0), (-10.0, 0.0, 10.0)):
+        row = {"specimen": specimen, "anterior_shift_mm": anterior, "superior_shift_mm": superior}
+        row |= {"joint": "*", "degrees_of_freedom": 6, **_fit_ended(size)}
+        if size.solved:
+            row |= {"cost": 1.0 + 0.01 * abs(superior), "allowed": True}
+            for number, name in enumerate(COORDINATES):
+                value = START[number] * (1.0 + 0.01 * superior)
+                row[STIFFNESS_COLUMNS[number]] = float(value)
+                row[f"{name}_identifiable"] = name in size.free
+        yield row
+
+
+def _load_point_effect(size: Size, rng: np.random.Generator) -> Iterator[Row]:
+    points = {"points": 6, "fitted": 6 if size.solved else 0, "allowed": 6 if size.solved else 0}
+    for specimen, name in product(size.specimens, size.free):
+        value = float(START[COORDINATES.index(name)])
+        found = {"stated": value, "lowest": 0.9 * value, "highest": 1.1 * value}
+        found |= {"per_mm_anterior": 0.0, "per_mm_superior": 0.01 * value}
+        found |= {"cost_lowest": 1.0, "cost_highest": 1.1}
+        row = {"specimen": specimen, "joint": "*", "coordinate": name, **points}
+        row |= {"unit": "N/m" if name in TRANSLATIONS else "N m/rad", "message": ""}
+        row |= {"anterior_sd_mm": 0.0, "superior_sd_mm": 0.0}
+        yield row | (found if size.solved else {"message": "no stiffness was found"})

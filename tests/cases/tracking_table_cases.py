@@ -340,7 +340,8 @@ def against_rows() -> list[Row]:
     """One published quantity that ours is outside of."""
     values = {"paper": 8.5, "paper_low": 8.0, "paper_high": 9.0, "ours": 5.0}
     words = {"id": "accuracy", "where": "Results", "quantity": "mean error", "unit": "mm"}
-    return [{**words, **values, "verdict": "outside", "reason": "another cohort"}]
+    judged = {"limit": "two_sided", "verdict": "outside", "reason": "another cohort"}
+    return [{**words, **values, **judged}]
 
 
 def tables_of(size: Size, **changed: pd.DataFrame) -> dict[str, pd.DataFrame]:

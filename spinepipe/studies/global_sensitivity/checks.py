@@ -181,16 +181,16 @@ def _weights(document: Document, study: GlobalSensitivity, cohort: Cohort) -> It
     if cohort.motion is None:
         return
     read = readings(cohort, study.chosen_tests(cohort), None)
-    if AUTO in study.calibration.free:
-        found = "auto, and no coordinate was both loaded and measured"
-        place = at(document, "calibration.free")
-        yield Problem(*place, found, "coordinates that were", "name some, or choose other tests")
     columns = measured_columns(read)
     weights = zip(COORDINATE_COLUMNS, study.calibration.weights.in_order(), strict=True)
     if columns and not any(weight for name, weight in weights if name in columns):
         place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
         yield Problem(*place, found, f"a weight on {one_of(columns)}", "weigh what was measured")
+    elif AUTO in study.calibration.free:
+        found = "auto, and no coordinate was both loaded and measured"
+        place = at(document, "calibration.free")
+        yield Problem(*place, found, "coordinates that were", "name some, or choose other tests")
 
 
 def check_factors(

@@ -128,20 +128,20 @@ def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> I
             remedy = "choose more tests, or leave the specimen out of the cohort"
             yield Problem(*at(document, "tests"), found, allowed, remedy)
     yield from _weights(document, study, measured)
-    if AUTO in study.calibration.free:
-        found = "auto, and no coordinate was both loaded and measured"
-        allowed = f"{one_of(COORDINATES)}, whose stiffness the data tell"
-        place = at(document, "calibration.free")
-        yield Problem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")
 
 
 def _weights(
     document: Document, study: JointPoseSensitivity, measured: pd.DataFrame
 ) -> Iterator[Problem]:
-    """Terms of what was not measured drop out of the cost; something measured must remain."""
+    """Terms of what was not measured drop out of the cost; something to fit must remain."""
     weights = study.calibration.weights.in_order()
     known = [c for c in COORDINATE_COLUMNS if measured[c].notna().any()]
     if not any(w > 0 for w, c in zip(weights, COORDINATE_COLUMNS, strict=True) if c in known):
         place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
         yield Problem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")
+    elif AUTO in study.calibration.free:
+        found = "auto, and no coordinate was both loaded and measured"
+        allowed = f"{one_of(COORDINATES)}, whose stiffness the data tell"
+        place = at(document, "calibration.free")
+        yield Problem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")

@@ -36,8 +36,9 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
         own = placed(root / "own", place, "stiffness", "fits", "errors")
         fit.run(str(root), STUDY, specimen, "per_joint", "flexion", **own)
         made += [told, own]
-    whole = placed(root / "pool", "fitted_to=flexion", "stiffness", "fits", "errors", "pooling")
-    pool.run(str(root), STUDY, "flexion", "nobody", **whole)
+    place = "representation=partially_pooled/fitted_to=flexion"
+    whole = placed(root / "pool", place, "stiffness", "fits", "errors", "pooling")
+    pool.run(str(root), STUDY, "partially_pooled", "flexion", "nobody", **whole)
     return [*made, whole]
 
 

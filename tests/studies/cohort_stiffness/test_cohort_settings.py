@@ -187,7 +187,9 @@ def analysed(project: Written) -> Tables:
     parts = made_of_jobs(project, settings.representations, layout.load_sets)
     for name, frames in parts.items():
         shape = KIND.table(name)
-        columns = {c.name: list(pd.concat(frames)[c.name]) for c in shape.columns}
+        whole = pd.concat(frames)
+        cells = whole.astype(object).where(whole.notna(), None)
+        columns = {c.name: cells[c.name].tolist() for c in shape.columns}
         write_table(to_arrow(shape, columns), project.root / f"{name}.parquet", {})
     for name in ("mae", "ranking", "statistics", "findings"):
         files = [

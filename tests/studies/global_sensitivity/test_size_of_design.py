@@ -104,7 +104,9 @@ def test_rows_and_files_of_a_small_study(root: Path) -> None:
     found = size_of_design.size_of_design(of_all_steps, cohort)
     # 2 specimens x 50 runs x 3 steps x 2 joints; 3 batches each; 6 coordinates of 2 joints, 3 steps
     assert found == Size(50, 36, 250, 600, 0, 6)
-    with_stiffness = study("latin_hypercube", 50, outputs={"motion": ["right"], "stiffness": True})
+    free = ["extension", "right_bending", "left_rotation"]
+    outputs = {"motion": ["right"], "stiffness": True}
+    with_stiffness = study("latin_hypercube", 50, outputs=outputs, calibration={"free": free})
     found = size_of_design.size_of_design(with_stiffness, cohort)
     assert found == Size(50, 2 * 4 + 3, 250, 200, 100, 200)
 

@@ -79,7 +79,8 @@ def test_tables_of_job_files_of_every_kind_are_joined() -> None:
     own = {"tracking": "tracking_phantom"}  # by kinds that ask the cohort for files of their own
     asked = {
         "joint_pose_sensitivity": {
-            *("method_fits", "posterior", "posterior_motion", "pose_weights")
+            *("method_fits", "posterior", "posterior_motion", "pose_weights"),
+            "stiffness_over_load_point",
         },
         "trunk_loads": {"responses"},
     }  # by studies that ask for them

@@ -24,6 +24,7 @@ cohort: felt
 poses: 30
 stiffness: {{anterior_n_per_m: {0}, superior_n_per_m: {1}, right_n_per_m: {2},
   extension_nm_per_rad: {3}, right_bending_nm_per_rad: {4}, left_rotation_nm_per_rad: {5}}}
+calibration: {{free: [anterior, superior, extension]}}
 posterior: {{draws: {draws}, warm_up: 100, noise: {noise}, stiffness_factor: 10}}
 """
 

@@ -180,14 +180,15 @@ def test_findings_are_the_numbers_of_the_tables() -> None:
     assert told[0].startswith("12 fits of 12 (100 %) are in the reduced dataset: 12 ended")
     assert "0 had not moved (all free stiffnesses within 1 % of the start)" in told[0]
     assert "flexion–extension 37.0 N m/rad (IQR 18.5 to 74.0)" in told[1]
-    assert "more of the variance than stiffness in 4 and stiffness more in 0." in told[2]
-    assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told[3]
-    assert "forward run default step 1 of 6 (least cost reached: 1)" in told[4]
+    assert told[2].startswith("Over 6 load points, ")
+    assert "more of the variance than stiffness in 4 and stiffness more in 0." in told[3]
+    assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told[4]
+    assert "forward run default step 1 of 6 (least cost reached: 1)" in told[5]
     many = page(SIZES["many specimens"])[0].text("li")
     assert many[0].startswith("27 fits of 27")
     assert "37.0 N m/rad in all 9 specimens" in many[1]
-    assert "1.25 mm (smallest of 9 specimens, s0)" in many[3]
-    assert "forward run default step 9 of 54" in many[4]
+    assert "1.25 mm (smallest of 9 specimens, s0)" in many[4]
+    assert "forward run default step 9 of 54" in many[5]
 
 
 def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -> None:
@@ -211,6 +212,7 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
             "unit": "mm",
             "paper": 1.0,
             "ours": float(n),
+            "limit": "two_sided",
             "verdict": verdict,
             "reason": "as <it> is",
         }
@@ -226,9 +228,9 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     (told,) = found.text("li")
     assert "Of 7 published quantities ours are inside the paper's range for 3" in told
     assert "outside for 2; 1 are contradicted by other numbers" in told
-    assert told.endswith("1 are not computed.")
+    assert "not chased, 1 are not computed. Of the 3 inside, 3 lie in a range with two ends" in told
     heads = found.text("button")
-    assert heads == ["quantity", "unit", "paper", "ours", "verdict", "reason", "where"]
+    assert heads == ["quantity", "unit", "paper", "ours", "limit", "verdict", "reason", "where"]
     assert found.text("td").count("as <it> is") == 7
 
 

@@ -227,5 +227,5 @@ def test_whether_films_were_brought_to_one_size_is_told() -> None:
 
 def test_published_quantities_are_told_once_they_are_judged() -> None:
     assert "published quantities" not in told(Size())
-    judged = pd.DataFrame({"verdict": ["inside", "outside", "contradicted"]})
+    judged = pd.DataFrame({"verdict": ["inside", "outside", "contradicted"], "limit": "wide"})
     assert "Of 3 published quantities" in told(Size(), against_jalalian_2017=judged)
