@@ -109,6 +109,7 @@ def check_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     yield from _without_a_point(draft, applied)
     yield from _preload(draft, applied)
     yield from _times(draft)
+    yield from _followers(draft)
 
 
 def _repeated_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
@@ -206,6 +207,22 @@ def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Itera
             yield Problem(file, line, "time_s", found, "one time per step", "correct the time")
         if step < later_step and later <= time:
             yield Problem(file, line, "time_s", found, "times that increase", "correct the time")
+
+
+def _followers(draft: Draft) -> Iterator[Problem]:
+    """A test has one follower load, told in each of its rows."""
+    file, told = draft.file("loads"), defaultdict[tuple[object, object], dict[str, int]](dict)
+    for line, (specimen, test, force) in draft.rows("loads", "specimen", "test", "follower_n"):
+        word = "no follower load" if isnan(force) else f"{force:g} N"
+        told[specimen, test].setdefault(word, line)
+    for specimen, test in tuple(told):
+        of_all = told["*", test] if specimen != "*" else {}
+        (first, _), *others = ({**of_all, **told[specimen, test]}).items()
+        for word, line in others:
+            found = f"{word} after {first} in test '{test}'"
+            allowed = "one tension in all rows of a test (of a specimen, or of * and it)"
+            remedy = "fill it in everywhere; a test under another tension has a name of its own"
+            yield Problem(file, line, "follower_n", found, allowed, remedy)
 
 
 def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:

@@ -14,6 +14,7 @@ LARGEST_ANGLE_DEG = 90.0
 LARGEST_COUNT = 1_000_000
 LARGEST_COORDINATE_MM = 10_000.0
 LARGEST_FORCE_N = 20_000.0
+LARGEST_FOLLOWER_N = 2000.0
 LARGEST_MOMENT_NM = 500.0
 LARGEST_TRANSLATION_MM = 200.0
 
@@ -211,6 +212,13 @@ LOADS = TableForm(
         *_loads(("mx_nm", "my_nm", "mz_nm"), "moment", LARGEST_MOMENT_NM),
         *_points(("px_mm", "py_mm", "pz_mm"), "point where the force acts", required=False),
         Column("time_s", "time since the start of the test", low=0),
+        Column(
+            "follower_n",
+            "tension of a cable through the joints' centres, a follower load; it acts in all steps "
+            "of the test, step 0 too",
+            low=0,
+            high=LARGEST_FOLLOWER_N,
+        ),
     ),
     keys=("specimen", "test", "cycle", "step", "vertebra"),
 )

@@ -124,15 +124,45 @@ def _possible(inertia: Array) -> Array:
     return possible
 
 
+def followers(cohort: Cohort, specimen: str) -> dict[str, float]:
+    """Tension in N of the follower load of each test that has one."""
+    table = cohort.loads
+    if table is None:
+        return {}
+    rows = table[table["specimen"].isin([specimen, "*"]) & (table["follower_n"] > 0.0)]
+    first = rows.drop_duplicates("test")
+    return dict(zip(first["test"], first["follower_n"].astype(float), strict=True))
+
+
+def cables(tension_n: Mapping[str, float], n_joints: int) -> tuple[ScopedEffect, ...]:
+    """Cables through the centres of all joints, one per test; its tension is known, not fitted."""
+    cable, joints = create("follower_load"), tuple(range(n_joints))
+    beside = [parameter.default for parameter in cable.parameters[1:]]
+    return tuple(
+        ScopedEffect(cable, joints, np.array([[force, *beside]]), (test,))
+        for test, force in tension_n.items()
+    )
+
+
 def spine_model(
     cohort: Cohort,
     specimen: str,
     frames: tuple[Pose, ...],
     effects: tuple[ScopedEffect, ...],
     damping: Array,
+    tension_n: Mapping[str, float] | None = None,
 ) -> SpineModel:
-    """The model of a specimen with these joint frames and effects; ``damping`` (6,) SI."""
+    """The model of a specimen with these joint frames and effects.
+
+    Behind the effects come the follower loads of its tests.
+
+    Parameters
+    ----------
+    damping : (6,) SI.
+    tension_n : of the follower load of each test that has one; None: as ``loads.csv`` says.
+    """
     n = len(cohort.joint_names)
+    told = followers(cohort, specimen) if tension_n is None else tension_n
     return SpineModel(
         specimen=specimen,
         joints=cohort.joint_names,
@@ -140,7 +170,7 @@ def spine_model(
         bodies=bodies(cohort, specimen),
         gravity=STANDARD_GRAVITY if cohort.gravity else np.zeros(3),
         damping=np.tile(damping, (n, 1)),
-        effects=effects,
+        effects=(*effects, *cables(told, n)),
     )
 
 
@@ -233,12 +263,14 @@ def on_bushings(
     stiffness: Array,
     damping: Array,
     others: tuple[ScopedEffect, ...] = (),
+    tension_n: Mapping[str, float] | None = None,
 ) -> SpineModel:
     """Model of a specimen on linear bushings; stiffness (6,) for all joints or (J, 6).
 
-    The bushings are its first effect, ``others`` come after them.
+    The bushings are its first effect, ``others`` come after them, follower loads last, see
+    `spine_model`.
     """
     n = len(cohort.joint_names)
     values = np.broadcast_to(stiffness, (n, 6)).copy()
     bushing = ScopedEffect(create("linear_bushing"), tuple(range(n)), values)
-    return spine_model(cohort, specimen, frames, (bushing, *others), damping)
+    return spine_model(cohort, specimen, frames, (bushing, *others), damping, tension_n)

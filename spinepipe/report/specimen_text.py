@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import followers
 from spinepipe.frames import zxy_angles
 from spinepipe.report.specimen import SpecimenView
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, from_si
@@ -41,7 +42,8 @@ def _heading(cohort: Cohort, view: SpecimenView) -> str:
         f"vertebrae  {', '.join(cohort.vertebrae)} (the first is fixed)",
         f"gravity    {'9.81 m/s2 downward' if cohort.gravity else 'off'}",
     ]
-    return "\n".join(lines)
+    told = [f"{force:g} N in {test}" for test, force in followers(cohort, view.specimen).items()]
+    return "\n".join([*lines, *([f"follower   {', '.join(told)}"] if told else [])])
 
 
 def _section(title: str, rows: Iterator[Cells]) -> str:

@@ -31,18 +31,18 @@ class AskedTest:
         return tuple(step.step for step in self.case.steps[self.stored])
 
 
-def asked(case: LoadCase, gravity: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
+def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
     """What is computed of a test: all of its load steps, or that of the largest load only.
 
     Joints have no memory, so the largest load can be computed without the steps before it.
 
     Parameters
     ----------
-    gravity : whether weight acts.
+    pressed : whether weight or a follower load acts, beside the loads of the case.
     subtracted : whether motion counts from step 0. Where nothing acts in it, that is the neutral
         pose, which need not be computed.
     """
-    from_first = subtracted and (gravity or _loaded(case.steps[0]))
+    from_first = subtracted and (pressed or _loaded(case.steps[0]))
     largest = case.steps[peak_step(case)]
     if all_steps:
         return AskedTest(case, from_first, largest.step, slice(None))

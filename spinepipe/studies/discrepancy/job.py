@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import followers
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
@@ -291,4 +292,5 @@ def _field_numbers(ended: Investigation, gap: Sequence[Row]) -> Sequence[Row]:
 def _model(ready: Prepared, fit: JointFit, of: str) -> ModelFile:
     file = ready.file
     base = [EVERY] if file is None else [entry.scope.specimens for entry in file.effects]
-    return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base)
+    given = {name: len(followers(ready.cohort, name)) for name in fit.models}
+    return model_file(fit, f"{ready.study.study}_{of}", ready.cohort.name, base, given)

@@ -7,7 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.specimen import joint_frames, landmarks, load_cases, on_bushings
+from spinepipe.cohort.specimen import (
+    followers,
+    joint_frames,
+    landmarks,
+    load_cases,
+    on_bushings,
+)
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import SpineModel
@@ -74,8 +80,9 @@ def asked_tests(
     cohort : with loads.
     all_steps : all load steps, or that of the largest load only.
     """
+    under = followers(cohort, specimen)
     return tuple(
-        asked(case, cohort.gravity, all_steps, cohort.zeroed_at_step_0)
+        asked(case, cohort.gravity or case.test in under, all_steps, cohort.zeroed_at_step_0)
         for case in first_cycles(load_cases(cohort, specimen, tests, np.zeros(3)))
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import virtual_load_cases
-from spinepipe.cohort.specimen import load_cases
+from spinepipe.cohort.specimen import followers, load_cases
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import LoadCase
 from spinepipe.studies.asked_tests import AskedTest, asked, first_cycles
@@ -17,8 +17,14 @@ from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 def asked_tests(root: str, study: str, specimen: str, _digest: str) -> tuple[AskedTest, ...]:
     """Tests of a specimen; ``_digest`` is that of its cohort."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    virtual = virtual_tensions(settings)
+    tension_n = followers(cohort, specimen) if virtual is None else virtual
     return tuple(
-        asked(case, cohort.gravity, settings.rows == "all_steps")
+        asked(
+            case,
+            cohort.gravity or tension_n.get(case.test, 0.0) > 0.0,
+            settings.rows == "all_steps",
+        )
         for case in all_cases(settings, cohort, specimen)
     )
 
@@ -30,3 +36,9 @@ def all_cases(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> tuple[L
         top = len(cohort.joint_names) - 1
         return virtual_load_cases(tests.tests, tests.moment_nm, tests.steps, top)
     return first_cycles(load_cases(cohort, specimen, settings.tests or cohort.tests, np.zeros(3)))
+
+
+def virtual_tensions(settings: RangeOfMotion) -> dict[str, float] | None:
+    """Follower load in N of each virtual test; None: the tests are the cohort's, as it says."""
+    asked_for = settings.virtual_tests
+    return None if asked_for is None else dict.fromkeys(asked_for.tests, asked_for.follower_n)

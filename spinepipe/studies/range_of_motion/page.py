@@ -144,7 +144,8 @@ def _percent(share: float) -> str:
 
 
 def _where(study: RangeOfMotion, cohort: Cohort) -> str:
-    if study.virtual_tests is None or cohort.gravity:
+    virtual = study.virtual_tests
+    if virtual is None or virtual.follower_n > 0.0 or cohort.gravity:
         return ""
     return (
         "The tests are pure moments without weight: they load no translation, and only how joint "

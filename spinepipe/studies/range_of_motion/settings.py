@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, Field
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.columns import LARGEST_FOLLOWER_N
 from spinepipe.cohort.text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.parts import (
@@ -56,6 +57,13 @@ class VirtualTests(BaseModel):
     )
     steps: int = Field(
         default=10, ge=1, le=1000, description="equal steps in which the moment grows"
+    )
+    follower_n: float = Field(
+        default=0.0,
+        ge=0,
+        le=LARGEST_FOLLOWER_N,
+        description="tension of a follower load through the joints' centres in all steps, N; "
+        "motion is told from step 0, where it acts already",
     )
 
 

@@ -18,7 +18,7 @@ from spinepipe.model import RefusedModel
 from spinepipe.statics import System, follow
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
-from spinepipe.studies.range_of_motion.load_steps import asked_tests
+from spinepipe.studies.range_of_motion.load_steps import asked_tests, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import read_frame, to_arrow, write
@@ -52,7 +52,8 @@ def run(
     values = drawn_stiffness(stiffness_sets)[int(stiffness)]
     damping = np.array(settings.damping.in_order())
     try:
-        chain = Chain(on_bushings(cohort, specimen, placed, values, damping))
+        tension_n = virtual_tensions(settings)
+        chain = Chain(on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n))
         ends = [_motion(chain, test) for test in tests]
     except RefusedModel as error:
         nowhere = np.full(values.shape, np.nan)

@@ -8,6 +8,7 @@ import pytest
 import spring_chain_cases as chains
 from search_cases import JOINTS, Array
 
+from spinepipe.cohort.specimen import cables
 from spinepipe.effects import Spread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
@@ -105,6 +106,23 @@ def test_a_base_may_have_an_effect_in_one_specimen_alone(tmp_path: Path) -> None
     for specimen in NAMES:
         again = model.with_effects(effects_for(file, specimen, model.joints))
         np.testing.assert_array_equal(motion(again), motion(models[specimen]))
+
+
+def test_follower_loads_of_the_cohort_are_left_out_of_the_file(tmp_path: Path) -> None:
+    """They come between base and what is supposed; whoever reads the file has the cohort."""
+    fit = fitted(one(OFFSET, Spread.SHARED))
+    pressed = {
+        name: model.with_effects(
+            (model.effects[0], *cables({"flexion": 100.0}, model.n_joints), *model.effects[1:])
+        )
+        for name, model in fit.models.items()
+    }
+    given = dict.fromkeys(NAMES, 1)
+    file = model_file(replace(fit, models=pressed), "m", "chains", given=given)
+    write_model(file, tmp_path / "pressed.yaml")
+    write_model(model_file(fit, "m", "chains"), tmp_path / "free.yaml")
+    written = [(tmp_path / f"{name}.yaml").read_text() for name in ("pressed", "free")]
+    assert written[0] == written[1]
 
 
 def test_specimens_differ_where_the_fit_says_so() -> None:

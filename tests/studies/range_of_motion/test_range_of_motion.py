@@ -155,6 +155,21 @@ def test_joints_of_a_straight_chain_turn_by_moment_over_stiffness(tmp_path: Path
     np.testing.assert_allclose(rows.filter(like="_mm"), 0.0, atol=1e-9)
 
 
+def test_a_follower_load_presses_virtual_tests_from_step_0_on(tmp_path: Path) -> None:
+    """About the axis of the chain it changes nothing; a bent chain it pushes anterior, or back."""
+    study = "virtual_tests: {moment_nm: 7.5, tests: [left_rotation, flexion, extension]%s}\n"
+    root = project(tmp_path / "pressed", study % ", follower_n: 400")
+    pressed = moved(root).set_index("test")
+    free = moved(project(tmp_path / "free", study % "")).set_index("test")
+    turned = pressed.loc["left_rotation"]
+    np.testing.assert_allclose(turned["predicted_left_rotation_deg"], np.rad2deg(7.5 / 250.0))
+    np.testing.assert_allclose(turned.filter(like="_mm"), 0.0, atol=1e-9)
+    assert (free.loc["flexion", "predicted_anterior_mm"].abs() < 1e-9).all()
+    ends = [pressed.loc[test, "predicted_anterior_mm"].iloc[0] for test in ("flexion", "extension")]
+    assert ends[0] == pytest.approx(-ends[1], rel=1e-6)
+    assert abs(ends[0]) > 0.01
+
+
 def test_tilted_frames_split_a_small_moment_among_their_axes(tmp_path: Path) -> None:
     """To first order each coordinate turns by the moment about its axis over its stiffness."""
     root = project(

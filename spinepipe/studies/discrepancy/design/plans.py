@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.effects import Wrench, create
+from spinepipe.cohort.specimen import cables
+from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import without_step_0
 
@@ -131,14 +132,8 @@ class Planned:
 
 def with_preloads(model: SpineModel, tests: Sequence[Planned]) -> SpineModel:
     """The model under the follower load of each test that has one: it is known and not fitted."""
-    cable, joints = create("follower_load"), tuple(range(model.n_joints))
-    at_joints = [p.default for p in cable.parameters[1:]]
-    forces = {one.case.test: one.preload for one in tests if one.preload > 0.0}
-    added = [
-        ScopedEffect(cable, joints, np.array([[force, *at_joints]]), (test,))
-        for test, force in forces.items()
-    ]
-    return model.with_effects((*model.effects, *added))
+    tension_n = {one.case.test: one.preload for one in tests if one.preload > 0.0}
+    return model.with_effects((*model.effects, *cables(tension_n, model.n_joints)))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -38,13 +39,19 @@ class FittedValue:
 
 
 def model_file(
-    fit: JointFit, name: str, cohort: str, base: Sequence[tuple[str, ...]] = (EVERY,)
+    fit: JointFit,
+    name: str,
+    cohort: str,
+    base: Sequence[tuple[str, ...]] = (EVERY,),
+    given: Mapping[str, int] = MappingProxyType({}),
 ) -> ModelFile:
     """The models of all specimens in one file.
 
     Parameters
     ----------
     base : specimens of each effect that the base has, in front of the supposed ones.
+    given : how many effects of each specimen come between these, as the cohort's loads say: the
+        file leaves them out, as whoever reads it has the cohort.
     """
     entries = []
     after = dict.fromkeys(fit.models, 0)
@@ -55,6 +62,8 @@ def model_file(
             entries.append(_of_scoped(acting, scoped, specimens))
         for specimen in acting:
             after[specimen] += 1
+    for specimen in after:
+        after[specimen] += given.get(specimen, 0)
     for supposed in fit.hypothesis.supposed:
         acting = {n: m for n, m in fit.models.items() if supposed.form.acts_in(n)}
         copies = _copies(supposed.form, acting, after)
