@@ -218,9 +218,9 @@ def _imitated(found: Found, one: Standing) -> _NoName | None:
     is_prop = any(one is prop for prop in props)
     if not is_prop and propped <= UNEXPLAINED_SHARE * (one.gain + propped):
         return None
-    different = list(dict.fromkeys(other.name for other in beside))
+    different = sorted({other.name for other in beside})
     names = _listed(different, "and") if len(different) > 1 else f"forms of {different[0]}"
-    alone = _listed(list(dict.fromkeys(other.name for other in props)), "and")
+    alone = _listed(sorted({other.name for other in props}), "and")
     why = f"{names} imitate it together, but by itself nothing speaks for {alone}"
     return Reason.IMITATED_TOGETHER, why
 
