@@ -12,6 +12,8 @@ from spinepipe.report.marks import quartiles
 from spinepipe.report.panels import MOST_ROWS, rows_of
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
 from spinepipe.report.words import fixed, number, percent, tick
+from spinepipe.studies.joint_pose_sensitivity.figures.stiffness import stiffness_figure
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.units import COORDINATES
 
 FIRST = ("stiffness", "errors", "joint_pose")
@@ -80,6 +82,25 @@ def test_shares_and_medians_are_written_in_the_panels(tmp_path: Path) -> None:
     told = f"at a bound {percent(at_bound, 40)}, not identifiable {percent(lost, 40)}, n = 40"
     assert told in words
     assert f"median {number(frame['extension_nm_per_rad'].median())} (IQR" in words
+
+
+def test_no_median_is_told_of_what_most_fits_do_not_hold(tmp_path: Path) -> None:
+    """Made by hand: 21 of 40 fits do not hold extension; lower ends 1 to 5, quartiles 2 and 4."""
+    size = Size(("a",), 2, 40)
+    study, cohort = study_and_cohort(str(project(tmp_path, size)), STUDY)
+    results(tmp_path, size)
+    frame = pd.read_parquet(tmp_path / "results" / STUDY / "calibrations.parquet")
+    frame["extension_low_nm_per_rad"] = np.resize([1.0, 2.0, 3.0, 4.0, 5.0], len(frame))
+    said = []
+    for lost in (20, 21):
+        frame["extension_identifiable"] = np.arange(len(frame)) >= lost
+        figure = stiffness_figure(study, cohort, {"calibrations": frame})
+        said.append(" ".join(text.get_text() for axis in figure.axes for text in axis.texts))
+    median = f"median {number(frame['extension_nm_per_rad'].median())} (IQR"
+    assert median in said[0]
+    assert "not held" not in said[0]
+    assert median not in said[1]
+    assert "not held; above 2.00–4.00 (IQR)" in said[1]
 
 
 def test_share_without_equilibrium_counts_runs_not_rows(tmp_path: Path) -> None:

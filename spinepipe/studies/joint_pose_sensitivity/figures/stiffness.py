@@ -36,8 +36,10 @@ from spinepipe.report.panels import (
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
 from spinepipe.status import USABLE
+from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import MOSTLY
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 AT_BOUND = 1e-4
@@ -153,13 +155,32 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
 
 
 def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool) -> None:
+    """Hill and bar of the fits; grey and without a median where the data do not hold most."""
     values = finite(frame[panel.column])
-    draw_density(axis, panel.inside(values), y + 0.1, 0.42, OURS, logarithmic=True)
-    found = draw_bar(axis, values, y, OURS)
+    held = _lost(panel, frame) <= MOSTLY * len(values)
+    color = OURS if held else GREY
+    draw_density(axis, panel.inside(values), y + 0.1, 0.42, color, logarithmic=True)
+    found = draw_bar(axis, values, y, color)
     if with_numbers:
-        note(axis, 0.02, y + 0.78, _median_and_iqr(found), OURS)
+        told = _median_and_iqr(found) if held else _lower_ends(panel, frame)
+        note(axis, 0.02, y + 0.78, told, color)
         note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
         _tell_far_bound(panel, axis, values, y - 0.125)
+
+
+def _lost(panel: _Panel, frame: pd.DataFrame) -> int:
+    """Fits that do not identify the stiffness."""
+    flags = frame[f"{panel.coordinate}_identifiable"]
+    return int((flags == False).sum())  # noqa: E712  (None: held fixed)
+
+
+def _lower_ends(panel: _Panel, frame: pd.DataFrame) -> str:
+    """What is known of a stiffness that most fits do not hold: how low it may be."""
+    ends = finite(frame[region_columns(panel.coordinate)[1]])
+    if not len(ends):
+        return "not held by the data"
+    found = quartiles(ends)
+    return f"not held; above {number(found.low)}–{number(found.high)} (IQR)"
 
 
 def _median_and_iqr(found: Quartiles) -> str:
@@ -169,10 +190,9 @@ def _median_and_iqr(found: Quartiles) -> str:
 def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
     """Shares at a bound and not identifiable, of the solved fits."""
     values = finite(frame[panel.column])
-    flags = frame[f"{panel.coordinate}_identifiable"]
-    lost = int((flags == False).sum())  # noqa: E712  (None: held fixed)
     at = percent(len(values) - len(panel.inside(values)), len(values))
-    return f"at a bound {at}, not identifiable {percent(lost, len(values))}, n = {len(values)}"
+    lost = percent(_lost(panel, frame), len(values))
+    return f"at a bound {at}, not identifiable {lost}, n = {len(values)}"
 
 
 def _tell_far_bound(panel: _Panel, axis: Axes, values: Array, y: float) -> None:
