@@ -127,7 +127,7 @@ def descend_along(
     for number in range(1, settled.evaluations):
         residual, jacobian = found
         cost = float(residual @ residual)
-        step = _damped(
+        step = damped_step(
             residual, jacobian * scale, damping, np.array([bounds[0] - x, bounds[1] - x]) / scale
         )
         left = residual + jacobian @ (step * scale)
@@ -146,8 +146,13 @@ def descend_along(
     return Descent(x, 0.5 * float(found[0] @ found[0]), False, settled.evaluations)
 
 
-def _damped(residual: Array, jacobian: Array, damping: float, reach: Array) -> Array:
-    """(m,) step within ``reach`` (2, m) of least linearised cost, damped by the columns' sizes."""
+def damped_step(residual: Array, jacobian: Array, damping: float, reach: Array) -> Array:
+    """(m,) step within ``reach`` (2, m) of least linearised cost, damped by the columns' sizes.
+
+    Parameters
+    ----------
+    damping : as of `DAMPING`. reach : from no step to the bounds.
+    """
     sizes = np.linalg.norm(jacobian, axis=0)
     sizes = np.maximum(sizes, 1e-6 * max(float(sizes.max(initial=0.0)), 1e-300))
     rows = np.vstack([jacobian, np.diag(np.sqrt(damping) * sizes)])

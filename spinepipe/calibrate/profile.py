@@ -19,7 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from spinepipe.calibrate.descent import Point, Settled, descend, descend_along, once
+from spinepipe.calibrate.descent import (
+    LEAST_DAMPING,
+    Point,
+    Settled,
+    damped_step,
+    descend,
+    descend_along,
+    once,
+)
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import UNSEEN_SHARE, uncertainty
@@ -109,6 +117,7 @@ class Best:
     scale : (m,) size of a typical change. bent : (m,) whether an unknown is the logarithm of a
         stiffness: what is read grows with one over it.
     enough : when the others have been fitted well enough. along_bounds : as of `Problem`.
+    ahead : factor by which first looks go beyond where a straight problem would end.
     """
 
     x: Array
@@ -120,6 +129,7 @@ class Best:
     bent: NDArray[np.bool_]
     enough: Settled = ENOUGH
     along_bounds: bool = False
+    ahead: float = 1.0
 
     def others(self, unknown: int) -> Indices:
         """All but one."""
@@ -131,6 +141,11 @@ class Best:
         direction = np.ones(len(self.x))
         direction[others] = -_not_made(self.jacobian, unknown, others)[1]
         return direction
+
+    def told_by(self, unknown: int) -> float:
+        """One over the SD of an unknown to first order, the others free; residuals in their SDs."""
+        left, _ = _not_made(self.jacobian, unknown, self.others(unknown))
+        return float(np.linalg.norm(left))
 
 
 @dataclass(frozen=True)
@@ -187,8 +202,7 @@ def profile_in_turn(
     """
     rises: list[_Rise | None] = [None] * len(best.x)
     for unknown in asked:
-        left, _ = _not_made(best.jacobian, unknown, best.others(unknown))
-        size = float(np.linalg.norm(left))
+        size = best.told_by(unknown)
         if size > UNSEEN_SHARE * float(np.linalg.norm(best.jacobian[:, unknown])):
             rises[unknown] = _Rise(limit**2, limit / size)
     return _profile(best, rises, lambda searches: [search(point) for search in searches])
@@ -267,7 +281,8 @@ def _end(best: Best, unknown: int, rise: _Rise, side: int, point: Point) -> _End
     if rise.way < EXACT * best.scale[unknown]:
         return _End(_no_further(origin + side * rise.way, bound, side), False, 0.0)
     inner, outer, least = (origin, 0.0), None, 0.0
-    value = _no_further(_from(origin, side * rise.way, bent), bound, side)
+    value = _no_further(_from(origin, side * best.ahead * rise.way, bent), bound, side)
+    alike = 0  # looks in a row that fell on the same side of the end, once it is between two
     direction, there = best.follow(unknown), best.x
     for number in range(1, MOST_FITS + 1):
         start = best.x + (value - origin) * direction
@@ -278,13 +293,16 @@ def _end(best: Best, unknown: int, rise: _Rise, side: int, point: Point) -> _End
             return _End(bound, True, least)
         if abs(share - 1.0) <= NEAR and (share >= 1.0 or outer is not None):
             return _End(value, False, least)
+        between = outer is not None
         if share > 1.0:
+            alike = max(alike, 0) + 1 if between else 0
             outer = (value, share)
         else:
+            alike = min(alike, 0) - 1 if between else 0
             inner, there = (value, share), fitted
             direction = (fitted - best.x) / (value - origin)
         far = outer is None and number >= AFAR
-        value = bound if far else _next(origin, inner, outer, bound, bent)
+        value = bound if far else _next(origin, inner, outer, bound, bent, abs(alike) > 1)
     return _End(bound, True, least) if outer is None else _End(outer[0], False, least)
 
 
@@ -294,8 +312,14 @@ def _next(
     outer: tuple[float, float] | None,
     bound: float,
     bent: bool,
+    halve: bool = False,
 ) -> float:
-    """Where to look next: the root of the rise is nearly straight, see `_from`."""
+    """Where to look next: the root of the rise is nearly straight, see `_from`.
+
+    Parameters
+    ----------
+    halve : whether it is not, as looks keep falling on one side: then half way between.
+    """
     value, share = inner
     root = np.sqrt(max(share, 0.0))
     side = 1 if bound > origin else -1
@@ -305,6 +329,7 @@ def _next(
     if not np.isfinite(outer[1]):
         return 0.5 * (value + outer[0])
     part = float(np.clip((1.0 - root) / (np.sqrt(outer[1]) - root), 0.05, 0.95))
+    part = 0.5 if halve else part
     return _from(value, part * _way(value, outer[0], bent), bent)
 
 
@@ -356,12 +381,13 @@ def _refitted(
         found = held(begin)
         if found is None:
             continue
-        cost, moved = _one_step(*found, begin)
+        size, scale = len(best.residual), best.scale[others]
+        along = (bounds, scale) if best.along_bounds else None
+        cost, moved = _one_step(*found, begin, along)
         if float(found[0] @ found[0]) - cost <= STRAIGHT * rise.allowed and np.all(
             (moved >= bounds[0]) & (moved <= bounds[1])
         ):
             return cost, whole(moved)
-        size, scale = len(best.residual), best.scale[others]
         if best.along_bounds:
             ended = descend_along(held, begin, bounds, scale, best.enough)
         else:
@@ -370,10 +396,25 @@ def _refitted(
     return np.inf, best.x
 
 
-def _one_step(residual: Array, jacobian: Array, start: Array) -> tuple[float, Array]:
-    """Cost and place that a linear step reaches."""
+def _one_step(
+    residual: Array,
+    jacobian: Array,
+    start: Array,
+    along: tuple[tuple[Array, Array], Array] | None,
+) -> tuple[float, Array]:
+    """Cost and place that a linear step reaches.
+
+    Parameters
+    ----------
+    along : bounds that it ends at and scale of the unknowns; None for a step without bounds.
+    """
     if not len(start):
         return float(residual @ residual), start
-    step, _ = lstsq(jacobian, -residual)
+    if along is None:
+        step, _ = lstsq(jacobian, -residual)
+    else:
+        (low, high), scale = along
+        reach = np.array([low - start, high - start]) / scale
+        step = scale * damped_step(residual, jacobian * scale, LEAST_DAMPING, reach)
     left = residual + jacobian @ step
-    return float(left @ left), start + step
+    return float(left @ left), np.clip(start + step, *along[0]) if along else start + step

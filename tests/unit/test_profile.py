@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from example_effects import NOWHERE, loaded, spine
 from scipy import stats
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
-from spinepipe.calibrate.profile import NEAR, Profile
+from spinepipe.calibrate.profile import NEAR, Best, Profile, profile_in_turn
 from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
@@ -255,3 +255,20 @@ def test_a_fit_without_regions_identifies_nothing() -> None:
     found = fit(one_spring(noisy(0, 60.0), 8.0))
     assert found.reach(0, 60.0) is None
     assert not found.identifiable(0)
+
+
+def test_an_end_before_a_wall_is_found_though_the_cost_hardly_rises_on_the_way() -> None:
+    """A residual 0.2 x + (x / 3)^15: a straight one would end at 9.8, this one ends near 3."""
+
+    def point(x: Array) -> tuple[Array, Array]:
+        slope = 0.2 + 5.0 * (x / 3.0) ** 14
+        return 0.2 * x + (x / 3.0) ** 15, slope[:, None]
+
+    start, far = np.zeros(1), np.full(1, 50.0)
+    straight = np.zeros(1, dtype=bool)
+    best = Best(start, *point(start), -far, far, np.ones(1), straight)
+    seen = profile_in_turn(best, point, [0])
+    end = brentq(lambda x: float(point(np.array([x]))[0][0]) - stats.norm.ppf(0.975), 1.0, 9.0)
+    assert seen.closed.all()
+    for found in (seen.high[0], -seen.low[0]):
+        assert end <= found < 1.2 * end

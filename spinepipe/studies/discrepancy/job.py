@@ -207,7 +207,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     numbers = _field_numbers(ended, rows[GAP.name])
     return Results(
         verdict=replace(
-            verdict_found(ready, ended, told, stays, numbers),
+            verdict_found(ready, ended, told, stays, numbers, run),
             imperfections=told_imperfections(imperfect["with_effects"]),
             tabulated=stays.table,
             withheld=tuple(map(told_withheld, hidden)),

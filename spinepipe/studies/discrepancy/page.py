@@ -80,7 +80,11 @@ _COLUMNS: Mapping[str, tuple[Column, ...]] = {
     "parameters": (
         _EFFECT,
         Column("parameter", "text", "parameter of the effect"),
-        Column("value [95 % interval]", "text", "estimate, and the interval if there is one"),
+        Column(
+            "value [95 % interval]",
+            "text",
+            "estimate and interval, or the end that is known",
+        ),
         Column("unit", "text", "unit; none for a ratio"),
         Column("place", "text", "joints, coordinates, specimens and tests it is of"),
     ),
@@ -112,7 +116,11 @@ _COLUMNS: Mapping[str, tuple[Column, ...]] = {
 }
 _TITLES = {
     "errors": ("Suspected errors of the data", "Readings that no model should be bent to."),
-    "parameters": ("What is missing, and how large it is", "Parameters of the named effects."),
+    "parameters": (
+        "What is missing, and how large it is",
+        "Parameters of the named effects, with all that the readings allow where everything else "
+        "is fitted anew. Where an end is open, the value is not known.",
+    ),
     "set": ("One of these is missing", "Effects that these tests cannot tell apart."),
     "rivals": ("Next best names", "Log evidence below a few units is too little to decide."),
     "not_testable": ("What these tests cannot show", "Base or nuisance take it up."),

@@ -43,7 +43,8 @@ class Quantity:
 
     Attributes
     ----------
-    place : joint, specimen or test it is of. low, high : may be infinite.
+    place : joint, specimen or test it is of.
+    low, high : infinite where that end is open; there the readings do not tell the value.
     at_bound : whether the fit ended at a bound, so that it says no more than that.
     """
 
@@ -56,40 +57,57 @@ class Quantity:
     at_bound: bool = False
 
     @property
-    def sized(self) -> str:
-        """Value and unit: ``3.1°``, ``14 N/mm``."""
-        if not isfinite(self.value):
-            return "nowhere"
-        return number(self.value) + (self.unit if self.unit == "°" else f" {self.unit}".rstrip())
-
-    @property
     def words(self) -> str:
-        """``half width 3.1° (95 % interval 2.8 to 3.4)``."""
+        """``half width 3.1° (95 % interval 2.8 to 3.4)``, ``half width: at least 2.8° (95 %, no
+        upper end)``, ``half width: not told by these tests``.
+        """
         told = f"{self.name} ({self.place})" if self.place else self.name
-        told = f"{told} {self.sized}"
-        if self.at_bound:
-            return f"{told}, at its bound"
+        if isfinite(self.low) and isfinite(self.high):
+            between = f"(95 % interval {number(self.low)} to {number(self.high)})"
+            return f"{told} {self._sized(self.value)}" + (
+                _BOUND if self.at_bound else f" {between}"
+            )
+        if isfinite(self.low):
+            return f"{told}: at least {self._sized(self.low)} (95 %, no upper end)"
         if isfinite(self.high):
-            return f"{told} (95 % interval {number(self.low)} to {number(self.high)})"
-        return f"{told} (95 % interval from {number(self.low)} on)" if isfinite(self.low) else told
+            return f"{told}: at most {self._sized(self.high)} (95 %, no lower end)"
+        return f"{told}: {_UNTOLD}"
 
     @property
     def in_brackets(self) -> str:
-        """``3.1 [2.8, 3.4]``, or that it is at its bound."""
-        value = number(self.value) if isfinite(self.value) else "nowhere"
-        if self.at_bound:
-            return f"{value}, at its bound"
-        ends = [number(end) if isfinite(end) else "∞" for end in (self.low, self.high)]
-        return f"{value} [{', '.join(ends)}]"
+        """``3.1 [2.8, 3.4]``, ``at least 2.8, no upper end``."""
+        if isfinite(self.low) and isfinite(self.high):
+            between = f" [{number(self.low)}, {number(self.high)}]"
+            return number(self.value) + (_BOUND if self.at_bound else between)
+        if isfinite(self.low):
+            return f"at least {number(self.low)}, no upper end"
+        if isfinite(self.high):
+            return f"at most {number(self.high)}, no lower end"
+        return _UNTOLD
+
+    def _sized(self, value: float) -> str:
+        """With its unit: ``3.1°``, ``14 N/mm``."""
+        return number(value) + (self.unit if self.unit == "°" else f" {self.unit}".rstrip())
+
+
+_BOUND, _UNTOLD = ", at its bound", "not told by these tests"
 
 
 @dataclass(frozen=True)
 class _Way:
-    """What a parameter is told as: a name, a unit, and the value there; it only rises or falls."""
+    """What a parameter is told as: a name, a unit, and the value there; it rises, or it falls."""
 
     name: str
     unit: str
     of: Callable[[float], float]
+    falls: bool = False
+
+    def ends(self, low: float | None, high: float | None) -> tuple[float, float]:
+        """Lower and upper end as they are told, infinite where one is open."""
+        below, above = (None if end is None else self.of(end) for end in (low, high))
+        if self.falls:
+            below, above = above, below
+        return -inf if below is None else below, inf if above is None else above
 
 
 def quantities(effect: Missing) -> tuple[Quantity, ...]:
@@ -101,10 +119,10 @@ def quantity(effect: str, variant: Mapping[str, Any], parameter: Estimate) -> Qu
     """One parameter of an effect as it is read; results write ``width@L4L5@s01``."""
     name, *place = parameter.name.split("@")
     way = _way(effect, variant, name, parameter.unit)
-    ends = sorted(way.of(end) for end in parameter.ci95)
+    low, high = way.ends(*parameter.ci95)
     where = ", ".join(map(plain, place))
     return Quantity(
-        way.name, where, way.of(parameter.value), way.unit, ends[0], ends[1], parameter.at_bound
+        way.name, where, way.of(parameter.value), way.unit, low, high, parameter.at_bound
     )
 
 
@@ -162,4 +180,4 @@ def _doubling(shape: Any, unit: str) -> _Way | None:
     def reached(rise: float) -> float:
         return factor * at(rise) if rise > 0.0 else inf
 
-    return _Way("stiffness doubles at", length, reached)
+    return _Way("stiffness doubles at", length, reached, falls=True)

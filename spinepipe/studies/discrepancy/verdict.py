@@ -50,19 +50,26 @@ class Scope:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter with its 95 % interval.
+    """A fitted parameter with its 95 % interval, by profile likelihood.
 
     Attributes
     ----------
     name : with the places it is of behind it: ``width@L4L5@s01``.
+    ci95 : low and high; None where that end is open.
     at_bound : whether it ended at a bound, and its value says no more than that.
+    open_below, open_above : the readings allow the bound there, and what may lie beyond.
+    identifiable : whether both ends are known; else the readings do not tell the value. None in a
+        file of before this was asked.
     """
 
     name: str
     value: float
     unit: str
-    ci95: tuple[float, float]
+    ci95: tuple[float | None, float | None]
     at_bound: bool = False
+    open_below: bool = False
+    open_above: bool = False
+    identifiable: bool | None = None
 
 
 @dataclass(frozen=True)

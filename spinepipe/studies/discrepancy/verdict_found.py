@@ -14,10 +14,11 @@ from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_fr
 from spinepipe.studies.discrepancy.search.hypothesis import Form
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
-from spinepipe.studies.discrepancy.search.model_files import fitted_values
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.search.regions import Estimated, estimated
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
     Candidate,
@@ -45,6 +46,7 @@ def verdict_found(
     told: ToldApart,
     stays: Beyond,
     numbers: Sequence[Row],
+    run: Run,
 ) -> Verdict:
     """What a search found, in a few words.
 
@@ -67,7 +69,7 @@ def verdict_found(
         cohort=cohort.name,
         verdict=ended.verdict,
         why=ended.why,
-        effects=tuple(_missing(found, one, cohort, numbers) for one in ended.named),
+        effects=tuple(_missing(found, one, cohort, numbers, run) for one in ended.named),
         candidates_in_set=ended.tied,
         candidates=near_alone(_in_set(found, ended), ready.study.margin),
         not_testable=told.not_testable,
@@ -113,7 +115,9 @@ def _in_set(found: Found, ended: Outcome) -> Iterator[Candidate]:
                 yield Candidate(name, own, None)
 
 
-def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]) -> Missing:
+def _missing(
+    found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row], run: Run
+) -> Missing:
     number = next(k for k, standing in enumerate(found.standing) if standing is one)
     form = one.supposed.form
     return Missing(
@@ -123,20 +127,27 @@ def _missing(found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row]
         variant=dict(form.variant.options),
         spread=form.spread.value,
         parameters=tuple(
-            Estimate(
-                "@".join([value.name, *value.place]),
-                value.value,
-                value.unit,
-                (value.low, value.high),
-                value.at_bound,
-            )
-            for value in fitted_values(found.final.fit, number)
+            _estimate(value)
+            for value in run(estimated, found.final.fit, found.final.setting, number)
         ),
         log_evidence=one.log_evidence,
         rivals=tuple(
             Rival(other.name, other.margin, other.on or EVERY) for other in one.rivals[:MOST_RIVALS]
         ),
         field_numbers=numbers_at(numbers, form, cohort.joint_names),
+    )
+
+
+def _estimate(value: Estimated) -> Estimate:
+    return Estimate(
+        "@".join([value.name, *value.place]),
+        value.value,
+        value.unit,
+        (value.low, value.high),
+        value.at_bound,
+        value.open_below,
+        value.open_above,
+        value.identifiable,
     )
 
 

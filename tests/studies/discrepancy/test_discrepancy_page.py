@@ -220,6 +220,42 @@ def test_findings_have_sizes_places_and_noise() -> None:
     assert "no cycle was repeated, so all hangs on that number" in declared
 
 
+OPEN_WIDTH = {
+    "name": "half_width",
+    "value": 1.55,
+    "unit": "deg",
+    "ci95": [1.42, None],
+    "open_above": True,
+    "identifiable": False,
+}
+
+
+def test_a_value_that_is_open_to_one_side_is_told_by_its_other_end() -> None:
+    (named,) = VERDICTS["NAMED"]["effects"]
+    changed = {"effects": [named | {"parameters": [OPEN_WIDTH]}]}
+    words = told("NAMED", **changed).replace("\u00a0", " ")
+    assert "half width: at least 1.42° (95 %, no upper end)" in words
+    assert "1.55" not in words
+    verdict = verdict_of(VERDICTS["NAMED"] | changed)
+    shown = shown_tables(verdict, rows_of(frames("NAMED")))
+    (row,) = next(one for one in shown if one.title.startswith("What is missing")).rows
+    assert "at least 1.42, no upper end" in str(row)
+    assert "1.55" not in str(row)
+
+
+def test_an_open_end_is_null_in_the_file_and_is_read_again() -> None:
+    (named,) = VERDICTS["NAMED"]["effects"]
+    verdict = verdict_of(VERDICTS["NAMED"] | {"effects": [named | {"parameters": [OPEN_WIDTH]}]})
+    text = json.dumps(plain_data(verdict), allow_nan=False)
+    assert '"ci95": [1.42, null]' in text
+    assert verdict_of(json.loads(text)) == verdict
+
+
+def test_files_of_before_regions_say_nothing_of_them() -> None:
+    (effect,) = verdict_of(VERDICTS["NAMED"]).effects
+    assert {one.identifiable for one in effect.parameters} == {None}
+
+
 @pytest.mark.parametrize("answer", VERDICTS)
 def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
     study, cohort = study_of(tmp_path)

@@ -24,7 +24,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     hypothesis,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import FittedValue, fitted_values, model_file
+from spinepipe.studies.discrepancy.search.model_files import fitted_values, in_tables, model_file
 from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.units import ROTATIONS
 
@@ -137,22 +137,16 @@ def test_specimens_differ_where_the_fit_says_so() -> None:
 # Values in units of tables -----------------------------------------------------------------------
 
 
-def value_of(
-    variant: Variant, column: int, start: float, move: float, se: float, at_bound: bool = False
-) -> FittedValue:
-    """The value of one parameter that a fit moved, the data and the prior saying equally much."""
+def fit_of(variant: Variant, column: int, start: float, move: float, at_bound: bool) -> JointFit:
+    """A fit that moved one parameter from its start."""
     values = np.array([p.default for p in variant.create().parameters])
     values[column] = start
-    prior = se * np.sqrt(2.0)
-    u = Unknown("", 0, column, ("a", "L4L5"), True, -9.0, 9.0, 0.0, prior)
+    u = Unknown("", 0, column, ("a", "L4L5"), True, -9.0, 9.0, 0.0, 1.0)
     supposed = (Supposed(Form(variant, Spread.ONE, 1, "a"), values),)
     member = Member(chains.model("a", chains.STIFFNESS), (), (0,))
-    of_a = {"a": np.array([[0.6], [0.8]]) / prior}
     started = Hypothesis({"a": member}, (u,), supposed)
     bound = np.array([at_bound])
-    fit = JointFit(started, np.array([move]), {}, 1.0, {}, of_a, {}, {}, bound, "")
-    (found,) = fitted_values(fit, 0)
-    return found
+    return JointFit(started, np.array([move]), {}, 1.0, {}, {}, {}, {}, bound, "")
 
 
 DEG = 180.0 / np.pi
@@ -213,22 +207,25 @@ VALUES = {
         "N m",
     ),
 }
-"""Effect, column, start, move and SE; value, low and high, worked by hand; their unit."""
+"""Effect, column, start, move, SD of the move; value, ends 1.96 SD away, by hand; their unit."""
 
 
 @pytest.mark.parametrize("name", VALUES)
-def test_values_and_intervals_in_units_of_tables(name: str) -> None:
+def test_values_and_ends_in_units_of_tables(name: str) -> None:
     variant, column, start, move, se, expected, unit = VALUES[name]
-    found = value_of(variant, column, start, move, se)
+    fit = fit_of(variant, column, start, move, at_bound=False)
+    (found,) = fitted_values(fit, 0)
     assert found.name == variant.create().parameters[column].name
-    assert (found.value, found.low, found.high) == pytest.approx(expected, rel=1e-6)
+    ends = [in_tables(fit, 0, move + side * Z * se) for side in (-1.0, 1.0)]
+    assert (found.value, ends[0][0], ends[1][0]) == pytest.approx(expected, rel=1e-6)
     assert (found.unit, found.place, found.at_bound) == (unit, ("a", "L4L5"), False)
+    assert {told for _, told in ends} == {unit}
 
 
-def test_intervals_end_at_bounds() -> None:
+def test_values_end_at_bounds() -> None:
     """A joint loses 0 to 95 % of its resistance."""
-    found = value_of(LAXITY, 0, 0.3, 0.6, 0.1, at_bound=True)
-    assert (found.value, found.high) == pytest.approx((0.9, 0.95))
-    assert found.low == pytest.approx(0.9 - 0.1 * Z)
+    fit = fit_of(LAXITY, 0, 0.3, 0.65 + 1e-9, at_bound=True)
+    (found,) = fitted_values(fit, 0)
+    assert found.value == 0.95
     assert found.at_bound
-    assert value_of(LAXITY, 0, 0.3, -0.25, 0.1).low == 0.0
+    assert in_tables(fit, 0, -0.4) == (0.0, "1")

@@ -26,7 +26,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
     investigate,
     prepared,
 )
-from spinepipe.studies.discrepancy.search.model_files import fitted_values
+from spinepipe.studies.discrepancy.search.regions import estimated
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Answer
 
@@ -187,7 +187,8 @@ def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) ->
     (standing,) = found.ended.named
     assert standing.name == "nonlinear_stiffening"
     assert dict(standing.supposed.form.variant.options)["coordinate"] == "anterior"
-    growth = next(v for v in fitted_values(found.found.final.fit, 0) if v.name == "growth")
+    final = found.found.final
+    growth = next(v for v in estimated(final.fit, final.setting, 0) if v.name == "growth")
     assert growth.unit == "1/m^2"
     assert growth.low < 0.15e6 < growth.high
     assert growth.high - growth.low < 0.1 * growth.value

@@ -1,5 +1,6 @@
 """Names of effects in the words of each coordinate, and their parameters in the field's units."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -175,16 +176,42 @@ def test_stiffness_has_doubled_where_it_is_said(
     assert found.low < found.value < found.high
 
 
-def test_stiffening_that_may_be_none_doubles_nowhere_for_certain() -> None:
-    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", (0.0, 19.1))
-    found = quantity("nonlinear_stiffening", {"shape": "tangent"}, growth)
+def test_an_end_that_is_open_is_told_as_open() -> None:
+    shape = {"shape": "tangent"}
+    growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", (16.2, 19.1))
+    found = quantity("nonlinear_stiffening", shape, growth)
     assert found.place == "L4L5, s01"
-    assert found.words == "stiffness doubles at (L4L5, s01) 10.7° (95 % interval from 10.3 on)"
-    assert found.in_brackets == "10.7 [10.3, ∞]"
-    none = Estimate("growth", 0.0, "1/rad^2", (0.0, 0.0), at_bound=True)
-    assert quantity("nonlinear_stiffening", {"shape": "tangent"}, none).words == (
-        "stiffness doubles at nowhere, at its bound"
+    told = "stiffness doubles at (L4L5, s01)"
+    assert found.words == f"{told} 10.7° (95 % interval 10.3 to 11.2)"
+    assert found.in_brackets == "10.7 [10.3, 11.2]"
+    some = quantity(
+        "nonlinear_stiffening", shape, replace(growth, ci95=(None, 19.1), open_below=True)
     )
+    assert some.words == f"{told}: at least 10.3° (95 %, no upper end)"
+    assert some.in_brackets == "at least 10.3, no upper end"
+    much = quantity(
+        "nonlinear_stiffening", shape, replace(growth, ci95=(16.2, None), open_above=True)
+    )
+    assert much.words == f"{told}: at most 11.2° (95 %, no lower end)"
+    assert much.in_brackets == "at most 11.2, no lower end"
+
+
+def test_what_no_reading_tells_is_told_without_its_value() -> None:
+    width = Estimate("width", 3.1, "deg", (None, None), False, True, True, False)
+    found = quantity("neutral_zone", {}, width)
+    assert found.words == "half width: not told by these tests"
+    assert "3.1" not in found.words + found.in_brackets
+    wide = replace(width, ci95=(2.8, None), open_below=False)
+    assert quantity("neutral_zone", {}, wide).words == (
+        "half width: at least 2.80° (95 %, no upper end)"
+    )
+
+
+def test_a_value_at_its_bound_is_told_as_that() -> None:
+    ended = Estimate("gap", 28.6, "deg", (26.0, 28.6), at_bound=True)
+    found = quantity("facet_contact", {}, ended)
+    assert found.words == "gap 28.6°, at its bound"
+    assert found.in_brackets == "28.6, at its bound"
 
 
 def test_an_asymmetry_is_the_ratio_of_its_two_sides() -> None:

@@ -188,9 +188,12 @@ def _unseen(named: Sequence[Judged]) -> Rows:
 
 def _parameters(right: Sequence[Judged]) -> Rows:
     found: list[Compared] = [one for row in right for one in compared(row.row)]
-    inside = [one.inside for one in found if one.inside is not None]
+    scored = [one for one in found if one.inside is not None]
+    inside = [one.inside for one in scored]
+    known = [one.inside for one in scored if one.identifiable]
     errors = [one.error for one in found if np.isfinite(one.error)]
     return [
         median("parameters: error over truth, median", errors, Goal(high=0.05)),
         share("parameters: truth in the 95 % interval", inside, Goal(0.92, 0.98)),
+        share("the same where both its ends are known", known),
     ]

@@ -21,7 +21,13 @@ Joints = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Compared:
-    """One parameter, SI. ``size`` : what an error counts against. ``inside`` : None without one."""
+    """One parameter, SI.
+
+    Attributes
+    ----------
+    size : what an error counts against. inside : whether the truth is in the 95 % region, which may
+        be open; None without one. identifiable : whether both ends are known.
+    """
 
     effect: str
     name: str
@@ -29,6 +35,7 @@ class Compared:
     fitted: float
     size: float
     inside: bool | None
+    identifiable: bool = True
 
     @property
     def error(self) -> float:
@@ -68,9 +75,11 @@ def _of(one: dict[str, Any], truth: dict[str, Any], joints: Joints) -> Iterator[
         if known and _same_place(one, truth, value["place"], joints):
             size = _size(one["name"], true, value["name"])
             factor = PER_UNIT.get(value["unit"], 1.0)
-            fitted, low, high = (factor * value[key] for key in ("value", "low", "high"))
-            at = true[value["name"]]
-            yield Compared(one["name"], value["name"], at, fitted, size, low <= at <= high)
+            at, fitted = true[value["name"]], factor * value["value"]
+            low = -np.inf if value["low"] is None else factor * value["low"]
+            high = np.inf if value["high"] is None else factor * value["high"]
+            inside, known = bool(low <= at <= high), value.get("identifiable", True)
+            yield Compared(one["name"], value["name"], at, fitted, size, inside, known)
 
 
 def _true(one: dict[str, Any], truth: dict[str, Any], place: list[str]) -> Values | None:

@@ -10,8 +10,8 @@ from spinepipe.problems import InputError
 from spinepipe.studies.discrepancy.search.grounds import NoBase
 from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
 from spinepipe.studies.discrepancy.search.investigation import investigate, prepared
-from spinepipe.studies.discrepancy.search.model_files import fitted_values
 from spinepipe.studies.discrepancy.search.outcome import Outcome
+from spinepipe.studies.discrepancy.search.regions import estimated
 from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make
@@ -111,10 +111,10 @@ def _said(found: Found, said: Outcome) -> Row:
 
 
 def _standing(found: Found, number: int) -> Row:
-    """A form that stands, with its values in the units of tables."""
+    """A form that stands, with its values and their regions in the units of tables."""
     one: Standing = found.standing[number]
     form = one.supposed.form
-    values = fitted_values(found.final.fit, number)
+    values = estimated(found.final.fit, found.final.setting, number)
     return {
         "name": one.name,
         "options": dict(form.variant.options),
@@ -133,6 +133,7 @@ def _standing(found: Found, number: int) -> Row:
                 "high": value.high,
                 "unit": value.unit,
                 "at_bound": value.at_bound,
+                "identifiable": value.identifiable,
             }
             for value in values
         ],

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing import get_context
 
 from tests.validation.discrepancy.judged import Judged, judged
+from tests.validation.discrepancy.parameters import Compared, compared
 from tests.validation.discrepancy.row import Row, scored
 from tests.validation.discrepancy.seeds import TUNING
 from tests.validation.discrepancy.targets import DRAWN, Target
@@ -28,13 +29,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     wanted = list(_targets(asked.kinds.split(","), asked.n, asked.seed, asked.effect))
     print(HEADER, flush=True)
     answers: Counter[str] = Counter()
+    found: list[Compared] = []
     started = time.monotonic()
     for target, row in _scored(wanted, asked.jobs):
         one = judged(row) if row["status"] in ("scored", "refused") else None
         answers[f"{target.kind}: {_right(one)}"] += 1
+        found += compared(row) if row["status"] == "scored" else []
         print(_line(target, row, one, asked.why), flush=True)
     seconds = time.monotonic() - started
     print(f"{len(wanted)} cohorts in {seconds:.0f} s; " + ", ".join(_told(answers)), flush=True)
+    print(_inside(found), flush=True)
+
+
+def _inside(found: Sequence[Compared]) -> str:
+    """How many true parameters lie in their regions."""
+    scored = [one for one in found if one.inside is not None]
+    known = [one for one in scored if one.identifiable]
+    every, closed = (f"{sum(bool(o.inside) for o in of)} of {len(of)}" for of in (scored, known))
+    return f"parameters: truth in the region {every}; where both its ends are known {closed}"
 
 
 def _scored(targets: Sequence[Target], jobs: int) -> Iterator[tuple[Target, Row]]:

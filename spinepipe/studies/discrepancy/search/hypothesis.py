@@ -245,6 +245,11 @@ class Unknown:
     mean: float
     sd: float
 
+    @property
+    def step(self) -> float:
+        """Size of a first step: a prior SD, of base stiffnesses one in the logarithm."""
+        return self.sd / STRENGTH_SDS if self.is_strength else min(self.sd, 1.0)
+
 
 @dataclass(frozen=True)
 class Member:

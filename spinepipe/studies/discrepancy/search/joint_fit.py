@@ -10,7 +10,7 @@ from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
-from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS, Hypothesis, Unknown
+from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis
 from spinepipe.studies.discrepancy.search.prediction import (
     NoEquilibrium,
     Predicted,
@@ -80,8 +80,8 @@ class JointFit:
 Near = Mapping[str, tuple[Array, ...]] | None
 
 
-class _Points:
-    """Evaluates a hypothesis; the last point is kept."""
+class Points:
+    """A hypothesis at any values of its unknowns; the last point is kept."""
 
     def __init__(self, hypothesis: Hypothesis, setting: Setting, near: Near) -> None:
         self.hypothesis, self.setting = hypothesis, setting
@@ -96,6 +96,10 @@ class _Points:
             bytes, tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]
         ] = {}
         self.trouble = ""
+
+    def begin_at(self, fit: "JointFit") -> None:
+        """What a fit in the same setting has where it ended need not be solved again."""
+        self.known = {fit.x.tobytes(): (dict(fit.residuals), dict(fit.jacobians), {})}
 
     def at(
         self, x: Array
@@ -154,25 +158,20 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting, near: Near = None) -> Jo
     ----------
     near : poses of a fit that the first ones are looked for near by.
     """
-    points = _Points(hypothesis, setting, near)
+    points = Points(hypothesis, setting, near)
     low = np.array([u.low for u in hypothesis.unknowns])
     high = np.array([u.high for u in hypothesis.unknowns])
     start = np.clip(np.zeros(len(low)), low, high)
     begun = points.compressed(start)
     if begun is None:
         return _nowhere(hypothesis, start, points.trouble)
-    scale = np.array([_scale(u) for u in hypothesis.unknowns])
+    scale = np.array([u.step for u in hypothesis.unknowns])
     ended = descend(points.compressed, start, (low, high), scale, len(begun[0]), SETTLED)
     status = "" if ended.arrived else SETTLED.given_up
     return _ended(points, ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6), status)
 
 
-def _scale(unknown: Unknown) -> float:
-    """Size of a first step: a prior SD, of base stiffnesses one in the logarithm."""
-    return unknown.sd / STRENGTH_SDS if unknown.is_strength else min(unknown.sd, 1.0)
-
-
-def _ended(points: _Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
+def _ended(points: Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
     found = points.at(x)
     if found is None or not points.together.leads_to(points.own(x), found[2]):
         return _nowhere(points.hypothesis, x, OFF_THE_PATH)

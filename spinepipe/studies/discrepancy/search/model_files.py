@@ -1,4 +1,4 @@
-"""Fitted models as model files, and fitted values with their 95 % intervals in units of tables."""
+"""Fitted models as model files, and fitted values in units of tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,8 +32,6 @@ class FittedValue:
     name: str
     place: tuple[str, ...]
     value: float
-    low: float
-    high: float
     unit: str
     at_bound: bool
 
@@ -144,25 +142,26 @@ def _specimens(form: Form) -> tuple[str, ...]:
 
 def fitted_values(fit: JointFit, number: int) -> tuple[FittedValue, ...]:
     """All fitted values of one supposed effect."""
-    errors = standard_errors(fit)
-    supposed = fit.hypothesis.supposed[number]
-    parameters = supposed.form.variant.create().parameters
+    own = [k for k, u in enumerate(fit.hypothesis.unknowns) if u.supposed == number]
+    parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
     found = []
-    for index, unknown in enumerate(fit.hypothesis.unknowns):
-        if unknown.supposed == number:
-            p, start = parameters[unknown.column], supposed.start[unknown.column]
-            ends = fit.x[index] + errors[index] * NORMAL_95 * np.array([0.0, -1.0, 1.0])
-            values = start * np.exp(ends) if p.logarithmic else start + ends
-            inside = np.clip(values, p.low, p.high)
-            (value, unit), low, high = border(p.unit, inside[0]), inside[1], inside[2]
-            low, high = border(p.unit, low)[0], border(p.unit, high)[0]
-            at_bound = bool(fit.at_bound[index])
-            found.append(
-                FittedValue(
-                    p.name, unknown.place, float(value), float(low), float(high), unit, at_bound
-                )
-            )
+    for index in own:
+        unknown = fit.hypothesis.unknowns[index]
+        value, unit = in_tables(fit, index, fit.x[index])
+        name, at_bound = parameters[unknown.column].name, bool(fit.at_bound[index])
+        found.append(FittedValue(name, unknown.place, value, unit, at_bound))
     return tuple(found)
+
+
+def in_tables(fit: JointFit, index: int, move: float) -> tuple[float, str]:
+    """What an unknown of a supposed effect is where it has moved, in the unit of tables."""
+    unknown = fit.hypothesis.unknowns[index]
+    assert unknown.supposed is not None
+    supposed = fit.hypothesis.supposed[unknown.supposed]
+    p, start = supposed.form.variant.create().parameters[unknown.column], supposed.start
+    at = float(start[unknown.column])
+    value = at * float(np.exp(move)) if p.logarithmic else at + float(move)
+    return border(p.unit, float(np.clip(value, p.low, p.high)))
 
 
 def border(unit: str, value: float) -> tuple[float, str]:
