@@ -16,7 +16,7 @@ LAWS = ("linear", "stiffening")
 PHANTOMS = 3
 PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
 STUDY = "study: phantom\nkind: cohort_stiffness\ncohort: phantom\n"
-JOBS = ("fit", "pool", "literature", "left_out", "mae", "ranking", "statistics", "findings")
+MODULES = ("fit", "pool", "literature", "left_out", "mae", "ranking", "significance", "findings")
 KEPT = ("findings", "ranking", "mae", "statistics", "sign_checks")
 """Tables of each study that are kept."""
 
@@ -32,7 +32,7 @@ def tables(seeds: Sequence[int] = range(PHANTOMS)) -> dict[str, pd.DataFrame]:
 
 
 def _studies(seeds: Sequence[int]) -> Iterator[tuple[str, int, Path]]:
-    base = ROOT / "results" / "validation" / "findings" / made_by(*JOBS)
+    base = ROOT / "results" / "validation" / "findings" / made_by(*MODULES)
     for seed in seeds:
         for law in LAWS:
             folder = base / f"law={law}" / f"seed={seed:04d}"

@@ -9,11 +9,11 @@ TESTS = Path(__file__).resolve().parents[1]
 SOURCES = ("generators/phantom", "validation")
 
 
-def made_by(*jobs: str) -> str:
-    """Digest of these jobs of kind cohort_stiffness, of the generator and of the validation."""
+def made_by(*modules: str) -> str:
+    """Digest of these modules of kind cohort_stiffness, of the generator and of the validation."""
     found = hashlib.sha256()
-    for job in jobs:
-        found.update(code_digest(f"spinepipe.studies.cohort_stiffness.{job}").encode())
+    for module in modules:
+        found.update(code_digest(f"spinepipe.studies.cohort_stiffness.{module}").encode())
     for folder in SOURCES:
         for path in sorted((TESTS / folder).glob("*.py")):
             found.update(path.read_bytes())
