@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from chain_cases import DEGREES, JOINTS, MOMENT_OF, TOP, WRENCH, Chains
+from chain_cases import DEGREES, JOINTS, MOMENT_OF, ROTATIONS, TOP, WRENCH, Chains, by_joint
 from scipy.spatial.transform import Rotation
 
 from tests.generators.phantom import mechanics
@@ -80,7 +80,9 @@ def cohort(
                 loads.append({**key, "vertebra": TOP, **wrench, **point})
                 read = turned_deg(one, moment, push_n) + noise_deg * rng.normal(size=(3, 3))
                 for joint, degrees in zip(JOINTS, read, strict=True):
-                    motion.append({**key, "joint": joint, **dict(zip(DEGREES, degrees))})
+                    motion.append(
+                        {**key, "joint": joint, **dict(zip(DEGREES, degrees, strict=True))}
+                    )
     made.loads, made.motion = pd.DataFrame(loads), pd.DataFrame(motion)
     return made
 
@@ -97,3 +99,22 @@ def turned_deg(one: Displaced, moment: np.ndarray, push_n: float) -> np.ndarray:
     q = mechanics.equilibrium(chain, moment[None, None])[0, 0]
     rotations = one.axes @ mechanics.turned(q)[2] @ np.swapaxes(one.axes, -1, -2)
     return Rotation.from_matrix(rotations).as_euler("ZXY", degrees=True)
+
+
+def true_values(one: Displaced, stiffness: pd.DataFrame) -> np.ndarray:
+    """The true stiffness of each row of a table ``stiffness``."""
+    k = pd.DataFrame(one.stiffness, index=list(JOINTS), columns=list(ROTATIONS))
+    return np.array([k.loc[row.joint, row.coordinate] for row in stiffness.itertuples()])
+
+
+def as_found(stiffness: pd.DataFrame, nuisances: pd.DataFrame) -> Displaced:
+    """The specimen that a fit says there is, for the other mechanics to move."""
+    table = nuisances.pivot(index="joint", columns="parameter", values="value").loc[list(JOINTS)]
+    centres = table.reindex(columns=list(CENTRES), fill_value=0.0).to_numpy(float)
+    tilts = table.reindex(columns=list(TILTS), fill_value=0.0).to_numpy(float)
+    return Displaced(by_joint(stiffness)[list(ROTATIONS)].to_numpy(float), centres, tilts)
+
+
+CENTRES = ("centre_anterior", "centre_superior", "centre_right")
+TILTS = ("tilt_extension", "tilt_right_bending", "tilt_left_rotation")
+"""Names of the table ``nuisances``, in the order of `Displaced`."""

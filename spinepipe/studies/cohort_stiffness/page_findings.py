@@ -11,6 +11,7 @@ from spinepipe.report.words import AXIS, after_number, case, count, number, perc
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
+from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
@@ -315,6 +316,6 @@ def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
 
 MAKERS: tuple[Finding, ...] = (
     *(signs, failed, bounds, optima, identifiable),
-    *(ranking, stiffening, claims, loaded_errors, spreads, covariates),
+    *(ranking, nuisances, stiffening, claims, loaded_errors, spreads, covariates),
     *(ranges, zones, hysteresis, axes, beside_the_paper),
 )

@@ -48,7 +48,7 @@ def _with_nuisances(one: Representation) -> Representation:
     return replace(
         one,
         name=f"{one.name}_nuisance",
-        words=f"{one.words}, {beside}",
+        words=f"{one.words}, centres and axes too",
         sentence=f"{one.sentence} {beside} fitted beside",
         about=f"as {one.name}, {beside} fitted beside",
         without_nuisances=one.name,
