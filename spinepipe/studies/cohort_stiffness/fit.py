@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate.profile import Reach
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
@@ -18,7 +19,12 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
     no_fit,
     stiffness_rows,
 )
-from spinepipe.studies.cohort_stiffness.nuisances import fitted_nuisances, nuisance_rows
+from spinepipe.studies.cohort_stiffness.nuisances import (
+    fitted_nuisances,
+    from_plain,
+    nuisance_rows,
+    without,
+)
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     BUSHING,
@@ -39,6 +45,9 @@ from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
+
+UNTOLD = Reach(None, None, open_below=True, open_above=True)
+"""Of a stiffness that was held as no reading tells of it."""
 
 
 def run(
@@ -102,7 +111,12 @@ def _fit(
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
         below = settings.identifiable_below
+        held = ""
+        if named(representation).without_nuisances:
+            plain = fit(without(problem), settings.starts, seed, below)
+            problem, held = from_plain(problem, plain)
         found = fit(problem, settings.starts, seed, below, profiled=True)
+        found = replace(found, message=joined(found.message, held))
         if named(representation).stiffens:
             status, message = ended(problem, found.at_bound, found.status, found.message)
             found = replace(found, status=status, message=message)
@@ -132,7 +146,8 @@ def _stiffness(
     k = model.effects[0].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
-    reaches = {}
+    fitted = [COORDINATES.index(name) for name in settings.free]
+    reaches = {(row, at): UNTOLD for row in range(len(k)) for at in fitted}
     for index, unknown in enumerate(problem.free):
         if unknown.effect != BUSHING:
             continue  # of a law that stiffens, or a nuisance
@@ -143,7 +158,9 @@ def _stiffness(
         for row in unknown.rows:
             one = row, unknown.column
             reach = found.reach(index, k[one])
-            if reach is not None:
+            if reach is None:
+                del reaches[one]
+            else:
                 reaches[one] = reach
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom

@@ -2,9 +2,14 @@
 
 A nuisance belongs to a specimen: what is fitted predicts this specimen's other load cases. Of a
 specimen of which nothing was fitted nothing is known of them, and it is predicted without any.
+
+Nuisances do not tell of stiffness what readings do not tell without them: such stiffness is held. A
+moment that no load case applies turns a tilted joint all the same, by tilt over stiffness, and as
+small tilts are the likelier ones that stiffness would go to its lower bound.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +19,7 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import FreeParameter, declared, free_parameters, moved
-from spinepipe.studies.cohort_stiffness.representations import named
+from spinepipe.studies.cohort_stiffness.representations import EACH_JOINT, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -58,10 +63,47 @@ def free_nuisances(
     sds: list[float] = []
     for place, sd in enumerate(prior_sds(study, representation).values(), first):
         names = [one.name for one in model.effects[place].effect.parameters]
-        unknowns = free_parameters(model, place, names, "per_joint")
+        unknowns = free_parameters(model, place, names, EACH_JOINT)
         found += unknowns
         sds += [sd] * len(unknowns)
     return found, np.array(sds)
+
+
+def without(problem: Problem) -> Problem:
+    """The problem with joint centres and axes as stated."""
+    kept = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
+    free = tuple(problem.free[index] for index in kept)
+    lower, upper = problem.lower[kept], problem.upper[kept]
+    return replace(problem, free=free, lower=lower, upper=upper, prior_sd=None)
+
+
+def from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
+    """The problem from where the fit without nuisances ended, and what is held there, in words.
+
+    Held is stiffness whose standard error without nuisances is too large, see ``identifiable``.
+
+    Parameters
+    ----------
+    plain : of `without` the problem; where it has no pose, all is fitted from the start.
+    """
+    if not plain.status.usable:
+        return problem, ""
+    known = plain.uncertainty.identifiable | (plain.at_bound != 0)
+    stiffness = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
+    x = np.zeros(len(problem.free))
+    x[stiffness] = plain.x
+    held = [index for index, told in zip(stiffness, known, strict=True) if not told]
+    kept = np.setdiff1d(np.arange(len(x)), held)
+    assert problem.prior_sd is not None
+    note = f"held as without nuisances: {len(held)} of {len(stiffness)} stiffnesses"
+    return replace(
+        problem,
+        model=moved(problem.model, problem.free, x),
+        free=tuple(problem.free[index] for index in kept),
+        lower=(problem.lower - x)[kept],
+        upper=(problem.upper - x)[kept],
+        prior_sd=problem.prior_sd[kept],
+    ), (note if held else "")
 
 
 def fitted_nuisances(problem: Problem, found: Fit) -> tuple[ScopedEffect, ...]:

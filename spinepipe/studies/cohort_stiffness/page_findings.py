@@ -15,6 +15,7 @@ from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
+    NUISANCE,
     POOLED,
     PUBLISHED,
     STIFFENING,
@@ -125,7 +126,10 @@ def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
         f"{len(places)} to all load cases: {_some(places)}" if places else "",
         f"{fewer} to fewer load cases, which say too little about it" if fewer else "",
     ]
-    what = "stiffness or a growth" if at["representation"].isin(STIFFENING).any() else "stiffness"
+    beside = at["representation"]
+    kinds = ("stiffness", "a growth", "an error of a centre or axis")
+    there = (True, beside.isin(STIFFENING).any(), beside.isin(NUISANCE).any())
+    what = " or ".join(kind for kind, is_there in zip(kinds, there, strict=True) if is_there)
     yield (
         f"{count(len(at), 'fit')} of {len(rows)} ended with a {what} at a bound, where the data "
         f"only say that it is beyond: {'; '.join(part for part in parts if part)}."

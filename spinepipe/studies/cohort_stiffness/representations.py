@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+EACH_JOINT: Literal["per_joint"] = "per_joint"
+"""Grouping of unknowns that each joint has for itself, as in `free_parameters`."""
+
 
 @dataclass(frozen=True)
 class Representation:

@@ -137,6 +137,22 @@ def test_stiffness_that_hangs_on_an_unknown_centre_is_not_identifiable(tmp_path:
     assert not project.fit("a", BESIDE, PUSHED)["stiffness"]["identifiable"].any()
 
 
+def test_nuisances_do_not_tell_of_a_stiffness_that_no_load_drives(tmp_path: Path) -> None:
+    """Flexion turns a tilted joint sideways, by tilt over stiffness: neither is told by that."""
+    found = (
+        cohort({"a": OFF}, STUDY).write(tmp_path).fit("a", BESIDE, "all_but_left_axial_rotation")
+    )
+    rows = found["stiffness"].set_index("coordinate").loc["left_rotation"]
+    assert (rows["stiffness"] == 291.0).all()  # published, where fits start
+    assert rows[["open_below", "open_above"]].all(axis=None)
+    assert rows[["standard_error", "low", "high"]].isna().all(axis=None)
+    assert not rows["identifiable"].any()
+    assert "held as without nuisances: 3 of 9 stiffnesses" in found["fits"]["message"].item()
+    others = found["stiffness"][found["stiffness"]["coordinate"] != "left_rotation"]
+    assert others["identifiable"].all()
+    assert found["fits"]["status"].item() == "converged"
+
+
 def flexion_bias(errors: pd.DataFrame) -> np.ndarray:
     """(3, 3) mean error under flexion of each joint and rotation, deg."""
     rows = errors[errors["test"] == "flexion"]
