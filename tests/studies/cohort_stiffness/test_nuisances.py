@@ -87,6 +87,19 @@ def test_what_displaced_joints_do_to_stiffness_is_undone(tmp_path: Path) -> None
     assert (rows["standard_error"] < 0.5 * rows["prior_sd"]).sum() >= 12
 
 
+def test_the_cost_is_of_readings_and_the_scatter_of_priors_too(tmp_path: Path) -> None:
+    """By the errors and the values that stand in the tables; readings have an SD of 0.1 degrees."""
+    found = cohort({"a": OFF}, STUDY).write(tmp_path).fit("a", BESIDE)
+    errors, record = found["errors"], found["fits"].iloc[0]
+    squares = (errors["readings"] * errors["rmse"].astype(float) ** 2).sum() / 0.1**2
+    assert record["cost"] == pytest.approx(squares, rel=1e-6)
+    of_priors = (found["nuisances"]["pull"].astype(float) ** 2).sum()
+    assert of_priors > 5.0
+    freedom = record["readings"] + 18 - 27  # a prior of each error; they and nine stiffnesses
+    assert record["scatter"] == pytest.approx(np.sqrt((squares + of_priors) / freedom), rel=1e-6)
+    assert 9.0 < record["effective_unknowns"] < record["unknowns"] == 27
+
+
 def test_a_prior_that_no_reading_tells_of_is_one_reading_and_one_unknown(tmp_path: Path) -> None:
     """Rotations under pure moments do not hang on centres: nothing may change by fitting these."""
     study = REPRESENTATIONS + "nuisance: {centre_mm: 3}\n"
