@@ -21,7 +21,7 @@ from spinepipe.studies.cohort_stiffness.stages import (
 
 _HELD_OUT = {LEFT_OUT_SPECIMEN: "a left-out specimen", LEFT_OUT_CASE: "a left-out load case"}
 
-FAR = 3.0
+FAR = 3
 """A pull beyond this, either way, is seldom of its prior: one in 370."""
 
 
@@ -69,8 +69,9 @@ def _order(rows: pd.DataFrame, words: str) -> Iterator[str]:
     if before == after:
         yield f"{about} The order of representations is the same with them."
         return
-    first, second = (", ".join(IN_WORDS[name] for name in names) for names in (before, after))
-    yield f"{about} The order of representations changes: {first} without; {second} with them."
+    first, second = ("; ".join(IN_WORDS[name] for name in names) for names in (before, after))
+    changed = f"Without them it is {first}. With them it is {second}."
+    yield f"{about} The order of representations changes. {changed}"
 
 
 def _sizes(rows: pd.DataFrame) -> Iterator[str]:
@@ -82,7 +83,7 @@ def _sizes(rows: pd.DataFrame) -> Iterator[str]:
         error, prior = part["standard_error"].astype(float), part["prior_sd"].astype(float)
         told, far = int((error < 0.5 * prior).sum()), int((part["pull"].abs() > FAR).sum())
         yield (
-            f"{IN_WORDS[str(name)]}: of {len(part)} errors of centres and axes readings tell "
+            f"Of {len(part)} errors of centres and axes ({IN_WORDS[str(name)]}) readings tell "
             f"{told} ({percent(told, len(part))}) to less than half their prior's SD; {far} are "
             f"beyond {number(FAR)} of these SDs."
         )

@@ -250,11 +250,12 @@ def test_the_order_changes_where_values_with_nuisances_stand_otherwise() -> None
     told = sentence(values)
     assert "1.20° without, 0.900° with" in told
     assert "order of representations changes" in told
+    assert "With them it is each joint its own; one value per specimen." in told
     same = sentence(values | {"per_joint_nuisance": 1.1})
     assert "order of representations is the same" in same
     few = sentence(values, specimens=2)
     assert "cannot be told: 2 specimens, and that needs 3" in few
-    assert "changes:" not in few
+    assert "representations changes" not in few
     assert sentence({"per_specimen": 1.0, "per_joint": 1.2}) == ""
 
 
