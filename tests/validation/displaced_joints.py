@@ -1,7 +1,7 @@
 """How often regions of stiffness cover the truth where joints are not where they are stated.
 
-Run ``PYTHONPATH=.:tests/cases python -m tests.validation.displaced_joints [PHANTOMS [PRIOR]]``, with
-PRIOR the SD in mm and deg that the fits are told; the truth is 3 mm and 3 degrees.
+Run ``PYTHONPATH=.:tests/cases python -m tests.validation.displaced_joints [PHANTOMS [PRIOR]]``;
+PRIOR is the SD in mm and deg that the fits are told, the truth is 3 mm and 3 degrees.
 """
 
 import sys
