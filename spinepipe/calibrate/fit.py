@@ -87,11 +87,12 @@ class Fit:
     ----------
     x, at_bound : (m,) see `Optimum`. values : (m,) value of each unknown's first row, SI.
     cost : sum of weight times squared error, mm2 and deg2; of whitened errors for zeroed cases
-        of a problem that allows for their correlation.
+        of a problem that allows for their correlation; with the squares of priors.
+    cost_of_priors : these squares alone.
     n_optima : distinct optima found; several of equal cost mean that the answer is not unique.
     cases : the measured cases with the load steps that were needed. poses : (T, n) of each,
         nothing where there is no usable pose.
-    profile : region of each unknown, if asked for and if there is an optimum.
+    profile : region of each unknown without a prior, if asked for and if there is an optimum.
     """
 
     x: Array
@@ -108,6 +109,7 @@ class Fit:
     cases: tuple[MeasuredCase, ...]
     poses: tuple[Array, ...]
     profile: Profile | None = None
+    cost_of_priors: float = 0.0
 
     def identifiable(self, unknown: int) -> bool:
         """Whether both ends of an unknown's region are known and its standard error is small."""
@@ -145,7 +147,8 @@ def fit(
     identifiable_below : largest standard error of an unknown at which it still counts as
         identified: of its logarithm where it is logarithmic, else in prior SDs.
     noise : (6,) m and rad, SD of one reading (before zeroing); None takes it from the residuals.
-    profiled : whether each unknown's region is looked for, a few more fits per unknown.
+    profiled : whether the region of each unknown without a prior is looked for, a few more fits
+        per unknown.
 
     Raises
     ------
@@ -181,6 +184,7 @@ def fit(
         cases=evaluator.problem.cases,
         poses=best.evaluation.poses if best.status.usable else (),
         profile=region,
+        cost_of_priors=float(np.sum((problem.by_priors @ best.x) ** 2)),
     )
 
 

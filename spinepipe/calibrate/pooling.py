@@ -101,8 +101,9 @@ def pool(
     Raises
     ------
     ValueError
-        For unknowns or starting values that differ, and ``noise`` that is not positive or given
-        for correlated readings that a problem takes for independent.
+        For unknowns or starting values that differ, unknowns with priors of their own, and
+        ``noise`` that is not positive or given for correlated readings that a problem takes for
+        independent.
     """
     _check(problems, noise)
     dof, scale = _degrees_of_freedom(problems[0]), problems[0].scale
@@ -137,6 +138,8 @@ def _check(problems: Sequence[Problem], noise: Array | None) -> None:
     nowhere = np.zeros(len(first.free))
     for problem in problems:
         name = problem.model.specimen
+        if len(problem.by_priors):
+            raise ValueError(f"{name}: a pool has its own prior, and takes no other")
         if problem.free != first.free:
             raise ValueError(f"{name}: unknowns differ from those of {first.model.specimen}")
         if not np.allclose(values(problem, nowhere), values(first, nowhere), rtol=1e-9, atol=0.0):

@@ -7,6 +7,9 @@ With one SD for every reading before zeroing, the n readings of a joint's coordi
 have covariance SD^2 (I + 1 1'). The inverse root of I + 1 1' is I - c 1 1' with c = (1 - 1 / sqrt(1
 + n)) / n: along 1 it is 1 + n, across it 1. Least squares on whitened residuals is generalised
 least squares (Aitken 1935, doi:10.1017/S0370164600014346).
+
+A normal prior of an unknown is a reading of it: the model's value, with the prior's SD. It is one
+more residual in every respect.
 """
 
 from collections.abc import Sequence
@@ -32,6 +35,9 @@ from spinepipe.statics import (
 from spinepipe.units import BORDER_PER_SI, less_step_0
 from spinepipe.world import Chain
 
+OF_PRIOR = -1
+"""In place of the coordinate of a residual that is no reading's."""
+
 SAME_POSE = 1e-7
 """m and rad: one pose solved from two sides differs by less, two branches of a snap by more."""
 
@@ -51,6 +57,9 @@ class Problem:
         was zeroed, and least squares is generalised least squares.
     along_bounds : whether optima are expected on bounds, as of strengths that may be off: fits then
         go along them.
+    prior_sd : (m,) SD of the normal prior of each unknown around the model's value, infinite for
+        none; in the unknown's unit, and beside weights that are one over squared SDs. None: no
+        unknown has any.
     """
 
     model: SpineModel
@@ -62,6 +71,7 @@ class Problem:
     course: Course | None = None
     correlated: bool = False
     along_bounds: bool = False
+    prior_sd: Array | None = None
 
     @cached_property
     def scale(self) -> Array:
@@ -70,17 +80,34 @@ class Problem:
             1.0 if parameter.logarithmic else declared(self.model, parameter).prior_scale
             for parameter in self.free
         ]
-        return np.array(sizes)
+        if self.prior_sd is None:
+            return np.array(sizes)
+        return np.where(np.isfinite(self.prior_sd), self.prior_sd, sizes)
+
+    @cached_property
+    def by_priors(self) -> Array:
+        """(P, m) residuals of the P priors by the unknowns."""
+        if self.prior_sd is None:
+            return np.zeros((0, len(self.free)))
+        held = np.isfinite(self.prior_sd)
+        rows: Array = np.diag(1.0 / np.where(held, self.prior_sd, 1.0))[held]
+        return rows
+
+    def has_prior(self, unknown: int) -> bool:
+        """Whether an unknown has a prior."""
+        return self.prior_sd is not None and bool(np.isfinite(self.prior_sd[unknown]))
 
 
 @dataclass(frozen=True)
 class Evaluation:
     """Weighted residuals (N,) and Jacobian (N, m) at one point; None where it has no equilibrium.
 
+    Those of readings, then those of priors.
+
     Attributes
     ----------
     poses : (T, n) of every case.
-    coordinate : (N,) which of the six each residual is of.
+    coordinate : (N,) which of the six each residual is of; `OF_PRIOR` for a prior.
     sharing : (N,) number of the residuals that share an error of step 0 which the cost takes no
         account of; -1 for none.
     """
@@ -114,8 +141,12 @@ class Evaluator:
         if refusal:
             raise RefusedModel(refusal)
         self._used = [_used(m, problem.weights) for m in problem.cases]
-        self.coordinate = np.concatenate([np.nonzero(used)[2] for used in self._used])
-        self.sharing = sharing(problem.cases, self._used, problem.correlated)
+        of_readings = [np.nonzero(used)[2] for used in self._used]
+        priors = np.full(len(problem.by_priors), OF_PRIOR)
+        self.coordinate = np.concatenate([*of_readings, priors])
+        alone = np.full(len(priors), -1)
+        shared = sharing(problem.cases, self._used, problem.correlated)
+        self.sharing = np.concatenate([shared, alone])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         loads = [case.case for case in problem.cases]
         self._solver: AtRest | Settling = (
@@ -141,17 +172,18 @@ class Evaluator:
         if new:
             self.evaluations += len(new)
             for (_, x), seen in zip(new, self._solver.solve(new), strict=True):
-                self._known[x.tobytes()] = self._evaluation(seen)
+                self._known[x.tobytes()] = self._evaluation(x, seen)
         return [self._known[x.tobytes()] for _, x in points]
 
-    def _evaluation(self, seen: Seen | str) -> Evaluation:
+    def _evaluation(self, x: Array, seen: Seen | str) -> Evaluation:
         if isinstance(seen, str):
             return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
-        residual = np.concatenate(
-            [self._residual(number, one) for number, one in enumerate(seen.readings)]
-        )
+        residual = self._residuals(x, seen.readings)
         jacobian = np.concatenate(
-            [self._jacobian(number, one) for number, one in enumerate(seen.by_x)]
+            [
+                *(self._jacobian(number, one) for number, one in enumerate(seen.by_x)),
+                self.problem.by_priors,
+            ]
         )
         return Evaluation(residual, jacobian, seen.poses, self.coordinate, self.sharing)
 
@@ -173,8 +205,12 @@ class Evaluator:
             np.stack([observe(System(chain, model, case), q, k) for k, q in enumerate(ends)])
             for case, ends in zip(cases, poses, strict=True)
         ]
-        residual = np.concatenate([self._residual(n, one) for n, one in enumerate(seen)])
-        return replace(found, residual=residual, poses=poses)
+        return replace(found, residual=self._residuals(x, seen), poses=poses)
+
+    def _residuals(self, x: Array, readings: Sequence[Array]) -> Array:
+        """(N,) of the readings (T, J, 6) of every case, and of the priors of x (m,)."""
+        of_readings = [self._residual(number, one) for number, one in enumerate(readings)]
+        return np.concatenate([*of_readings, self.problem.by_priors @ x])
 
     def _residual(self, number: int, seen: Array) -> Array:
         """(N,) weighted residuals of the readings (T, J, 6) of one case that enter the cost."""

@@ -167,7 +167,7 @@ def profile(
     noise: Array | None = None,
     level: float = LEVEL,
 ) -> Profile:
-    """Region of every unknown of a fit.
+    """Region of every unknown of a fit without a prior; those with one are fitted among the others.
 
     Parameters
     ----------
@@ -239,13 +239,16 @@ def _through(search: _Search, at: Callable[[Array], Evaluation]) -> _End:
 def _rises(
     problem: Problem, evaluation: Evaluation, at_bound: Array, noise: Array | None, level: float
 ) -> Iterator[_Rise | None]:
-    """Of each unknown; None where the data hold nothing against any value.
+    """Of each unknown; None where the data hold nothing against any value, or it has a prior.
 
     What is at a bound is held there, but for an unknown's own rise.
     """
     assert evaluation.jacobian is not None
     alike = uncertainty(problem, evaluation, at_bound, np.inf, noise)
     for unknown in range(len(at_bound)):
+        if problem.has_prior(unknown):
+            yield None
+            continue
         free, found = at_bound, alike
         if at_bound[unknown] != 0:
             free = np.where(np.arange(len(at_bound)) == unknown, 0, at_bound)

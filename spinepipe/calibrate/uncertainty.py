@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.problem import Evaluation, Problem, shared_sums
+from spinepipe.calibrate.problem import OF_PRIOR, Evaluation, Problem, shared_sums
 from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 from spinepipe.units import BORDER_PER_SI
@@ -26,13 +26,16 @@ class Uncertainty:
     covariance : (m, m); infinite for unknowns at a bound or without a trace in the data.
     standard_error : (m,); infinite where the data do not constrain the unknown.
     identifiable : (m,) bool.
-    degrees_of_freedom : readings less unknowns; the scatter comes from them.
+    degrees_of_freedom : readings and priors less unknowns; the scatter comes from them.
+    held_by_priors : how many unknowns the priors decide about: what these hold of the fit (their
+        leverage). The others are decided by readings.
     """
 
     covariance: Array
     standard_error: Array
     identifiable: NDArray[np.bool_]
     degrees_of_freedom: int
+    held_by_priors: float = 0.0
 
 
 def refuse_correlated(problem: Problem) -> None:
@@ -51,9 +54,13 @@ def refuse_correlated(problem: Problem) -> None:
 
 
 def declared_deviation(problem: Problem, coordinate: NDArray[np.int64], noise: Array) -> Array:
-    """SD (N,) of the weighted residuals of these coordinates (N,), from ``noise`` (6,)."""
-    scale: Array = np.sqrt(problem.weights) * BORDER_PER_SI * noise
-    return scale[coordinate]
+    """SD (N,) of the weighted residuals of these coordinates (N,), from ``noise`` (6,).
+
+    That of a prior is 1: it is in SDs as it is.
+    """
+    scale = np.sqrt(problem.weights) * BORDER_PER_SI * noise
+    deviation: Array = np.where(coordinate == OF_PRIOR, 1.0, scale[coordinate])
+    return deviation
 
 
 def uncertainty(
@@ -87,7 +94,18 @@ def uncertainty(
         covariance = infinite.copy()
         covariance[np.ix_(inside, inside)] = inner
         error[inside] = np.where(known, np.sqrt(np.diagonal(inner)), np.inf)
-    return Uncertainty(covariance, error, error < identifiable_below * problem.scale, freedom)
+    known = error < identifiable_below * problem.scale
+    return Uncertainty(covariance, error, known, freedom, _held_by_priors(evaluation, inside))
+
+
+def _held_by_priors(evaluation: Evaluation, inside: NDArray[np.bool_]) -> float:
+    """Trace of the priors' part of the matrix that makes fitted values of readings and priors."""
+    of_priors = evaluation.coordinate == OF_PRIOR
+    if not of_priors.any():
+        return 0.0
+    assert evaluation.jacobian is not None
+    left, _, _ = _seen(evaluation.jacobian[:, inside])
+    return float(np.sum(left[of_priors] ** 2))
 
 
 def _deviation(

@@ -134,7 +134,7 @@ class Written:
 
     def fit(self, specimen: str, representation: str, fitted_to: str = "all") -> Tables:
         """Tables of the job ``fit``."""
-        files = self._files("stiffness", "fits", "errors")
+        files = self._files("stiffness", "fits", "errors", "nuisances")
         fit.run(str(self.root), STUDY, specimen, representation, fitted_to, **files)
         return _read(files)
 

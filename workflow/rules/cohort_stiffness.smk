@@ -34,6 +34,7 @@ rule fit:
         stiffness=f"{COHORTS}/fits/{OWN}/stiffness.parquet",
         fits=f"{COHORTS}/fits/{OWN}/fits.parquet",
         errors=f"{COHORTS}/fits/{OWN}/errors.parquet",
+        nuisances=f"{COHORTS}/fits/{OWN}/nuisances.parquet",
     log:
         f"{LOGS}/fits/{OWN}.log",
     params:

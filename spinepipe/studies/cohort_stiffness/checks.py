@@ -10,7 +10,7 @@ from spinepipe.cohort.text import Document
 from spinepipe.effects import create
 from spinepipe.model.file import read_model
 from spinepipe.problems import InputError, Problem, one_of
-from spinepipe.studies.cohort_stiffness.representations import STIFFENING, named
+from spinepipe.studies.cohort_stiffness.representations import NUISANCE, STIFFENING, named
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     ALL_BUT,
@@ -41,6 +41,7 @@ def check_cohort_stiffness(
     yield from _levels(document, study, cohort)
     yield from _cost(document, study, cohort)
     yield from _covariates(document, study, cohort)
+    yield from _nuisances(document, study)
 
 
 def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
@@ -141,6 +142,33 @@ def _covariates(document: Document, study: CohortStiffness, cohort: Cohort) -> I
             place = (f"{cohort.folder.name}/specimens.csv", None, "sex")
             remedy = "write one of them, or leave the cell empty"
             yield Problem(*place, f"'{sex}' of specimen '{specimen}'", one_of(SEXES), remedy)
+
+
+def _nuisances(document: Document, study: CohortStiffness) -> Iterator[Problem]:
+    """Priors and representations that fit them need each other, SDs, and the fit without."""
+    asked = [name for name in study.representations if name in NUISANCE]
+    sds = study.nuisance and (study.nuisance.centre_mm, study.nuisance.axes_deg)
+    if asked and not (sds and any(sds)):
+        found = "null" if sds is None else "0 mm and 0 deg"
+        allowed = f"an SD above 0, as {', '.join(asked)} needs"
+        remedy = "write nuisance: {centre_mm: 3, axes_deg: 3}, or leave it out of representations"
+        yield Problem(*at(document, "nuisance"), found, allowed, remedy)
+    if sds is not None and not asked:
+        found = f"SDs, and none of {', '.join(NUISANCE)} among representations"
+        allowed = "one of them, as no other fits errors of centres and axes"
+        remedy = f"add {NUISANCE[-1]} to representations, or delete nuisance"
+        yield Problem(*at(document, "nuisance"), found, allowed, remedy)
+    for name in asked:
+        plain = named(name).without_nuisances
+        if plain not in study.representations:
+            found, allowed = f"{name} without {plain}", f"{plain} too, which it is compared with"
+            place = at(document, "representations")
+            yield Problem(*place, found, allowed, f"add {plain}, or leave {name} out")
+    if asked and study.cost == "published":
+        found = f"published, and {', '.join(asked)} among representations"
+        allowed = "cost: measurement_sd, as priors are weighed against readings in their SDs"
+        remedy = "choose cost: measurement_sd, or leave them out of representations"
+        yield Problem(*at(document, "cost"), found, allowed, remedy)
 
 
 def check_one_stiffening(

@@ -22,6 +22,10 @@ BY_CONSTRUCTION = "by_construction"
 """Marks a row whose claim is no test: fitted to the readings it is judged by."""
 
 
+FEWEST = 3
+"""Specimens that a verdict needs; the scatter of two is that of one difference."""
+
+
 @dataclass(frozen=True)
 class Claim:
     """What is claimed; see the columns of table ``findings``."""

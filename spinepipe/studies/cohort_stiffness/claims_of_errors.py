@@ -21,7 +21,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     listed,
     words,
 )
-from spinepipe.studies.cohort_stiffness.representations import EVERY, STIFFENING, named
+from spinepipe.studies.cohort_stiffness.representations import ASKED_FOR, EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
     FITTED,
     LEFT_OUT_CASE,
@@ -207,7 +207,7 @@ def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
     seen, asked = compared_motion(errors), set(errors["representation"])
     for comparison in COMPARISONS:
         better = comparison.smaller.representation
-        if better in STIFFENING and better not in asked:
+        if better in ASKED_FOR and better not in asked:
             continue  # fitted only where a study asks for it: of nobody else is it claimed
         yield compared(comparison, seen, significance)
     yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)

@@ -19,10 +19,10 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import corrected
 from spinepipe.studies.cohort_stiffness.representations import (
+    ASKED_FOR,
     OF_JOINTS,
     POOLED,
     SHARED,
-    STIFFENING,
 )
 from spinepipe.studies.cohort_stiffness.settings import SEXES, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
@@ -51,7 +51,7 @@ STEPS = {
 """What one step of a covariate is, in its own unit and in words."""
 
 _PLAIN = tuple(
-    name for name in (*OF_JOINTS, *SHARED) if name not in POOLED and name not in STIFFENING
+    name for name in (*OF_JOINTS, *SHARED) if name not in POOLED and name not in ASKED_FOR
 )
 """Fitted specimen by specimen: pooled ones are drawn towards each other, whoever they are."""
 

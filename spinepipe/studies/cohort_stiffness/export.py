@@ -8,7 +8,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, one_of
 from spinepipe.status import USABLE
 from spinepipe.studies.cohort_stiffness.problem import base_effects, start_stiffness, stiff_model
-from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NUISANCE
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     CohortStiffness,
@@ -35,7 +35,8 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: Wanted) -> tuple[st
         Where the study has no such representation, no results, or no fit of the specimen.
     """
     refuse(wanted, representations=True)
-    known = representations_of(study, cohort.joint_names)
+    every = representations_of(study, cohort.joint_names)
+    known = tuple(one for one in every if one not in NUISANCE)  # the file has joints as stated
     name = wanted.representation
     if name is not None and name not in known:
         remedy = "choose one of them, or leave the option out"

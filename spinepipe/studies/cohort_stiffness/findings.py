@@ -16,6 +16,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
     DECIDED,
+    FEWEST,
     UNDECIDED,
     Row,
 )
@@ -33,9 +34,6 @@ PUT_IN = ("stiffness_differs_between_", "literature_overpredicts_", "wrong_level
 """How claims begin that are about the stiffness that was put into a made-up cohort."""
 
 MADE_UP = "put in: nobody was measured, the cohort is made up"
-
-FEWEST = 3
-"""Specimens that a verdict needs; the scatter of two is that of one difference."""
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate.profile import Reach
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
@@ -18,23 +19,35 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
     no_fit,
     stiffness_rows,
 )
+from spinepipe.studies.cohort_stiffness.nuisances import (
+    fitted_nuisances,
+    from_plain,
+    nuisance_rows,
+    without,
+)
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
+    BUSHING,
     SpecimenTests,
     base_effects,
     calibration_problem,
     origin,
     specimen_tests,
 )
+from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, ended, fitted_growth, laws
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
 from spinepipe.tables import from_rows, write
 from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
+
+UNTOLD = Reach(None, None, open_below=True, open_above=True)
+"""Of a stiffness that was held as no reading tells of it."""
 
 
 def run(
@@ -46,21 +59,28 @@ def run(
     stiffness: str,
     fits: str,
     errors: str,
+    nuisances: str,
 ) -> None:
-    """Write stiffness, the record of the fit, and the errors under all tests of the specimen."""
+    """Write stiffness, the record of the fit, and the errors under all tests of the specimen.
+
+    And what was fitted beside: errors of joint centres and axes.
+    """
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
     others = base_effects(root, settings, cohort, specimen)
+    beside: tuple[ScopedEffect, ...] = ()
+    told: list[Row] = []
     where = specimen, representation, fitted_to
     problem, found, refusal = _fit(settings, cohort, *where, tests, others)
     if problem is None or found is None:
         k, growth, rows = None, None, _no_stiffness(settings, cohort, refusal)
         record = no_fit(Status.REFUSED.value, refusal)
     else:
-        growth = fitted_growth(settings, problem, found)
+        growth = _growth(settings, representation, problem, found)
         k, rows = _stiffness(settings, cohort, problem, found, growth)
-        record = _record(problem, found)
-    others = (*laws(settings, None if growth is None else growth.values), *others)
+        record, beside = _record(problem, found), fitted_nuisances(problem, found)
+        told = nuisance_rows(problem, found, cohort.joint_names)
+    others = (*laws(settings, None if growth is None else growth.values), *beside, *others)
     seen = [] if k is None else error_rows(cohort, specimen, tests, k, others)
     labelled = [
         {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
@@ -69,6 +89,7 @@ def run(
     write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
     write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, made)
     write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
+    write(from_rows(NUISANCES.without(*IN_FOLDERS), told), nuisances, made)
 
 
 def _fit(
@@ -90,11 +111,26 @@ def _fit(
         )
         seed = specimen_seed(settings.seed, f"{specimen}/{representation}/{fitted_to}")
         below = settings.identifiable_below
+        held = ""
+        if named(representation).without_nuisances:
+            plain = fit(without(problem), settings.starts, seed, below)
+            problem, held = from_plain(problem, plain)
         found = fit(problem, settings.starts, seed, below, profiled=True)
-        status, message = ended(problem, found.at_bound, found.status, found.message)
-        return problem, replace(found, status=status, message=message), ""
+        found = replace(found, message=joined(found.message, held))
+        if named(representation).stiffens:
+            status, message = ended(problem, found.at_bound, found.status, found.message)
+            found = replace(found, status=status, message=message)
+        return problem, found, ""
     except RefusedModel as error:
         return None, None, str(error)
+
+
+def _growth(
+    settings: CohortStiffness, representation: str, problem: Problem, found: Fit
+) -> Growth | None:
+    """Of laws that stiffen; None where they are linear."""
+    stiffens = named(representation).stiffens
+    return fitted_growth(settings, problem, found) if stiffens else None
 
 
 def _stiffness(
@@ -110,10 +146,11 @@ def _stiffness(
     k = model.effects[0].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
-    reaches = {}
+    fitted = [COORDINATES.index(name) for name in settings.free]
+    reaches = {(row, at): UNTOLD for row in range(len(k)) for at in fitted}
     for index, unknown in enumerate(problem.free):
-        if unknown.effect:
-            continue  # of a law that stiffens
+        if unknown.effect != BUSHING:
+            continue  # of a law that stiffens, or a nuisance
         at = (list(unknown.rows), unknown.column)
         error[at] = found.uncertainty.standard_error[index]
         known[at] = found.identifiable(index)
@@ -121,7 +158,9 @@ def _stiffness(
         for row in unknown.rows:
             one = row, unknown.column
             reach = found.reach(index, k[one])
-            if reach is not None:
+            if reach is None:
+                del reaches[one]
+            else:
                 reaches[one] = reach
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
@@ -134,13 +173,16 @@ def _stiffness(
 
 
 def _record(problem: Problem, found: Fit) -> Row:
-    """The row of the table ``fits``."""
+    """The row of the table ``fits``; its cost is that of the readings alone.
+
+    Of the unknowns those count that priors do not decide about.
+    """
     unknowns = len(problem.free)
     readings = sum(
         int(np.isfinite(case.measured[:, :, problem.weights > 0.0]).sum()) for case in problem.cases
     )
-    cost = found.cost if found.status.usable else None
-    effective = None if cost is None else float(unknowns)
+    cost = found.cost - found.cost_of_priors if found.status.usable else None
+    effective = None if cost is None else unknowns - found.uncertainty.held_by_priors
     several = f"{found.n_optima} optima: the answer depends on the start"
     alone = independent(problem)
     shared = "" if alone or cost is None else SHARED_ERROR
@@ -150,7 +192,10 @@ def _record(problem: Problem, found: Fit) -> Row:
         "unknowns": unknowns,
         "effective_unknowns": effective,
         "cost": cost,
-        **criteria(cost, readings, effective, found.uncertainty.degrees_of_freedom, alone),
+        **criteria(
+            *(cost, readings, effective, found.uncertainty.degrees_of_freedom, alone),
+            cost_of_priors=found.cost_of_priors,
+        ),
         "iterations": found.iterations,
         "evaluations": found.evaluations,
         "n_optima": found.n_optima,

@@ -93,6 +93,7 @@ def criteria(
     effective_unknowns: float | None,
     freedom: float | None = None,
     independent: bool = True,
+    cost_of_priors: float = 0.0,
 ) -> dict[str, float | None]:
     """Scatter, log-likelihood, corrected Akaike and Schwarz criterion.
 
@@ -103,6 +104,7 @@ def criteria(
     ----------
     cost : sum of squared residuals; None where there is no fit.
     freedom : degrees of freedom of the scatter; readings less effective unknowns by default.
+    cost_of_priors : squares of priors, which are readings to the scatter, and to nothing else here.
     independent : False where residuals are correlated and ``cost`` is told nothing of it: then it
         is no likelihood.
     """
@@ -111,7 +113,7 @@ def criteria(
         return empty
     freedom = readings - effective_unknowns if freedom is None else freedom
     if freedom > 0.0:
-        empty["scatter"] = float(np.sqrt(cost / freedom))
+        empty["scatter"] = float(np.sqrt((cost + cost_of_priors) / freedom))
     unknowns = effective_unknowns + 1.0
     if not independent or cost <= 0.0 or readings - unknowns - 1.0 <= 0.0:
         return empty

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
-from spinepipe.studies.cohort_stiffness.representations import POOLED, finest
+from spinepipe.studies.cohort_stiffness.representations import NUISANCE, POOLED, finest
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     NOBODY,
@@ -21,13 +21,14 @@ from spinepipe.studies.cohort_stiffness.settings import (
 )
 from spinepipe.studies.cohort_stiffness.tables import TABLES
 from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
+from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles
 
 OF_EXPERIMENTS = ("load_displacement", "helical_axes")
 """What laboratories report, one job per specimen."""
 
-OF_JOBS = ("stiffness", "errors", "fits", "sign_checks", "pooling", *OF_EXPERIMENTS)
+OF_JOBS = ("stiffness", "errors", "fits", "nuisances", "sign_checks", "pooling", *OF_EXPERIMENTS)
 """Tables joined from job files."""
 
 _ANALYSES = (
@@ -120,7 +121,8 @@ class CohortLayout(StudyFiles):
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
         pooled = ("pooling",) if self._pooled_ones else ()
-        own = ("stiffness", "fits", "errors", "sign_checks", *pooled, *OF_EXPERIMENTS)
+        beside = ("nuisances",) if self._with_nuisances else ()
+        own = ("stiffness", "fits", "errors", *beside, "sign_checks", *pooled, *OF_EXPERIMENTS)
         return (*own, *(job.name for job in _ANALYSES if self._asked(job.name)))
 
     def _asked(self, analysis: str) -> bool:
@@ -148,7 +150,7 @@ class CohortLayout(StudyFiles):
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
-        alone = table in ("sign_checks", *OF_EXPERIMENTS)
+        alone = table in ("nuisances", "sign_checks", *OF_EXPERIMENTS)
         whole = not alone and self._pooled_ones
         return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
 
@@ -158,6 +160,9 @@ class CohortLayout(StudyFiles):
             return [f"{self.folder}/pooled/{place}/{table}.parquet" for place in self._pooled()]
         if table in OF_EXPERIMENTS:
             return [f"{self.folder}/experiment/specimen={specimen}/{table}.parquet"]
+        if table == "nuisances":
+            places = [f"fits/specimen={specimen}/{place}" for place in self._fits(beside=True)]
+            return [f"{self.folder}/{place}/{table}.parquet" for place in places]
         places = [f"literature/specimen={specimen}"] if table != "fits" else []
         if table in ("stiffness", "errors", "fits"):
             places += [f"fits/specimen={specimen}/{place}" for place in self._fits()]
@@ -192,10 +197,16 @@ class CohortLayout(StudyFiles):
         """Representations fitted to all specimens at once."""
         return tuple(name for name in self.representations if name in POOLED)
 
-    def _fits(self) -> list[str]:
+    @property
+    def _with_nuisances(self) -> tuple[str, ...]:
+        """Representations with errors of joint centres and axes fitted beside."""
+        return tuple(name for name in self.representations if name in NUISANCE)
+
+    def _fits(self, beside: bool = False) -> list[str]:
+        """Places of the fits of a specimen; ``beside`` : of those with nuisances alone."""
         return [
             f"representation={representation}/fitted_to={label}"
-            for representation in self._single
+            for representation in (self._with_nuisances if beside else self._single)
             for label in self.load_sets
         ]
 
@@ -250,14 +261,14 @@ KIND = Kind(
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
     checks_of_files=(BaseCheck(own_bushings=True), check_one_stiffening),
-    tables=(*TABLES, *TABLES_OF_EXPERIMENTS),
+    tables=(*TABLES, NUISANCES, *TABLES_OF_EXPERIMENTS),
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
-        Job("literature", ignores=ignoring(*_HELD_OUT, *_FITTING), reads_base=True),
+        Job("literature", ignores=ignoring(*_HELD_OUT, *_FITTING, "nuisance"), reads_base=True),
         Job("left_out", ignores=ignoring(*_HELD_OUT), reads_base=True, also=_fits_of_others),
         Job(
             "pool",
-            ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness"),
+            ignores=ignoring(*_HELD_OUT, "seed", "starts", "level_stiffness", "nuisance"),
             reads_base=True,
         ),
         Job(

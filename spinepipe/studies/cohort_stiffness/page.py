@@ -18,6 +18,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
 from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
+from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
 from spinepipe.tables.schema import Column, Table
 from spinepipe.tables.shared import against_as_shown
 
@@ -38,6 +39,7 @@ SHOWN = {
     "helical_axes": "Helical axes and centres of rotation",
     "fits": "Fits",
     "stiffness": "Stiffness fitted to all load cases",
+    "nuisances": "Errors of joint centres and axes fitted beside",
     "statistics": "Tests of significance",
 }
 """Tables of the page in their order, with their titles."""
@@ -72,7 +74,7 @@ _COLUMNS = {
 }
 """What a reader compares stands first; short names are left to the files."""
 
-_SHAPES = {table.name: table for table in (*TABLES, *TABLES_OF_EXPERIMENTS)}
+_SHAPES = {table.name: table for table in (*TABLES, NUISANCES, *TABLES_OF_EXPERIMENTS)}
 
 NO_LEVELS = (
     "no stiffness of single levels is published for these joints and the coordinates that are free"
@@ -153,7 +155,7 @@ def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
         chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
     elif name == "pooling":
         chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
-    elif name in ("fits", "mae"):
+    elif name in ("fits", "mae", "nuisances"):
         left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
         chosen, told = frame[~left_out], "fits that leave no load case out"
     if len(chosen) == len(frame):

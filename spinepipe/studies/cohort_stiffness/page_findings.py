@@ -11,9 +11,11 @@ from spinepipe.report.words import AXIS, after_number, case, count, number, perc
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
+from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
+    NUISANCE,
     POOLED,
     PUBLISHED,
     STIFFENING,
@@ -124,7 +126,10 @@ def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
         f"{len(places)} to all load cases: {_some(places)}" if places else "",
         f"{fewer} to fewer load cases, which say too little about it" if fewer else "",
     ]
-    what = "stiffness or a growth" if at["representation"].isin(STIFFENING).any() else "stiffness"
+    beside = at["representation"]
+    kinds = ("stiffness", "a growth", "an error of a centre or axis")
+    there = (True, beside.isin(STIFFENING).any(), beside.isin(NUISANCE).any())
+    what = " or ".join(kind for kind, is_there in zip(kinds, there, strict=True) if is_there)
     yield (
         f"{count(len(at), 'fit')} of {len(rows)} ended with a {what} at a bound, where the data "
         f"only say that it is beyond: {'; '.join(part for part in parts if part)}."
@@ -315,6 +320,6 @@ def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
 
 MAKERS: tuple[Finding, ...] = (
     *(signs, failed, bounds, optima, identifiable),
-    *(ranking, stiffening, claims, loaded_errors, spreads, covariates),
+    *(ranking, nuisances, stiffening, claims, loaded_errors, spreads, covariates),
     *(ranges, zones, hysteresis, axes, beside_the_paper),
 )

@@ -26,6 +26,7 @@ from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
+from spinepipe.studies.cohort_stiffness.nuisances import free_nuisances, none_yet
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.cohort_stiffness.stiffening import free_growth, laws
@@ -33,6 +34,9 @@ from spinepipe.studies.parts import Damping, stiffness_of_joints
 from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
 
 FIRST_CYCLE = 1
+BUSHING = 0
+"""Its place in a model: laws that stiffen follow it, then nuisances, then effects of a base."""
+
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
 
 
@@ -115,21 +119,27 @@ def calibration_problem(
     """
     start, one = start_stiffness(study, cohort, representation), named(representation)
     growth = np.zeros(start.shape) if one.stiffens else None
-    model = stiff_model(cohort, specimen, frames, start, (*laws(study, growth), *others))
+    stiffening = laws(study, growth)
+    nuisances = none_yet(study, representation, len(start))
+    beside = (*stiffening, *nuisances, *others)
+    model = stiff_model(cohort, specimen, frames, start, beside)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
     assert one.grouping is not None  # nothing of a published set is fitted
-    stiffness = free_parameters(model, 0, names, one.grouping)
+    stiffness = free_parameters(model, BUSHING, names, one.grouping)
     growths = free_growth(study, model, representation)
-    free = stiffness + growths
-    reach = np.append(
-        np.full(len(stiffness), np.log(study.bound_factor)), np.full(len(growths), np.inf)
-    )  # of growth its declared bounds
+    errors, sds = free_nuisances(study, model, representation, BUSHING + 1 + len(stiffening))
+    free = stiffness + growths + errors
+    reach = np.full(len(free), np.inf)  # of growth and nuisances their declared bounds
+    reach[: len(stiffness)] = np.log(study.bound_factor)
+    prior_sd = np.append(np.full(len(stiffness + growths), np.inf), sds) if errors else None
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested
     )
     shared = study.cost == "measurement_sd" and cohort.zeroed_at_step_0
     weights = _weights(study, cohort)
-    return Problem(model, cases, free, weights, -reach, reach, None, shared, one.stiffens)
+    return Problem(
+        *(model, cases, free, weights, -reach, reach, None, shared, one.stiffens, prior_sd)
+    )
 
 
 def _in_cost(study: CohortStiffness, one: MeasuredCycle) -> Array:

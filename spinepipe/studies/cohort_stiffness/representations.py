@@ -5,8 +5,11 @@ order it, all follow from the entries.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+EACH_JOINT: Literal["per_joint"] = "per_joint"
+"""Grouping of unknowns that each joint has for itself, as in `free_parameters`."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,8 @@ class Representation:
     pooled : whether it is fitted to all specimens at once.
     stiffens : whether resistance grows as the joint moves, by an unknown beside each stiffness.
         Studies ask for such a one by name.
+    without_nuisances : the representation that it is with errors of joint centres and axes fitted
+        beside; empty for one that takes these as stated. Studies ask for such a one by name.
     beats : those that it is claimed to be better than on held-out motion.
     """
 
@@ -36,10 +41,25 @@ class Representation:
     grouping: Literal["per_specimen", "per_joint"] | None = None
     pooled: bool = False
     stiffens: bool = False
+    without_nuisances: str = ""
     beats: tuple[str, ...] = ()
 
 
-EVERY = (
+def _with_nuisances(one: Representation) -> Representation:
+    """The same with errors of joint centres and axes fitted beside."""
+    beside = "with errors of centres and axes"
+    return replace(
+        one,
+        name=f"{one.name}_nuisance",
+        words=f"{one.words}, centres and axes too",
+        sentence=f"{one.sentence} {beside} fitted beside",
+        about=f"as {one.name}, {beside} fitted beside",
+        without_nuisances=one.name,
+        beats=(one.name,),
+    )
+
+
+_STATED = (
     Representation(
         "literature",
         words="published, one value",
@@ -116,6 +136,12 @@ EVERY = (
         beats=("partially_pooled", "per_joint_stiffening"),
     ),
 )
+"""Those that take joint centres and axes as stated."""
+
+EVERY = (
+    *_STATED,
+    *(_with_nuisances(one) for one in _STATED if one.grouping and not (one.pooled or one.stiffens)),
+)
 """All of them, from what is taken as published to what is free in each joint; linear ones first."""
 
 _NAMED = {one.name: one for one in EVERY}
@@ -132,7 +158,13 @@ PUBLISHED = tuple(one.name for one in EVERY if one.grouping is None)
 FITTED = tuple(one.name for one in EVERY if one.grouping is not None)
 """Those that are fitted, among which studies choose."""
 
-UNLESS_ASKED = tuple(name for name in FITTED if not _NAMED[name].stiffens)
+NUISANCE = tuple(name for name in FITTED if _NAMED[name].without_nuisances)
+"""Those with errors of joint centres and axes fitted beside."""
+
+ASKED_FOR = tuple(name for name in FITTED if _NAMED[name].stiffens or name in NUISANCE)
+"""Those that are fitted only where a study asks for them."""
+
+UNLESS_ASKED = tuple(name for name in FITTED if name not in ASKED_FOR)
 """Those that are fitted where a study does not choose."""
 
 STIFFENING = tuple(name for name in FITTED if _NAMED[name].stiffens)
@@ -159,6 +191,9 @@ def start_of(name: str) -> str:
 
 
 def finest(names: Iterable[str]) -> str | None:
-    """Of some fitted specimen by specimen, the one with most unknowns; None where there is none."""
-    known = set(names) - {POOLED}
+    """Of some fitted specimen by specimen, the one with most unknowns; None where there is none.
+
+    Of those that take joint centres and axes as stated.
+    """
+    known = set(names) - {*POOLED, *NUISANCE}
     return next((name for name in (*OF_JOINTS, *SHARED) if name in known), None)

@@ -59,6 +59,26 @@ class CrossValidation(BaseModel):
     )
 
 
+class Nuisance(BaseModel):
+    """How far joint centres and axes may be from where they are stated."""
+
+    model_config = FORM
+
+    centre_mm: float = Field(
+        default=0.0,
+        ge=0,
+        le=20,
+        description="SD of a joint centre along each axis of its frame, mm; 0: it is as stated",
+    )
+    axes_deg: float = Field(
+        default=0.0,
+        ge=0,
+        le=15,
+        description="SD of the tilt of a joint's axes about each of them, deg; 0: they are as "
+        "stated",
+    )
+
+
 class CohortStiffness(Study):
     """Fit every specimen in several representations and load cases, predict what was held out."""
 
@@ -80,7 +100,7 @@ class CohortStiffness(Study):
         default=UNLESS_ASKED,
         description="how stiffness is described; what the literature says is always shown beside. "
         "Ratios of levels are left out, unless asked for here, where none are published; laws that "
-        "stiffen are fitted only where asked for",
+        "stiffen, and errors of joint centres and axes, are fitted only where asked for",
     )
     free: Coordinates = Field(
         default=("extension", "right_bending", "left_rotation"),
@@ -101,6 +121,11 @@ class CohortStiffness(Study):
     level_stiffness: Mapping[str, LevelStiffness] = Field(
         default_factory=_published_levels,
         description="published rotational stiffness joint by joint, whose ratios level_ratio keeps",
+    )
+    nuisance: Nuisance | None = Field(
+        default=None,
+        description="errors of joint centres and axes, fitted beside the stiffness by the "
+        "representations whose name ends in _nuisance; null: none",
     )
     base: Base | None = Field(
         default=None, description="what acts in every model besides the bushings; null: nothing"

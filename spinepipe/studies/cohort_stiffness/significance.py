@@ -22,7 +22,7 @@ from spinepipe.statistics import (
     wilcoxon_signed_rank,
 )
 from spinepipe.statistics.normality import NESTED
-from spinepipe.studies.cohort_stiffness.representations import POOLED, start_of
+from spinepipe.studies.cohort_stiffness.representations import NUISANCE, POOLED, start_of
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     CohortStiffness,
@@ -198,9 +198,10 @@ def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
 def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
     """The extra sum of squares F test for each specimen and each plain representation.
 
-    Pooled fits are no least squares fits: they are drawn towards the cohort.
+    Pooled fits are no least squares fits: they are drawn towards the cohort. Nor are those with
+    nuisances, and separate ones of each load case would be of several places for one joint.
     """
-    plain = fits[~fits["representation"].isin(POOLED)]
+    plain = fits[~fits["representation"].isin((*POOLED, *NUISANCE))]
     for (representation, specimen), rows in plain.groupby(
         ["representation", "specimen"], sort=False
     ):

@@ -77,7 +77,7 @@ STIFFNESS = Table(
         ),
         _stiffness(
             "low",
-            "lower end of the 95 % region: all other stiffnesses fitted anew (profile likelihood); "
+            "lower end of the 95 % region: all other unknowns fitted anew (profile likelihood); "
             "of pooled fits and new specimens an interval of the logarithm",
             _OPEN,
         ),
@@ -126,14 +126,16 @@ FITS = Table(
         Column(
             "effective_unknowns",
             "number",
-            "unknowns that the data decide about: all of a plain fit, fewer of a pooled one",
+            "unknowns that the data decide about: all of a plain fit, fewer of a pooled one, or of "
+            "one with nuisances that their priors hold",
             null=NO_FIT,
             low=0.0,
         ),
         Column(
             "cost",
             "number",
-            "sum of squared errors in SDs of one reading, or in deg2 for the published cost",
+            "sum of squared errors in SDs of one reading, or in deg2 for the published cost; of "
+            "readings alone, without priors",
             null=NO_FIT,
             low=0.0,
         ),
@@ -141,7 +143,7 @@ FITS = Table(
             "scatter",
             "number",
             "root of cost over readings less unknowns inside their bounds (effective ones of a "
-            "pooled fit): 1 where errors are as large as declared",
+            "pooled fit), each prior one reading more: 1 where errors are as large as declared",
             null=f"{NO_FIT}, or no more readings than unknowns",
             low=0.0,
         ),

@@ -33,7 +33,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
         told = placed(root / "literature", named, "stiffness", "errors", "sign_checks")
         literature.run(str(root), STUDY, specimen, **told)
         place = f"{named}/representation=per_joint/fitted_to=flexion"
-        own = placed(root / "own", place, "stiffness", "fits", "errors")
+        own = placed(root / "own", place, "stiffness", "fits", "errors", "nuisances")
         fit.run(str(root), STUDY, specimen, "per_joint", "flexion", **own)
         made += [told, own]
     place = "representation=partially_pooled/fitted_to=flexion"

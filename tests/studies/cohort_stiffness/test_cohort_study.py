@@ -128,7 +128,7 @@ def test_a_deleted_fit_reruns_what_hangs_on_it(cohort_project: Project) -> None:
     cohort_project.path(f"results/{FIT}/stiffness.parquet").unlink()
     again = cohort_project.rerun()
     jobs = {name for name in again if "specimen=" in name and "blocks" not in name}
-    fitted = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors")}
+    fitted = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "nuisances")}
     medians = {
         FIT.replace("fits/specimen=b", f"left_out/specimen={name}") + f"/{file}.parquet"
         for name in ("a", "c")

@@ -74,7 +74,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def held_out_deg(root: Path, study: str, test: str) -> float:
     """Root mean square error of a load case of the unseen specimen that no fit has seen."""
     files = {
-        name: str(root / f"{study}_{name}.parquet") for name in ("stiffness", "fits", "errors")
+        name: str(root / f"{study}_{name}.parquet")
+        for name in ("stiffness", "fits", "errors", "nuisances")
     }
     fit.run(str(root), study, UNSEEN, "per_specimen", f"all_but_{test}", **files)
     errors = read_frame(files["errors"])

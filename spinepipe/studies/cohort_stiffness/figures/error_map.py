@@ -17,12 +17,12 @@ from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
 from spinepipe.report.words import POSITIVE, SIGNS, after_number, case, count, fixed, short
 from spinepipe.studies.cohort_stiffness.representations import (
+    ASKED_FOR,
     IN_WORDS,
     OF_JOINTS,
     POOLED,
     PUBLISHED,
     SHARED,
-    STIFFENING,
 )
 from spinepipe.studies.cohort_stiffness.settings import NOTHING, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import compared_motion, joint_label_of, unit_of
@@ -46,7 +46,7 @@ _ALL = (
     (OF_JOINTS[0], "left_out_specimen"),
     _FEW[2],
 )
-_INSTEAD = tuple(sorted((*OF_JOINTS[::-1], *SHARED), key=STIFFENING.__contains__))
+_INSTEAD = tuple(sorted((*OF_JOINTS[::-1], *SHARED), key=ASKED_FOR.__contains__))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,11 @@ from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
 from spinepipe.report.words import AXIS, count, listed, number, short, stiffness_unit
 from spinepipe.studies.cohort_stiffness.representations import (
+    ASKED_FOR,
     IN_WORDS,
     OF_JOINTS,
     PUBLISHED,
     SHARED,
-    STIFFENING,
     named,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -62,7 +62,7 @@ _MOST_LETTERS = 140
 
 _PANEL_MM, _KEY_MM = 56.0, 22.0
 _MOST_NAMES = 12
-_FROM_BEST = tuple(sorted((*OF_JOINTS, *SHARED), key=STIFFENING.__contains__))
+_FROM_BEST = tuple(sorted((*OF_JOINTS, *SHARED), key=ASKED_FOR.__contains__))
 """Linear ones first: a stiffness at rest is not to be compared with one of the whole motion."""
 
 _MARKS = (Mark(OURS, "o", 3.4), Mark(BEST, "D", 2.9))
@@ -97,7 +97,7 @@ def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
     """At most two: those with a value for each joint first; one where two would crowd."""
     known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
     found = [name for name in _FROM_BEST if name in set(known["representation"])]
-    found = [name for name in found if name not in STIFFENING] or found
+    found = [name for name in found if name not in ASKED_FOR] or found
     free = [name for name in found if name in OF_JOINTS] or found[:1]
     one = len(cohort.joint_names) * len(cohort.specimen_names)
     return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
