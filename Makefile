@@ -40,6 +40,7 @@ bench: dev-env  ## measure speed side by side with OpenSim
 
 validate: dev-env  ## measure what is too slow for a test; goes on where it was cut off
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.validation
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/cases $(BIN)/python -m tests.validation.displaced_joints
 
 figures: all  ## renew the pictures of README and tutorial from results
 	$(BIN)/spinepipe docs --figures

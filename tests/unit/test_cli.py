@@ -243,6 +243,24 @@ def test_export_of_a_cohort_study(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert (code, bushing(file, "L4L5")[0]) == (0, 51.0)
 
 
+def test_export_of_a_law_that_stiffens_says_what_is_not_in_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = "per_joint_stiffening"
+    study = f"representations: [per_joint, {name}]\n"
+    chains = Chains({"a": A}, growth={"a": 2.0}, study=study).write(tmp_path)
+    rows = chains.fit("a", name)["stiffness"]
+    rows = rows.assign(specimen="a", representation=name, fitted_to="all")
+    (tmp_path / "results/probe").mkdir(parents=True)
+    rows.to_parquet(tmp_path / "results/probe/stiffness.parquet")
+    file = tmp_path / "a.osim"
+    command = ["--root", tmp_path, "export", "probe", "a", "--representation", name, "-o", file]
+    code, out, _ = run(capsys, *command)
+    assert code == 0
+    assert "at rest: that it grows with motion is not in the file" in out
+    assert bushing(file, JOINTS[0])[0] == pytest.approx(A[0][0], rel=0.02)
+
+
 def test_export_of_a_model_with_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Bushings are written, and what OpenSim cannot say is named, outside and inside the file."""
     Chains({"a": A}).write(tmp_path)

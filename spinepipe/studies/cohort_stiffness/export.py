@@ -8,7 +8,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, one_of
 from spinepipe.status import USABLE
 from spinepipe.studies.cohort_stiffness.problem import base_effects, start_stiffness, stiff_model
-from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NUISANCE
+from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NUISANCE, STIFFENING
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     CohortStiffness,
@@ -48,6 +48,8 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: Wanted) -> tuple[st
     told = "start of the study" if wanted.start else f"fitted, {IN_WORDS[name]}{why}"
     if not wanted.start:
         k = _fitted(study, cohort, wanted, name, k)
+    if name in STIFFENING and not wanted.start:
+        told += ", at rest: that it grows with motion is not in the file"
     others = base_effects(str(wanted.root), study, cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
