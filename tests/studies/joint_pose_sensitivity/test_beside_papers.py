@@ -78,6 +78,7 @@ def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: 
 def test_tables_of_job_files_of_every_kind_are_joined() -> None:
     own = {"tracking": "tracking_phantom"}  # by kinds that ask the cohort for files of their own
     asked = {
+        "cohort_stiffness": {"nuisances"},
         "joint_pose_sensitivity": {
             *("method_fits", "posterior", "posterior_motion", "pose_weights"),
             "stiffness_over_load_point",
