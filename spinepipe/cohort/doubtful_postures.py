@@ -47,6 +47,9 @@ LEAST_SINE = 0.5
 BEHIND_MM = 3.0
 """Pedicles lie behind the middle of the body, by 8 mm and more."""
 
+LEAST_ACROSS = 0.4
+"""Of the way from left to right lies along z: 0.75 in vertebrae turned by 41 deg."""
+
 ANGLES = ("extension_deg", "right_bending_deg", "left_rotation_deg")
 XYZ = ("x_mm", "y_mm", "z_mm")
 
@@ -210,6 +213,27 @@ def doubtful_shapes(cohort: Cohort) -> Iterator[Doubt]:
             file_of(cohort, "landmarks"), line, "x_mm", f"{words} ({shown})", allowed, remedy
         )
         yield Doubt(problem, "postures", certain)
+
+
+def doubtful_sides(cohort: Cohort) -> Iterator[Doubt]:
+    """Landmarks of a left and a right side that do not lie to the left and right of each other."""
+    for specimen in cohort.specimen_names if cohort.landmarks is not None else ():
+        across = [
+            points[name.replace("left", "right", 1)] - point
+            for vertebra, points in landmarks(cohort, specimen).items()
+            for name, point in points.items()
+            if is_level(vertebra) and name.startswith("left_")
+            if name.replace("left", "right", 1) in points
+        ]
+        length = sum(float(np.linalg.norm(one)) for one in across)
+        if length > 0.0 and float(np.sum(across, axis=0)[2]) < LEAST_ACROSS * length:
+            table = cohort.landmarks
+            assert table is not None
+            row = int(np.flatnonzero(table["specimen"] == specimen)[0])
+            place = (file_of(cohort, "landmarks"), first_line(cohort, "landmarks", row), "z_mm")
+            found = f"landmarks of the right side not to the right of the left ones ({specimen})"
+            remedy = "suspected: columns exchanged, or left and right; exchange them back"
+            yield Doubt(Problem(*place, found, "right sides along +z", remedy), "postures")
 
 
 def _fault(points: Mapping[str, Array]) -> tuple[str, str, bool] | None:

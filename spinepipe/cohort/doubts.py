@@ -30,7 +30,11 @@ from spinepipe.cohort.doubtful_places import (
     file_of,
     first_line,
 )
-from spinepipe.cohort.doubtful_postures import doubtful_postures, doubtful_shapes
+from spinepipe.cohort.doubtful_postures import (
+    doubtful_postures,
+    doubtful_shapes,
+    doubtful_sides,
+)
 from spinepipe.cohort.doubtful_readings import doubtful_readings, doubtful_sizes_of_readings
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.cohort.measured import measured_specimen
@@ -122,7 +126,8 @@ def _geometry(cohort: Cohort) -> Iterator[Doubt]:
             trusted.append(pose)
     yield from doubtful_sizes(cohort, poses)
     yield from doubtful_postures(cohort, poses)
-    yield from doubtful_shapes(cohort)
+    shapes = list(doubtful_shapes(cohort))
+    yield from shapes or doubtful_sides(cohort)
     yield from doubtful_points(cohort, trusted)
     yield from doubtful_masses(cohort, trusted)
 
