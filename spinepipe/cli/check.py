@@ -1,6 +1,7 @@
 """`spinepipe check`: every problem of studies and cohorts, and every doubt, before anything runs.
 
-A problem stops a run, a doubt (`warn`) does not: units and signs that no cell gives away.
+A problem stops a run, a doubt (`warn`) does not: units and signs that no cell gives away. What
+cannot be right, as a spine ten times too large, is a problem unless cohort.yaml says it is meant.
 """
 
 import argparse
@@ -12,10 +13,11 @@ from pathlib import Path
 from spinepipe import cohort as cohorts
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.doubts import doubts
+from spinepipe.cohort.doubts import doubts, refusals
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
+from spinepipe.studies.free import unmeasured
 from spinepipe.studies.registry import PACKAGE, every_form, kind_of
 from spinepipe.studies.study import COHORTS, Study
 
@@ -88,6 +90,7 @@ def _study_task(root: Path, name: str) -> Task:
         study, cohort = studies.check(root, name)
         words, warnings = _told_by_kind(study, cohort, root)
         told = f"{study.kind} on cohort {cohort.name}"
+        warnings = warnings or unmeasured(root, study, cohort)
         return Seen("; ".join(filter(None, (told, words))), warnings, cohort)
 
     return f"study {name}", look
@@ -144,6 +147,8 @@ def _tell(
     """
     try:
         seen = look()
+        if seen.cohort is not None and (refused := refusals(seen.cohort)):
+            raise InputError(refused)
     except InputError as error:
         new = [problem for problem in error.problems if problem not in told]
         known = len(error.problems) - len(new)

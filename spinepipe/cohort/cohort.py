@@ -12,6 +12,8 @@ from typing import Annotated, Any
 import pandas as pd
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
+from spinepipe.cohort.doubt import Group
+
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 VertebraName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9]*$")]
@@ -80,6 +82,11 @@ class CohortHeader(BaseModel):
     measurement_sd: MeasurementSd | None = Field(
         default=None, description="standard deviations of one reading, may be left out"
     )
+    i_mean_it: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
+        default=(),
+        description="what looks impossible and is meant: lengths, postures, masses, loads, motion, "
+        "zeroing, errors; such refusals of the plausibility checks become warnings",
+    )
 
 
 def joint_names(vertebrae: tuple[str, ...]) -> tuple[str, ...]:
@@ -112,6 +119,7 @@ class Cohort:
     made_up : whether nobody was measured.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
+    i_mean_it : groups of what looks impossible and is meant.
     digest : sha256 over the names and bytes of the files that were read.
     """
 
@@ -134,6 +142,7 @@ class Cohort:
     supports: pd.DataFrame | None = None
     preload: pd.DataFrame | None = None
     made_up: bool = False
+    i_mean_it: tuple[Group, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:

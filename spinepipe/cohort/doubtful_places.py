@@ -1,51 +1,80 @@
-"""Lengths that are most likely in another unit: joints too near each other, points elsewhere.
+"""Lengths in another unit, points far from their vertebra, columns of points exchanged.
 
 Metres for millimetres make a file unsound (`check_geometry`); centimetres and inches do not, and a
 load point in another unit than the landmarks only moves the load.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from dataclasses import dataclass
+from itertools import combinations
+from math import log
 from typing import Any
 
 import numpy as np
 
+from spinepipe.anatomy.levels import HEIGHT_MM, ONE_SPREAD, SIZE_SPREAD, spacing_mm
 from spinepipe.cohort.answers import of_specimens, typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.csv_table import read_rows
-from spinepipe.cohort.motion_size import LIKE, PLAUSIBLE, is_plausible
-from spinepipe.cohort.specimen import joint_frames
+from spinepipe.cohort.doubt import Doubt, Group
+from spinepipe.cohort.neutral_pose import NeutralPose
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
-from spinepipe.units import MM_PER_M
 
-APART_MM = 35.0
-"""Between neighbouring joints of the lumbar spine (Gould 2024a, Table 7: 39 mm from L1L2 to L2L3);
-cervical joints are half as far apart."""
+UNITS = {
+    1e3: "lengths in m",
+    10.0: "lengths in cm",
+    25.4: "lengths in inches",
+    0.1: "lengths multiplied by 10",
+    1.0 / 25.4: "lengths multiplied by 25.4",
+}
+"""What a number must be multiplied by to be mm, and what it is in."""
+
+NEAR_MM = 35.0
+"""Points that are no further from their vertebra are where they should be."""
 
 NEARER = 1.5
-"""Times that another unit must bring a point nearer to its vertebra."""
+"""Times that another unit must bring points nearer to their vertebrae."""
 
-UNITS = {1e3: "m", 10.0: "cm", 25.4: "inches"}
-"""What a number must be multiplied by to be mm, and what it is in."""
+THERE_MM = 70.0
+"""And how near: as slices of a trunk have their centres of mass in front of the spine."""
+
+MOST = 0.8
+"""Share of the points that a mistake of the whole column must explain."""
+
+NEARER_SWAPPED = 2.0
+"""And exchanged columns: of these there are more."""
+
+FAR_MM: Mapping[str, float] = {
+    "bodies": 150.0,
+    "loads": 300.0,
+    "preload": 300.0,
+    "landmarks": 120.0,
+}
+"""From the middle of a vertebra. Bodies: the pelvis, 121 mm from L5S1, and slices of a trunk, 65 mm
+(Pearsall et al. 1996, Ann Biomed Eng 24:198); loads: lever arms of rigs; landmarks: tips of
+processes."""
+
+NOWHERE_MM = 1000.0
+"""No point of a specimen is so far from its vertebra."""
 
 FORCE = ("fx_n", "fy_n", "fz_n")
 
-Origins = Mapping[str, Array]
-"""(J, 3) mm of each specimen, caudal to cranial."""
+COLUMNS = {
+    "bodies": ("com_x_mm", "com_y_mm", "com_z_mm"),
+    "loads": ("px_mm", "py_mm", "pz_mm"),
+    "preload": ("px_mm", "py_mm", "pz_mm"),
+    "landmarks": ("x_mm", "y_mm", "z_mm"),
+}
+
+_Told = dict[tuple[str, str, bool], list[tuple[int, str, float]]]
 
 
-def doubtful_places(cohort: Cohort) -> Iterator[Problem]:
-    """Doubts about where joints, centres of mass and load points are, one for each file."""
-    if not cohort.has_frames:
-        return
-    origins = {
-        name: np.array([pose.origin for pose in joint_frames(cohort, name)]) * MM_PER_M
-        for name in cohort.specimen_names
-    }
-    yield from _spacing(cohort, origins)
-    yield from _points(cohort, origins, "bodies", ("com_x_mm", "com_y_mm", "com_z_mm"))
-    yield from _points(cohort, origins, "loads", ("px_mm", "py_mm", "pz_mm"))
+def doubtful_points(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Doubt]:
+    """Doubts about where centres of mass and load points are beside joints that are trusted."""
+    for stem in ("bodies", "loads", "preload", *(() if cohort.joints is None else ("landmarks",))):
+        yield from _points(cohort, poses, stem)
 
 
 def first_line(cohort: Cohort, stem: str, row: int) -> int | None:
@@ -59,66 +88,210 @@ def file_of(cohort: Cohort, stem: str) -> str:
     return f"{cohort.folder.resolve().name}/{stem}.csv"
 
 
-def _spacing(cohort: Cohort, origins: Origins) -> Iterator[Problem]:
-    """Neighbouring joints as far apart as in no spine; in all specimens that are so, at once."""
-    found: dict[str, float] = {}
-    for name, of_specimen in origins.items():
-        apart = [float(np.linalg.norm(upper - lower)) for lower, upper in pairwise(of_specimen)]
-        if apart and not is_plausible(typical(apart) / APART_MM):
-            found[name] = typical(apart)
-    if not found:
-        return
-    size = typical(list(found.values()))
-    unit = min(UNITS, key=lambda factor: abs(np.log(size * factor / APART_MM)))
-    told = f"lengths in {UNITS[unit]} and not mm ({1.0 / unit:.3g})"
-    likely = abs(np.log(size * unit / APART_MM)) < np.log(LIKE)
-    remedy = f"suspected: {told}; convert the file" if likely else "look at the unit of lengths"
+def unit_like(ratio: float) -> float | None:
+    """What lengths must be multiplied by that are so many times too large; None if no unit does."""
+    factor = min(UNITS, key=lambda one: abs(log(ratio * one)))
+    return factor if abs(log(ratio * factor)) <= log(SIZE_SPREAD) else None
+
+
+def _ratios(cohort: Cohort, pose: NeutralPose) -> dict[str, float]:
+    """Length of each vertebra, from joint to joint, over that of its level.
+
+    Where there is one joint alone, heights of bodies count, from endplate to endplate.
+    """
+    expected = [spacing_mm(vertebra) for vertebra in pose.vertebrae[1:-1]]
+    found = zip(pose.vertebrae[1:-1], pose.spacing, expected, strict=True)
+    ratios = {name: float(mm) / usual for name, mm, usual in found if usual is not None}
+    return ratios or heights(cohort, pose.specimen)
+
+
+def heights(cohort: Cohort, specimen: str) -> dict[str, float]:
+    """Height of each body, from endplate to endplate, over that of its level."""
+    table = cohort.landmarks
+    if table is None:
+        return {}
+    own = table[table["specimen"] == specimen]
+    names = zip(own["vertebra"], own["landmark"], strict=True)
+    points = dict(zip(names, own[list(COLUMNS["landmarks"])].to_numpy(float), strict=True))
+    faces = ("superior_endplate_centre", "inferior_endplate_centre")
+    return {
+        name: float(np.linalg.norm(points[name, faces[0]] - points[name, faces[1]])) / usual
+        for name, usual in HEIGHT_MM.items()
+        if (name, faces[0]) in points and (name, faces[1]) in points
+    }
+
+
+def doubtful_sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Doubt]:
+    """Vertebrae of a size that no spine has: all of a specimen, or one between its neighbours."""
     stem = "landmarks" if cohort.joints is None else "joints"
-    whose = of_specimens(found, cohort.specimen_names)
-    shown = f"neighbouring joints {size:.3g} mm apart ({whose})"
-    allowed = f"{APART_MM / PLAUSIBLE:g} to {APART_MM * PLAUSIBLE:g} mm in a person's spine"
-    yield Problem(file_of(cohort, stem), None, "x_mm", shown, allowed, remedy)
+    whole: dict[float | None, dict[str, float]] = defaultdict(dict)
+    for pose in poses:
+        ratios = _ratios(cohort, pose)
+        size = typical(list(ratios.values())) if ratios else 1.0
+        if size <= 0.0 or abs(log(size)) > log(SIZE_SPREAD):
+            whole[unit_like(size) if size > 0.0 else None][pose.specimen] = size
+        else:
+            yield from _odd_vertebrae(cohort, stem, pose, ratios)
+    for unit, found in whole.items():
+        yield _of_another_size(cohort, stem, unit, found)
 
 
-def _points(
-    cohort: Cohort, origins: Origins, stem: str, columns: Sequence[str]
-) -> Iterator[Problem]:
-    """Points far from their vertebra that another unit brings near it."""
+def _of_another_size(
+    cohort: Cohort, stem: str, unit: float | None, found: Mapping[str, float]
+) -> Doubt:
+    size = typical(list(found.values()))
+    shown = (
+        f"neighbouring joints {size:.3g} times as far apart as in a spine "
+        f"({of_specimens(found, cohort.specimen_names)})"
+    )
+    allowed = (
+        f"1/{SIZE_SPREAD:g} to {SIZE_SPREAD:g} times the mean of the level (Panjabi 1991, 1992)"
+    )
+    remedy = (
+        "look at the unit of lengths"
+        if unit is None
+        else f"suspected: {UNITS[unit]} and not mm ({1.0 / unit:.3g}); convert the file"
+    )
+    rows = np.flatnonzero(getattr(cohort, stem)["specimen"] == next(iter(found)))
+    line = first_line(cohort, stem, int(rows[0]))
+    problem = Problem(file_of(cohort, stem), line, "x_mm", shown, allowed, remedy)
+    return Doubt(problem, "lengths", certain=unit is not None)
+
+
+def _odd_vertebrae(
+    cohort: Cohort, stem: str, pose: NeutralPose, ratios: Mapping[str, float]
+) -> Iterator[Doubt]:
+    """Single vertebrae much longer or shorter than the rest of their specimen."""
+    usual = typical(list(ratios.values())) if ratios else 1.0
+    for vertebra, ratio in ratios.items():
+        if 1.0 / ONE_SPREAD <= ratio / usual <= ONE_SPREAD:
+            continue
+        shown = f"{vertebra} of {pose.specimen} {ratio:.3g} times as long as the level is"
+        allowed = f"1/{ONE_SPREAD:g} to {ONE_SPREAD:g} times, as the rest of the specimen is"
+        joint = cohort.joint_names[cohort.vertebrae.index(vertebra) - 1]
+        named = ("vertebra", vertebra) if stem == "landmarks" else ("joint", joint)
+        table = getattr(cohort, stem)
+        rows = np.flatnonzero((table["specimen"] == pose.specimen) & (table[named[0]] == named[1]))
+        line = first_line(cohort, stem, int(rows[0])) if len(rows) else None
+        remedy = f"look for a misplaced point of {vertebra} or of its neighbours"
+        place = (file_of(cohort, stem), line, "y_mm")
+        yield Doubt(Problem(*place, shown, allowed, remedy), "lengths")
+
+
+def _points(cohort: Cohort, poses: Sequence[NeutralPose], stem: str) -> Iterator[Doubt]:
+    """Points far from their vertebra, and what would bring them near it, all of a specimen's."""
     table: Any = getattr(cohort, stem)
     if table is None:
         return
-    acting = table[list(columns)].notna().all(axis=1)
-    if stem == "loads":
+    acting = table[list(COLUMNS[stem])].notna().all(axis=1)
+    if "fx_n" in table:
         acting &= (table[list(FORCE)] != 0.0).any(axis=1)
-    units: dict[str, list[int]] = {}
-    for row in np.flatnonzero(acting):
-        specimen, vertebra = table["specimen"].iloc[row], table["vertebra"].iloc[row]
-        point = table[list(columns)].iloc[row].to_numpy(float)
-        names = cohort.specimen_names if specimen == "*" else (specimen,)
-        better = {_unit(point, _near(cohort, origins[name], vertebra)) for name in names}
-        if len(better) == 1 and None not in better:
-            units.setdefault(str(*better), []).append(int(row))
-    for unit, rows in units.items():
-        found = f"{len(rows)} of {int(acting.sum())} points far from their vertebra"
-        allowed = "points at or near the vertebra of their row"
-        remedy = f"suspected: points in {unit} and not mm, which would be nearer; convert them"
-        place = (file_of(cohort, stem), first_line(cohort, stem, rows[0]), columns[0])
-        yield Problem(*place, found, allowed, remedy)
+    told: _Told = defaultdict(list)
+    for pose in poses:
+        rows = np.flatnonzero(acting & table["specimen"].isin([pose.specimen, "*"]))
+        if len(rows):
+            points = table[list(COLUMNS[stem])].to_numpy(float)[rows]
+            near = np.array([pose.near(name) for name in table["vertebra"].iloc[rows]])
+            for suspect in _suspects(stem, table.iloc[rows], points, near):
+                key = (suspect.words, suspect.column, suspect.certain)
+                told[key].append((int(rows[suspect.row]), pose.specimen, suspect.away_mm))
+    for (words, column, certain), found in told.items():
+        yield _of_points(cohort, stem, words, column, certain, found)
 
 
-def _near(cohort: Cohort, origins: Array, vertebra: str) -> Array:
-    """(3,) mm: a place in a vertebra, midway between its joints or at the only one."""
-    level = cohort.vertebrae.index(vertebra)
-    beside = origins[max(level - 1, 0) : level + 1]
-    middle: Array = beside.mean(axis=0)
-    return middle
+@dataclass(frozen=True)
+class _Suspect:
+    """A row, counted from 0, whose point is elsewhere: what is behind it, how sure, how far."""
+
+    row: int
+    words: str
+    column: str
+    certain: bool
+    away_mm: float
 
 
-def _unit(point: Array, near: Array) -> str | None:
-    """The unit that brings a point much nearer to its vertebra; None where mm are near enough."""
-    here = float(np.linalg.norm(point - near))
-    if here <= APART_MM:
+def _suspects(stem: str, table: Any, points: Array, near: Array) -> Iterator[_Suspect]:
+    """Rows of a specimen whose points are elsewhere."""
+    away = np.linalg.norm(points - near, axis=1)
+    behind = _behind(stem, table, points, near)
+    if behind is not None:
+        words, column, certain, moved = behind
+        nearer = np.linalg.norm(moved - near, axis=1) < away
+        for row in np.flatnonzero(nearer).tolist():
+            yield _Suspect(row, words, column, certain, float(away[row]))
+        return
+    for row in _exchanged_names(table, points, near) if stem in ("landmarks", "bodies") else ():
+        told = "suspected: names of two neighbouring vertebrae exchanged; exchange them back"
+        yield _Suspect(row, told, "vertebra", False, float(away[row]))
+    for row in np.flatnonzero(away > FAR_MM[stem]).tolist():
+        column = COLUMNS[stem][int(np.argmax(np.abs(points[row] - near[row])))]
+        sure = bool(away[row] > NOWHERE_MM)
+        yield _Suspect(row, "look for a misplaced point", column, sure, float(away[row]))
+
+
+def _exchanged_names(table: Any, points: Array, near: Array) -> Iterator[int]:
+    """Rows of two neighbours that are much nearer to each other's middle than to their own."""
+    names = table["vertebra"].to_numpy()
+    levels = list(dict.fromkeys(names))
+    centres = np.array([points[names == name].mean(axis=0) for name in levels])
+    middles = np.array([near[names == name][0] for name in levels])
+    for first, second in combinations(range(len(levels)), 2):
+        pair = [first, second]
+        own = np.linalg.norm(centres[pair] - middles[pair], axis=1).sum()
+        others = np.linalg.norm(centres[pair] - middles[pair[::-1]], axis=1).sum()
+        if own > NEAR_MM and others * NEARER_SWAPPED < own:
+            yield from np.flatnonzero(np.isin(names, [levels[at] for at in pair])).tolist()
+
+
+def _behind(
+    stem: str, table: Any, points: Array, near: Array
+) -> tuple[str, str, bool, Array] | None:
+    """What brings the points of a specimen near their vertebrae: a unit or exchanged columns."""
+    here = _distance(points, near)
+    if here <= (NEAR_MM if len(points) == 1 or "fx_n" in table else NEAR_MM / 2.0):
         return None
-    factor = min(UNITS, key=lambda one: float(np.linalg.norm(one * point - near)))
-    there = float(np.linalg.norm(factor * point - near))
-    return UNITS[factor] if there * NEARER < here else None
+    names = COLUMNS[stem]
+    tried = []
+    for factor, words in UNITS.items():
+        what = words.replace("lengths", "points")
+        told = f"suspected: {what} and not mm ({1.0 / factor:.3g}); convert the columns"
+        tried.append((NEARER, told, names[0], stem == "bodies", factor * points))
+    for first, second in ((0, 1), (1, 2), (0, 2)):
+        order = [0, 1, 2]
+        order[first], order[second] = second, first
+        told = f"suspected: {names[first]} and {names[second]} exchanged; exchange them back"
+        tried.append((NEARER_SWAPPED, told, names[first], False, points[:, order]))
+    best = min(tried, key=lambda one: one[0] * _distance(one[4], near))
+    needed, told, column, sure, moved = best
+    there = _distance(moved, near)
+    shrunk = float(np.abs(moved).max()) < float(np.abs(points).max()) / 5.0
+    if there * needed >= here or there > (NEAR_MM if shrunk and len(points) == 1 else THERE_MM):
+        return None
+    nearer = np.linalg.norm(moved - near, axis=1) < np.linalg.norm(points - near, axis=1) + 5.0
+    if nearer.mean() < MOST:  # a unit is that of all rows
+        return None
+    sure = sure and len(points) > 1 and there < NEAR_MM and here > 3.0 * there
+    return told, column, sure or here > NOWHERE_MM, moved
+
+
+def _distance(points: Array, near: Array) -> float:
+    """Root mean square, mm."""
+    return float(np.sqrt(np.mean(np.sum((points - near) ** 2, axis=1))))
+
+
+def _of_points(
+    cohort: Cohort,
+    stem: str,
+    words: str,
+    column: str,
+    certain: bool,
+    found: Sequence[tuple[int, str, float]],
+) -> Doubt:
+    rows = sorted({row for row, _, _ in found})
+    whose = of_specimens(dict.fromkeys(name for _, name, _ in found), cohort.specimen_names)
+    far = max(away for _, _, away in found)
+    shown = f"{len(rows)} points up to {far:.3g} mm from the middle of their vertebra ({whose})"
+    allowed = f"points at or near the vertebra of their row, at most {FAR_MM[stem]:g} mm"
+    place = (file_of(cohort, stem), first_line(cohort, stem, rows[0]), column)
+    group: Group = "loads" if stem in ("loads", "preload") else "lengths"
+    return Doubt(Problem(*place, shown, allowed, words), group, certain)

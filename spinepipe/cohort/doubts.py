@@ -1,8 +1,10 @@
 """What a sound cohort most likely has wrong: units and signs that no cell gives away.
 
 Each joint's motion is held against what its load gives with published stiffness, without a fit:
-a mistake is told before anything runs, and where no fit would find a pose. Doubts are told and
-nothing is refused: a joint may be fused, a specimen no spine of a person.
+a mistake is told before anything runs, and where no fit would find a pose. These doubts are told
+and nothing is refused: a joint may be fused, a specimen no spine of a person. What
+`doubtful_places` and its neighbours find may be certain: then no run starts, unless cohort.yaml
+says that it is meant.
 
 Not told: units that leave the motion within a factor of five (lbf for N, kgf for N), joints whose
 moment is made by a force with a lever arm of less than a centimetre, and tests with supports,
@@ -20,10 +22,24 @@ import pandas as pd
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
 from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads, of_specimens, typical
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.doubtful_places import doubtful_places, file_of, first_line
+from spinepipe.cohort.doubt import Doubt
+from spinepipe.cohort.doubtful_masses import doubtful_masses
+from spinepipe.cohort.doubtful_places import (
+    doubtful_points,
+    doubtful_sizes,
+    file_of,
+    first_line,
+)
+from spinepipe.cohort.doubtful_postures import (
+    doubtful_postures,
+    doubtful_shapes,
+    doubtful_sides,
+)
+from spinepipe.cohort.doubtful_readings import doubtful_readings, doubtful_sizes_of_readings
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.motion_size import PLAUSIBLE, Unit, geometric_mean, is_plausible, unit_like
+from spinepipe.cohort.neutral_pose import neutral_poses
 from spinepipe.problems import Problem
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, to_si
 
@@ -71,12 +87,49 @@ class _Told:
 
 
 def doubts(cohort: Cohort) -> tuple[Problem, ...]:
-    """What is most likely wrong with a validated cohort, one for each test or column.
+    """What is most likely wrong with a validated cohort, and no run is stopped by.
 
-    Empty for cohorts without measured motion under loads, but for what is told of places.
+    That is all that cannot be certain, and what is but was meant.
     """
+    return tuple(one.problem for one in suspicions(cohort) if not _refused(cohort, one))
+
+
+def refusals(cohort: Cohort) -> tuple[Problem, ...]:
+    """What cannot be right in a validated cohort, and is not said to be meant."""
+    return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
+
+
+def _refused(cohort: Cohort, one: Doubt) -> bool:
+    return one.certain and one.group not in cohort.i_mean_it
+
+
+def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
+    """All that looks wrong, one for each column and what is behind it."""
     told = list(_told(cohort))
-    return (*doubtful_places(cohort), *_sizes(cohort, told), *_signs(cohort, told))
+    answers = (*_sizes(cohort, told), *_signs(cohort, told))
+    found = (
+        *(_geometry(cohort) if cohort.has_frames else ()),
+        *doubtful_readings(cohort),
+        *(Doubt(problem, "motion") for problem in answers),
+        *(() if answers else doubtful_sizes_of_readings(cohort)),
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _geometry(cohort: Cohort) -> Iterator[Doubt]:
+    """Of joints, then of what stands beside joints that are trusted: one mistake is told once."""
+    poses = list(neutral_poses(cohort))
+    trusted = []
+    for pose in poses:
+        joints = (*doubtful_sizes(cohort, [pose]), *doubtful_postures(cohort, [pose]))
+        if not joints:
+            trusted.append(pose)
+    yield from doubtful_sizes(cohort, poses)
+    yield from doubtful_postures(cohort, poses)
+    shapes = list(doubtful_shapes(cohort))
+    yield from shapes or doubtful_sides(cohort)
+    yield from doubtful_points(cohort, trusted)
+    yield from doubtful_masses(cohort, trusted)
 
 
 def _told(cohort: Cohort) -> Iterator[_Told]:

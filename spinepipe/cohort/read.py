@@ -136,6 +136,7 @@ def _cohort(
         supports=final.get("supports"),
         preload=final.get("preload"),
         made_up=header.made_up,
+        i_mean_it=header.i_mean_it,
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )

@@ -5,6 +5,7 @@ an answer. Weights that the study gives count: what has none is not measured, fo
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ from spinepipe.anatomy.stiffness_range import middle
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.answers import UNSURE_M, joint_loads
 from spinepipe.cohort.measured import measured_specimen
+from spinepipe.cohort.text import read_yaml
 from spinepipe.effects.contract import Array
+from spinepipe.problems import Problem, one_of
 from spinepipe.studies.parts import AUTO
-from spinepipe.units import COORDINATES, TRANSLATIONS
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 LEAST_SHARE = 0.1
 """A coordinate is loaded where its load would move it by this share of what the largest translation
@@ -84,3 +87,33 @@ def calibration_settled(study: Any, cohort: Cohort) -> Any:
     calibration = freed(study.calibration, cohort, study.tests)
     same = calibration is study.calibration
     return study if same else study.model_copy(update={"calibration": calibration})
+
+
+def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[Problem, ...]:
+    """Coordinates that a study frees by name though nobody measured them: told, not refused.
+
+    Their stiffness may show in what others do, but mostly keeps its start or the bound it hits.
+    """
+    holder = getattr(study, "calibration", None)
+    key = "free" if holder is None else "calibration.free"
+    holder = study if holder is None else holder
+    if cohort.motion is None or "free" not in getattr(holder, "model_fields_set", ()):
+        return ()
+    read = cohort.motion[list(COORDINATE_COLUMNS)].notna().any().to_numpy()
+    known = [name for name, is_read in zip(COORDINATES, read, strict=True) if is_read]
+    nobody = [name for name in holder.free if name in COORDINATES and name not in known]
+    if not nobody:
+        return ()
+    document, _ = read_yaml(root / "config" / "studies" / f"{study.study}.yaml", study.study)
+    if document is None or not _names_free(document.data, key):
+        return ()  # left to the default, or put there in place of `auto`
+    place = (f"config/studies/{study.study}.yaml", document.line_of(key), key)
+    found = f"{', '.join(nobody)}, which nobody measured in cohort '{cohort.name}'"
+    remedy = "take it out: its stiffness would keep its start or run to a bound"
+    return (Problem(*place, found, one_of(known), remedy),)
+
+
+def _names_free(data: Any, key: str) -> bool:
+    for part in key.split("."):
+        data = data.get(part) if isinstance(data, dict) else None
+    return data is not None

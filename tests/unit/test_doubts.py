@@ -14,7 +14,7 @@ from cohort_cases import write as write_small
 from cohort_edge_cases import A
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.doubts import doubts
+from spinepipe.cohort.doubts import suspicions
 from spinepipe.problems import Problem
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, draw_hidden, make
@@ -31,7 +31,7 @@ ANGLES_OF_TESTS = {"flexion": "extension_deg", "left_lateral_bending": "right_be
 
 
 def told(folder: Path) -> tuple[Problem, ...]:
-    return doubts(cohorts.read(folder, every_form()))
+    return tuple(one.problem for one in suspicions(cohorts.read(folder, every_form())))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
-from spinepipe.cohort.doubts import doubts
+from spinepipe.cohort.doubts import doubts, refusals
 from spinepipe.jobs.pool import Progress, submit_and_wait, warm_up
 from spinepipe.studies.registry import place_of
 
@@ -69,13 +69,16 @@ def check_writable():
 
 
 def tell_doubts():
-    """Say which units and signs of the data look wrong; the run goes on."""
+    """Say which data look wrong; the run goes on unless they cannot be right."""
     if not workflow.is_main_process:
         return
     cohorts = {cohort.digest: cohort for _, cohort in map(load, studies_at_work())}
     for cohort in cohorts.values():
         for doubt in doubts(cohort):
             print(f"warn  {doubt}", file=sys.stderr)
+    refused = [str(one) for cohort in cohorts.values() for one in refusals(cohort)]
+    if refused:
+        stop("\n".join(refused))
 
 
 def studies_at_work():

@@ -1,0 +1,33 @@
+"""What is told of a sound cohort that is most likely wrong, and whether a run may start with it."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from spinepipe.problems import Problem
+
+Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors"]
+"""What can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml."""
+
+GROUPS: tuple[Group, ...] = get_args(Group)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One suspicion.
+
+    Attributes
+    ----------
+    certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
+    """
+
+    problem: Problem
+    group: Group
+    certain: bool = False
+
+    @property
+    def with_switch(self) -> Problem:
+        """The problem, with what to write where it is meant."""
+        told = self.problem
+        remedy = f"{told.remedy} (if you mean it: i_mean_it: [{self.group}] in cohort.yaml)"
+        place = (told.file, told.row, told.column)
+        return Problem(*place, told.found, told.allowed, remedy)
