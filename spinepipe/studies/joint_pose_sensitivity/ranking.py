@@ -2,16 +2,16 @@
 
 import json
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from spinepipe.files import Stamp, stamp
-from spinepipe.marks import without_mark
+from spinepipe.marks import read_json
 
 
 @lru_cache(maxsize=4)
 def _ranking(where: Stamp) -> dict[str, list[dict[str, Any]]]:
-    return without_mark(json.loads(Path(where[0]).read_text("utf-8")))
+    found: dict[str, list[dict[str, Any]]] = read_json(where[0])
+    return found
 
 
 def ranking(path: str) -> dict[str, list[dict[str, Any]]]:
