@@ -9,8 +9,8 @@ sys.path.insert(0, workflow.basedir)
 
 include: "workflow/rules/scheduling.smk"
 include: "workflow/rules/common.smk"
-include: "workflow/rules/marks.smk"
 include: "workflow/rules/disk.smk"
+include: "workflow/rules/marks.smk"
 include: "workflow/rules/execution.smk"
 
 
@@ -47,7 +47,6 @@ onstart:
     check_engine()
     check_writable()
     tell_how_many_lost()
-    sweep_temporary_files()
     tell_doubts()
     lift_rate_limit()
     look_at_few()

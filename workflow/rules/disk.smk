@@ -11,11 +11,23 @@ from snakemake.dag import DAG
 from spinepipe.files import sweep
 
 
-def sweep_temporary_files():
-    """Remove what processes that are no more were writing into the studies at work."""
-    if workflow.is_main_process:
-        for name in studies_at_work():
-            sweep(f"results/{name}")
+def check_record():
+    """Say so where Snakemake cannot keep its record: it would end with a Python stack."""
+    kept = [
+        path for path in (".snakemake/locks", ".snakemake", ".") if os.path.isdir(path)
+    ]
+    if workflow.is_main_process and not os.access(kept[0], os.W_OK):
+        stop(
+            f"{Path(kept[0]).resolve()} cannot be written, where Snakemake keeps its record. Change "
+            "its permissions or owner, or copy the project to a folder of your own."
+        )
+
+
+@cache
+def sweep_temporary_files(study):
+    """Remove what processes that are no more were writing into the results of a study."""
+    if workflow.is_main_process and not workflow.dryrun:
+        sweep(f"results/{study}")
 
 
 async def check_output_mtime(self, job, expanded_output):
@@ -67,3 +79,4 @@ def bear_with_disks():
 
 leave_log = DAG.handle_log
 bear_with_disks()
+check_record()

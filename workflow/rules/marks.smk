@@ -57,6 +57,7 @@ def params_changed(self, job, file=None):
     wanted = mark_of_rule(job)
     if wanted is None:
         return record_of_params(self, job, file)
+    sweep_temporary_files(job.wildcards.study)
     files = [file] if file is not None else job.output
     cut_off = self._filter_incomplete_keys([self._get_key(path) for path in files])
     wrong = {
