@@ -44,10 +44,7 @@ _TEXTS = {
 _TAIL_BYTES = 512
 _CONTENT, _KEY = CONTENT.encode(), KEY.encode()
 _AT_END = re.compile(
-    _CONTENT
-    + rb": ([0-9a-f]{64})(?: -->\n<!-- |\n# )"
-    + _KEY
-    + rb": ([0-9a-f]{64})(?: -->\n|\n)\Z"
+    _CONTENT + rb": ([0-9a-f]{64})(?: -->\n<!-- |\n# )" + _KEY + rb": ([0-9a-f]{64})(?: -->\n|\n)\Z"
 )
 _BEFORE_END_OF_PNG = re.compile(
     _CONTENT + rb"\0([0-9a-f]{64}.{4}).{4}tEXt" + _KEY + rb"\0([0-9a-f]{64}).{4}\0{4}IEND.{4}\Z",
@@ -113,7 +110,8 @@ def marked(content: str | bytes, suffix: str, digest: str) -> bytes:
     if suffix not in _TEXTS:
         able = ".json", _PNG, _MOTION, *_TEXTS
         raise ValueError(f"a file {suffix} carries no mark: {', '.join(able)}")
-    remarks = (_TEXTS[suffix].format(f"{name}: {of}") for name, of in ((CONTENT, BLANK), (KEY, digest)))
+    marks = ((CONTENT, BLANK), (KEY, digest))
+    remarks = (_TEXTS[suffix].format(f"{name}: {of}") for name, of in marks)
     return sealed(raw + "".join(remarks).encode(), suffix)
 
 

@@ -1,4 +1,4 @@
-"""No result file is believed that is not, to the bit, what was written; what is cut short is swept."""
+"""No result file is believed that is not, to the bit, what was written; leftovers are swept."""
 
 import json
 import os
@@ -28,7 +28,9 @@ from spinepipe.report.style import picture
 from spinepipe.tables import Column, Table, opened, read, read_metadata, to_arrow, write
 
 DIGEST = "0123456789abcdef" * 4
-TABLE = Table("small", "A table.", ("n",), (Column("n", "integer", "n"), Column("x", "number", "x")))
+TABLE = Table(
+    "small", "A table.", ("n",), (Column("n", "integer", "n"), Column("x", "number", "x"))
+)
 
 
 def table(path: Path, rows: int = 5) -> Path:
@@ -147,7 +149,13 @@ def test_one_changed_number_of_a_json_file_is_seen_its_layout_is_free(tmp_path: 
         path.write_text(json.dumps(with_mark(data, DIGEST), indent=indent))
         assert read_mark(path) == DIGEST
         assert read_json(path)["s01"] == data["s01"]
-    for old, new in (("0.1", "0.2"), ("s01", "s02"), (DIGEST, DIGEST[::-1]), ("}", ""), ("n", "\0")):
+    for old, new in (
+        ("0.1", "0.2"),
+        ("s01", "s02"),
+        (DIGEST, DIGEST[::-1]),
+        ("}", ""),
+        ("n", "\0"),
+    ):
         path.write_text(json.dumps(with_mark(data, DIGEST)).replace(old, new))
         assert read_mark(path) == ""
         with pytest.raises(DamagedFile):

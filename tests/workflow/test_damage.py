@@ -1,4 +1,4 @@
-"""What a disk did to results is named in a sentence and computed again, and no table is made of it."""
+"""What a disk did to results is named in a sentence and computed again; no table is made of it."""
 
 import os
 import time

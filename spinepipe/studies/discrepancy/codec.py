@@ -26,7 +26,10 @@ NUMBERS = "biufc"
 
 PACKAGE = "spinepipe"
 
-_NOT_OURS = (LookupError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, ArithmeticError)
+_NOT_OURS = (
+    *(LookupError, TypeError, AttributeError, ImportError),
+    *(EOFError, BadZipFile, ArithmeticError, RecursionError),
+)
 """What reading bytes raises that were not written here, besides ValueError."""
 
 

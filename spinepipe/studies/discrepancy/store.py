@@ -175,7 +175,8 @@ class Store:
         kept = self._kept.read(token)
         if kept is not None:
             try:
-                return decoded(kept)  # type: ignore[no-any-return]
+                again: R = decoded(kept)
+                return again
             except ValueError as trouble:
                 _log.warning("a piece that somebody else wrote is replaced: %s", trouble)
         data = _computed(token, lambda: encoded(function(*args, **kwargs)))
