@@ -9,6 +9,7 @@ sys.path.insert(0, workflow.basedir)
 
 include: "workflow/rules/scheduling.smk"
 include: "workflow/rules/common.smk"
+include: "workflow/rules/disk.smk"
 include: "workflow/rules/marks.smk"
 include: "workflow/rules/execution.smk"
 
@@ -45,6 +46,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    tell_how_many_lost()
     tell_doubts()
     lift_rate_limit()
     look_at_few()

@@ -1,14 +1,25 @@
 """Writing files so that they appear whole or not at all."""
 
 import os
+import platform
+import re
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+_HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
+_TEMPORARY = re.compile(r"\..+\.[a-z]+\.(\d+)(?:@([A-Za-z0-9-]+))?")
+"""Name of a temporary file: what it will be called, the process that writes it and its machine."""
+
+_DAY_S = 86400.0
 
 
 @contextmanager
 def appearing(path: str | Path) -> Iterator[Path]:
     """A temporary file beside ``path`` to be written; it takes that name when all went well.
+
+    Its name begins with a dot: readers of a folder as one data set leave it out.
 
     Raises
     ------
@@ -17,12 +28,48 @@ def appearing(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}@{_HOST}")
     try:
         yield temporary
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def is_temporary(name: str) -> bool:
+    """Whether `appearing` gives such names to files that are being written."""
+    return _TEMPORARY.fullmatch(name) is not None
+
+
+def sweep(folder: str | Path) -> int:
+    """Delete temporary files that processes which are no more left below a folder; how many.
+
+    Of another machine it is not known whether a process lives: its files stay for a day. Links are
+    not followed.
+    """
+    swept = 0
+    for place, _, names in os.walk(folder):
+        for name in filter(is_temporary, names):
+            path = os.path.join(place, name)
+            with suppress(OSError):
+                if _is_abandoned(path, name):
+                    os.unlink(path)
+                    swept += 1
+    return swept
+
+
+def _is_abandoned(path: str, name: str) -> bool:
+    found = _TEMPORARY.fullmatch(name)
+    assert found is not None
+    if found[2] not in (None, _HOST):
+        return time.time() - os.lstat(path).st_mtime > _DAY_S
+    try:
+        os.kill(int(found[1]), 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except PermissionError:  # it lives, and is somebody else's
+        return False
+    return False
 
 
 Stamp = tuple[str, int, int]

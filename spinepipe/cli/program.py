@@ -72,10 +72,11 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
 
 def _is_for_people(error: Exception) -> bool:
     """Whether the error says what the user can mend; any other is a fault of ours."""
+    from spinepipe.marks import DamagedFile
     from spinepipe.model.spine import RefusedModel
     from spinepipe.problems import InputError
 
-    return isinstance(error, InputError | RefusedModel | OSError | ImportError)
+    return isinstance(error, DamagedFile | InputError | RefusedModel | OSError | ImportError)
 
 
 def _message(error: Exception) -> str:

@@ -219,6 +219,11 @@ def _fate(worker: _Worker) -> str:
 
 
 def _explain(failure: _Failure, folder: str) -> str:
+    if failure.errno == errno.ENOENT and Path(folder).parts[:1] == ("results",):
+        return (
+            f"{failure.path or folder} is gone: it, or its folder, was removed while the run went "
+            "on. Run the same command again (what is left is kept)"
+        )
     if failure.errno not in _REMEDIES:
         return failure.message
     remedy = _REMEDIES[failure.errno].format(folder=folder)

@@ -4,14 +4,12 @@ from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 
-import pyarrow.parquet as pq
-
 from spinepipe.jobs.digest import report_digest
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
 from spinepipe.report.page.document import Picture, Results
 from spinepipe.studies.registry import PACKAGE, kind_of
-from spinepipe.tables import Tables
+from spinepipe.tables import Tables, read_metadata
 
 
 def run(
@@ -45,17 +43,12 @@ def results_of(
     drawn = {Path(path).stem: _text(path) for path in figures}
     return Results(
         tables=Tables.read([path for path in tables if Path(path).stem in read], others),
-        metadata={Path(path).stem: _metadata(path) for path in tables},
+        metadata={Path(path).stem: read_metadata(path) for path in tables},
         pictures={
             name: Picture.of(name, titles[name], svg, " ".join(words[name].split()))
             for name, svg in drawn.items()
         },
     )
-
-
-def _metadata(path: str) -> dict[str, str]:
-    found = pq.read_schema(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in found.items()}
 
 
 def _text(path: str) -> str:

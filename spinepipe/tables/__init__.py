@@ -6,9 +6,11 @@ from spinepipe.tables.parquet import (
     from_rows,
     join,
     metadata_of,
+    opened,
     read,
     read_frame,
     read_frames,
+    read_metadata,
     to_arrow,
     write,
 )
@@ -22,9 +24,11 @@ __all__ = [
     "from_rows",
     "join",
     "metadata_of",
+    "opened",
     "read",
     "read_frame",
     "read_frames",
+    "read_metadata",
     "to_arrow",
     "write",
 ]

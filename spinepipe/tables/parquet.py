@@ -1,6 +1,11 @@
-"""Reading and writing result tables as Parquet: checked against their schema, atomically."""
+"""Reading and writing result tables as Parquet: checked against their schema, atomically.
 
-from collections.abc import Mapping, Sequence
+A file is only believed as it was written: each has checksums of its pages, which any reader can
+verify, and a digest of all its bytes, so of the names, types and values of all columns.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +16,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from spinepipe.files import appearing
+from spinepipe.marks import BLANK, CONTENT, DamagedFile, check_whole, sealed
 from spinepipe.tables.schema import TYPES, Column, Table
 
 SMALL_ROWS = 1000
@@ -100,14 +106,36 @@ def _problem(column: Column, array: pa.Array) -> str | None:
 def write(rows: pa.Table, path: str | Path, metadata: Mapping[str, str]) -> None:
     """Write rows with provenance in the file's metadata; the file appears whole or not at all."""
     rows = rows.replace_schema_metadata(dict(sorted(metadata.items())))
+    how = _SMALL if rows.num_rows < SMALL_ROWS else _LARGE
+    file = pa.BufferOutputStream()
+    with pq.ParquetWriter(file, rows.schema, write_page_checksum=True, **how) as writer:
+        writer.write_table(rows)
+        writer.add_key_value_metadata({CONTENT: BLANK})  # not in Arrow's own copy of the metadata
+    raw = sealed(file.getvalue(), ".parquet")
     with appearing(path) as temporary:
-        pq.write_table(rows, temporary, **(_SMALL if rows.num_rows < SMALL_ROWS else _LARGE))
+        temporary.write_bytes(raw)
 
 
 def metadata_of(rows: pa.Table) -> dict[str, str]:
     """Metadata of a table that was read."""
-    found = rows.schema.metadata or {}
-    return {key.decode(): value.decode() for key, value in found.items()}
+    return _told(rows.schema)
+
+
+def read_metadata(path: str | Path) -> dict[str, str]:
+    """Metadata of a file, its rows left alone.
+
+    Raises
+    ------
+    DamagedFile
+        As `read` does.
+    """
+    with opened(path) as file:
+        return _told(file.schema_arrow)
+
+
+def _told(schema: pa.Schema) -> dict[str, str]:
+    found = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
+    return {key: value for key, value in found.items() if key != CONTENT}
 
 
 def join(
@@ -121,13 +149,42 @@ def join(
     write(rows, path, metadata)
 
 
-def read(path: str | Path) -> pa.Table:
-    """The rows of one file, metadata included; folder names are not read as columns."""
-    return pq.ParquetFile(path).read()
+@contextmanager
+def opened(path: str | Path) -> Iterator[pq.ParquetFile]:
+    """A file whose bytes are those that were written, to be read whole or some rows at a time.
+
+    Raises
+    ------
+    DamagedFile
+        For a file that is broken, cut off, empty or changed, here or while it is read.
+    OSError
+        With the file's name, where there is none or it may not be read.
+    """
+    with open(path, "rb") as file:
+        try:
+            check_whole(path, file)
+            yield pq.ParquetFile(file, page_checksum_verification=True)
+        except (pa.ArrowException, OSError) as trouble:
+            raise DamagedFile(path, " ".join(str(trouble).split())) from None
+
+
+def read(path: str | Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """The rows of one file, metadata included; folder names are not read as columns.
+
+    The digest of the file's bytes is no metadata of its rows, and is left out.
+
+    Raises
+    ------
+    DamagedFile, OSError
+        As `opened` does.
+    """
+    with opened(path) as file:
+        rows = file.read(columns=None if columns is None else list(columns))
+    return rows.replace_schema_metadata(_told(rows.schema))
 
 
 def read_frame(path: str | Path) -> pd.DataFrame:
-    """The rows of one file as a data frame, empty cells as NaN or None."""
+    """The rows of one file as a data frame, empty cells as NaN or None. Raises what `read` does."""
     frame: pd.DataFrame = read(path).to_pandas()
     return frame
 

@@ -13,7 +13,7 @@ from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.expected import Expected
 from spinepipe.jobs.model_mark import base_marks
-from spinepipe.marks import read_mark
+from spinepipe.marks import DamagedFile, read_mark
 from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.studies.range_of_motion import draw, simulate
 from spinepipe.studies.read import check
@@ -88,6 +88,17 @@ def test_a_file_without_a_mark_is_not_joined(root: Path) -> None:
     pq.write_table(read(first).replace_schema_metadata(None), first)
     with pytest.raises(StaleFile, match=r"found the mark none, expected [0-9a-f]{64}"):
         join(told)
+
+
+def test_a_file_with_one_flipped_bit_is_not_joined(root: Path) -> None:
+    """It has the mark that is expected: of settings, data and code."""
+    told = made(root)
+    (first, *_) = told.files.job_files("range_of_motion", "a", "000")
+    whole = Path(first).read_bytes()
+    Path(first).write_bytes(whole[:99] + bytes([whole[99] ^ 8]) + whole[100:])
+    with pytest.raises(DamagedFile, match="counts as lost"):
+        join(told)
+    assert not Path(BLOCK).exists()
 
 
 def test_digests_of_joined_files_are_kept_also_where_they_differ(root: Path) -> None:

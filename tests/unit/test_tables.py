@@ -1,10 +1,10 @@
 """Tables keep their schema, appear whole or not at all, and carry their provenance."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from spinepipe.status import Status
@@ -133,12 +133,13 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypat
     write(to_arrow(TABLE, ROWS), path, {})
     before = path.read_bytes()
 
-    def half(rows: pa.Table, where: Path, **_: object) -> None:
-        Path(where).write_bytes(b"half a file")
-        raise OSError("no space left")
+    def half(where: Path, content: bytes) -> None:
+        with where.open("wb") as file:
+            file.write(content[: len(content) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device", str(where))
 
-    monkeypatch.setattr(pq, "write_table", half)
-    with pytest.raises(OSError, match="no space"):
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(OSError, match="No space"):
         write(to_arrow(TABLE, spoiled("pose", 9)), path, {})
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]

@@ -8,27 +8,13 @@ from pathlib import Path
 import psutil
 import pyarrow.parquet as pq
 import pytest
-from small_project import Project, Shared, copy_project
+from small_project import Project, Shared
+from small_tables import TABLES, project_with_tables, simulation
 
 from spinepipe.marks import read_mark
 
 pytestmark = pytest.mark.slow
 
-STUDY = """\
-study: small
-kind: joint_pose_sensitivity
-cohort: palanca_l1l4
-seed: 1
-loading: equilibrium
-poses: 4
-best_models: 2
-block: 2
-calibration:
-  bound_factor: 100
-  weights:
-    {anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}
-"""
-TABLES = tuple(f"results/small/{name}.parquet" for name in ("simulations", "agreement"))
 KIND = "joint_pose_sensitivity"
 
 SEED = ("seed: 1", "seed: 2")
@@ -41,14 +27,7 @@ SAME = ("seed: 1", "seed: 1")
 @pytest.fixture
 def done(shared: Shared, tmp_path: Path) -> Project:
     """A project with the tables of a small study; each test has its own."""
-
-    def build(folder: Path) -> Project:
-        project = copy_project(folder)
-        project.path("config/studies/small.yaml").write_text(STUDY)
-        project.run(*TABLES)
-        return project
-
-    return shared.project("tables", build).copy(tmp_path / "project")
+    return project_with_tables(shared, tmp_path)
 
 
 def killed_with(project: Project, change: tuple[str, str], rule: str, count: int) -> None:
@@ -87,10 +66,6 @@ def test_after_kill_and_change_back_tables_are_as_undisturbed(
         again = done.contents()
     assert {name: again[name] for name in content} == content
     assert done.planned(*TABLES) == set()
-
-
-def simulation(pose: int, stiffness: str) -> str:
-    return f"small/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
 
 
 def test_a_killed_run_goes_on_where_it_was(done: Project) -> None:

@@ -1,6 +1,7 @@
 # Whether a file is what it should be is told by its own mark, not by Snakemake's record of it
 # (docs/decisions/0013).
 import inspect
+import sys
 
 from snakemake.persistence import ParamsChange, PersistenceBase
 
@@ -16,9 +17,36 @@ def mark_of_rule(job):
 def mark_in(path):
     """The mark in a file, or None without the file; a file that a job rewrites is asked no more."""
     try:
-        return read_mark(path) or "no mark"
+        mark = read_mark(path)
     except OSError:
         return None
+    if not mark:
+        tell_lost(path)
+    return mark or "no mark"
+
+
+MOST_NAMED = 5
+LOST = []
+
+
+def tell_lost(path):
+    """Name a file that is there and not to be believed, of many the first ones."""
+    LOST.append(path)
+    if len(LOST) <= MOST_NAMED:
+        print(
+            f"warn  {path} is damaged, cut off, empty or of an older version: it counts as lost and "
+            "is computed again",
+            file=sys.stderr,
+        )
+
+
+def tell_how_many_lost():
+    """Say how many such files are not named."""
+    if len(LOST) > MOST_NAMED:
+        print(
+            f"warn  so do {len(LOST) - MOST_NAMED} more files below results",
+            file=sys.stderr,
+        )
 
 
 def params_changed(self, job, file=None):
@@ -29,6 +57,7 @@ def params_changed(self, job, file=None):
     wanted = mark_of_rule(job)
     if wanted is None:
         return record_of_params(self, job, file)
+    sweep_temporary_files(job.wildcards.study)
     files = [file] if file is not None else job.output
     cut_off = self._filter_incomplete_keys([self._get_key(path) for path in files])
     wrong = {

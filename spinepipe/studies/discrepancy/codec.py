@@ -14,6 +14,7 @@ from functools import cache
 from importlib import import_module
 from io import BytesIO
 from typing import Any, Literal
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -24,6 +25,12 @@ NUMBERS = "biufc"
 """Kinds of dtype that are written: bool, integers, floats and complex numbers."""
 
 PACKAGE = "spinepipe"
+
+_NOT_OURS = (
+    *(LookupError, TypeError, AttributeError, ImportError),
+    *(EOFError, BadZipFile, ArithmeticError, RecursionError),
+)
+"""What reading bytes raises that were not written here, besides ValueError."""
 
 
 def encoded(value: Any) -> bytes:
@@ -53,11 +60,15 @@ def decoded(data: bytes) -> Any:
     Raises
     ------
     ValueError
-        For a name outside of spinepipe, or of nothing that is written: it is never looked up.
+        For what `encoded` never writes: pickles, arrays of objects, names outside of spinepipe,
+        which are never looked up, values that are no fields of their class.
     """
-    with np.load(BytesIO(data), allow_pickle=False) as file:
-        flat = {name: file[name] for name in file.files}
-    return _Reader(flat).of(json.loads(flat.pop(STRUCTURE).tobytes()))
+    try:
+        with np.load(BytesIO(data), allow_pickle=False) as file:
+            flat = {name: file[name] for name in file.files}
+        return _Reader(flat).of(json.loads(flat.pop(STRUCTURE).tobytes()))
+    except _NOT_OURS as trouble:
+        raise ValueError(f"{type(trouble).__name__}: {trouble}") from trouble
 
 
 class _Writer:
@@ -175,7 +186,8 @@ def _name(kind: type) -> str:
 def _class(name: str) -> type:
     """The dataclass or enum of that name."""
     module, _, inside = name.partition(":")
-    if module.split(".")[0] != PACKAGE:
+    rooms = module.split(".")
+    if rooms[0] != PACKAGE or "__main__" in rooms:  # to import that one is to run it
         raise ValueError(f"{name} is not of {PACKAGE}")
     found: Any = import_module(module)
     for part in inside.split("."):

@@ -24,8 +24,8 @@ MARK = _OURS + b"1\n"
 """First bytes of a file; the number is that of the format."""
 
 _NAME = re.compile(rf"([0-9a-f]{{64}}){SUFFIX}")
-_TEMPORARY = re.compile(rf"\.[0-9a-f]{{64}}{SUFFIX}\.\d+")
-"""What `appearing` leaves when the process is killed."""
+_TEMPORARY = re.compile(rf"\.[0-9a-f]{{64}}{SUFFIX}\.\d+(@[A-Za-z0-9-]+)?")
+"""What `appearing` leaves when the process is killed, see `spinepipe.files`."""
 
 _OLD_PLACE, _OLD_ENTRY = re.compile(r"[0-9a-f]{64}"), re.compile(r"hashes|python-\w+(\.lock)?")
 """Folders in which pydra once pickled the results, and what lies in them."""

@@ -11,6 +11,7 @@ that was read back from a store would not be known again.
 """
 
 import hashlib
+import logging
 import os
 from collections.abc import Callable, Mapping
 from collections.abc import Set as AnySet
@@ -30,6 +31,8 @@ from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import versions
 from spinepipe.studies.discrepancy.codec import decoded, encoded
 from spinepipe.studies.discrepancy.kept import Kept
+
+_log = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -169,10 +172,15 @@ class Store:
         content = content_digest((function, args, sorted(kwargs.items())))
         token = hashlib.sha256(self._made_by + content).hexdigest()
         self._asked.add(token)
-        data = self._kept.read(token)
-        if data is None:
-            data = _computed(token, lambda: encoded(function(*args, **kwargs)))
-            self._kept.write(token, data)
+        kept = self._kept.read(token)
+        if kept is not None:
+            try:
+                again: R = decoded(kept)
+                return again
+            except ValueError as trouble:
+                _log.warning("a piece that somebody else wrote is replaced: %s", trouble)
+        data = _computed(token, lambda: encoded(function(*args, **kwargs)))
+        self._kept.write(token, data)
         found: R = decoded(data)  # now too, so that a search made again goes on with the same
         return found
 

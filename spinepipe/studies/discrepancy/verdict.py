@@ -4,7 +4,6 @@ Fields are the keys of the file, in its order. Sentences are for people: what a 
 field of its own.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
@@ -13,6 +12,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from spinepipe.marks import read_json
 from spinepipe.studies.discrepancy.verdict_imperfections import Imperfections, WithheldEffect
 from spinepipe.studies.discrepancy.verdict_unnamed import Part, Reason, Tabulated, Unknown
 
@@ -288,9 +288,9 @@ def read_verdict(path: str | Path) -> Verdict:
     Raises
     ------
     ValueError
-        As `verdict_of` does.
+        As `verdict_of` does, and for a file that is not as it was written.
     """
-    return verdict_of(json.loads(Path(path).read_text(encoding="utf-8")))
+    return verdict_of(read_json(path))
 
 
 def plain_data(verdict: Verdict) -> dict[str, Any]:

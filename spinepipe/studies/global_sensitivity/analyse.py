@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
@@ -34,7 +33,7 @@ from spinepipe.studies.global_sensitivity.tables import (
     INDICES,
     RESPONSES,
 )
-from spinepipe.tables import Table, to_arrow, write
+from spinepipe.tables import Table, read, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
@@ -243,4 +242,4 @@ def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Itera
 
 def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:
     """Rows of all blocks; they come in the order of the samples."""
-    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])
+    return pa.concat_tables([read(path, columns) for path in blocks])

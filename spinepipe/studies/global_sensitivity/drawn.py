@@ -3,12 +3,12 @@
 from functools import lru_cache
 
 import numpy as np
-import pyarrow.parquet as pq
 
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.tables import read
 
 
 def design_of(study: GlobalSensitivity) -> Design:
@@ -36,6 +36,6 @@ def drawn_values(path: str, study: GlobalSensitivity, part: slice) -> Array:
 
 @lru_cache(maxsize=2)
 def _values(where: Stamp, factors: int) -> Array:
-    column = pq.read_table(where[0], columns=["value"]).column("value")
+    column = read(where[0], ["value"]).column("value")
     values: Array = column.to_numpy().reshape(-1, factors)
     return values

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.stats import binom
 
@@ -19,6 +18,7 @@ from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.indices import kept
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.tables import EVERY
+from spinepipe.tables import read
 
 THIRDS = ("low", "middle", "high")
 ENDS = {"low": "lowest_third", "high": "highest_third"}
@@ -138,4 +138,4 @@ def _thirds(design: Design, column: int, failed: NDArray[np.bool_]) -> dict[str,
 
 
 def _read(blocks: Sequence[str], columns: list[str]) -> pa.Table:
-    return pa.concat_tables([pq.read_table(path, columns=columns) for path in blocks])
+    return pa.concat_tables([read(path, columns) for path in blocks])

@@ -1,16 +1,16 @@
 """The kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
+from spinepipe.studies.joint_pose_sensitivity.ranking import is_whole, ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
@@ -279,9 +279,9 @@ def _set_simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
     """A set of the ranking, where a pose is simulated with one."""
     if place["stiffness"] == "calibrated":
         return []
-    best = Path(expected.root, expected.files.folder, "best.json")
+    best = os.path.join(expected.root, expected.files.folder, "best.json")
     chosen = place["specimen"], place["stiffness"]
-    return [ranked_set(str(best), *chosen) if best.is_file() else ""]
+    return [ranked_set(best, *chosen) if is_whole(best) else ""]
 
 
 _SOLVING = ("loading", "settle_time_s")

@@ -7,7 +7,6 @@ from statistics import mode
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
@@ -15,6 +14,7 @@ from spinepipe.cohort.load_tests import loaded_coordinate
 from spinepipe.effects.contract import Array
 from spinepipe.studies.range_of_motion.load_steps import all_cases
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.tables import opened
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 ROWS_AT_A_TIME = 50_000
@@ -54,14 +54,15 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
     motion = np.full((*sizes, len(cohort.joint_names), 6), np.nan)
     asked = np.zeros(sizes, dtype=bool)
     names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
-    for rows in pq.ParquetFile(path).iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
-        rows = rows.filter(rows["largest_load"])
-        at = {name: _positions(rows[name], values) for name, values in names.items()}
-        at |= {name: rows[name].to_numpy() for name in ("pose", "stiffness")}
-        place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
-        values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
-        motion[place] = np.column_stack(values)
-        asked[place[:4]] = True
+    with opened(path) as file:
+        for rows in file.iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
+            rows = rows.filter(rows["largest_load"])
+            at = {name: _positions(rows[name], values) for name, values in names.items()}
+            at |= {name: rows[name].to_numpy() for name in ("pose", "stiffness")}
+            place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
+            values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
+            motion[place] = np.column_stack(values)
+            asked[place[:4]] = True
     driven = _driven(study, cohort)
     loaded = tuple(
         driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)

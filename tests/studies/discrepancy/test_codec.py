@@ -237,6 +237,30 @@ def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:
         decoded(written(["data", name, "true"]))
 
 
+def test_the_program_is_not_run_by_its_name() -> None:
+    """To import `spinepipe.cli.__main__` would be to run it, and to exit."""
+    with pytest.raises(ValueError, match="is not of spinepipe"):
+        decoded(written(["data", "spinepipe.cli.__main__:main", "true"]))
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        ["data", "spinepipe.no_such_room:Data"],
+        ["data", "spinepipe.status:NoSuchName"],
+        ["data", "spinepipe.tables.schema:Table", "name"],
+        ["enum", "spinepipe.status:Status", "no_such_member"],
+        ["array", "<f8", [2], "C", 0],
+        ["no such tag"],
+        ["same", 7],
+        [],
+    ],
+)
+def test_what_was_not_written_here_is_one_kind_of_error(structure: Any) -> None:
+    with pytest.raises(ValueError, match=r"\S"):
+        decoded(written(structure))
+
+
 def test_nothing_is_unpickled() -> None:
     """An array of objects is a pickle inside of an npz: numpy is told not to read it."""
     objects = np.empty(1, dtype=object)

@@ -2,6 +2,7 @@
 
 import io
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 from spinepipe.effects import Spread
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy import store as store_module
-from spinepipe.studies.discrepancy.kept import MARK, SUFFIX
+from spinepipe.studies.discrepancy.kept import MARK, SUFFIX, Kept
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.store import Store, content_digest
 
@@ -329,3 +330,69 @@ def test_two_runs_at_once_come_to_the_same(tmp_path: Path) -> None:
     assert [ended(one) for one in both] == [(0, "2160.0", "")] * 2
     assert search_of(Store(tmp_path / "store", MODULE), 6) == 2160.0
     assert CALLS == []
+
+
+class Trap:
+    """Unpickled, it makes a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.mkdir, (str(self._folder),)
+
+
+def objects(trap: Trap) -> bytes:
+    """An npz whose structure is an array of objects, which numpy writes as a pickle."""
+    array = np.empty(1, dtype=object)
+    array[0] = trap
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=True, structure=array)
+    return buffer.getvalue()
+
+
+PLANTED: dict[str, Callable[[Trap], bytes]] = {
+    "a pickle": pickle.dumps,
+    "an array of objects": objects,
+    "no structure": lambda trap: b"PK\5\6" + bytes(18),
+}
+
+
+@pytest.mark.parametrize("what", PLANTED)
+@pytest.mark.parametrize("sealed", [True, False])
+def test_what_somebody_planted_is_not_run_and_computed_again(
+    tmp_path: Path, what: str, sealed: bool
+) -> None:
+    """Bare, and in an envelope that verifies, as anybody can make it who knows the format."""
+    folder, sprung = tmp_path / "store", tmp_path / "sprung"
+    Store(folder, MODULE)(scaled, of(1.0))
+    (piece,) = folder.iterdir()
+    content = PLANTED[what](Trap(sprung))
+    if sealed:
+        Kept(folder).write(piece.stem, content)
+    else:
+        piece.write_bytes(content)
+    found = Store(folder, MODULE)(scaled, of(1.0))
+    assert CALLS == [2.0, 2.0]
+    np.testing.assert_array_equal(found.mean.ravel(), [2.0])
+    assert not sprung.exists()
+    Store(folder, MODULE)(scaled, of(1.0))
+    assert CALLS == [2.0, 2.0]  # it was replaced
+
+
+def test_a_planted_link_is_not_followed(tmp_path: Path) -> None:
+    folder = tmp_path / "store"
+    Store(folder, MODULE)(scaled, of(1.0))
+    (piece,) = folder.iterdir()
+    piece.rename(tmp_path / "elsewhere")
+    piece.symlink_to(tmp_path / "elsewhere")
+    Store(folder, MODULE)(scaled, of(1.0))
+    assert CALLS == [2.0, 2.0]
+    assert not piece.is_symlink()
+    assert (tmp_path / "elsewhere").exists()
+
+
+def test_the_trap_works(tmp_path: Path) -> None:
+    """Else the tests above would show nothing."""
+    pickle.loads(pickle.dumps(Trap(tmp_path / "sprung")))
+    assert (tmp_path / "sprung").is_dir()
