@@ -124,8 +124,8 @@ def table(ended: Sequence[Ended], asked: str) -> str:
     lines = [
         "# Mutants",
         "",
-        "Small faults put into the code, place by place at random, and whether the tests nearest to",
-        "them see them. What lives is looked at: either a test is missing, or the fault changes",
+        "Small faults put into the code, place by place at random, and whether the tests nearest",
+        "to them see them. What lives is looked at: either a test is missing, or the fault changes",
         "nothing that can be seen.",
         "",
         f"`{asked}`, {date.today().isoformat()}",

@@ -1,4 +1,4 @@
-"""Which mutants are tried: places of the code drawn evenly, and at each one of the ways to spoil it.
+"""Which mutants are tried: places of the code drawn evenly, at each one of the ways to spoil it.
 
 The ways are those of Cosmic Ray. Drawn by place, as an addition can be spoilt in ten ways and a
 comparison in seven, and the ten would be nearly one mutant ten times.
