@@ -117,3 +117,61 @@ def test_what_is_proven_is_what_decays(
     by_forms = stability.proven_by_forms(lanes)
     assert not (by_forms & ~stands).any()
     assert by_forms.sum() >= 0.9 * stands.sum()
+
+
+def growth(mass: Array, tangent: Array) -> float:
+    """Largest real part of the rates l of M l^2 + l + K, over that of all their sizes."""
+    n = len(mass)
+    inverse = np.linalg.inv(mass)
+    rates = np.linalg.eigvals(
+        np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ tangent, -inverse]])
+    )
+    return float(rates.real.max() / np.abs(rates).max())
+
+
+def fluttering(mass: Array, tangent: Array, share: float) -> float | None:
+    """A factor for the damping at which motion grows; None where springs do not hold, or none does.
+
+    That factor is ``share`` of the one from which on motion decays, found by halving.
+    """
+    if np.linalg.eigvalsh(tangent + tangent.T).min() <= 0.0:
+        return None
+    grows, decaying = 1e-6, 1e3
+    if growth(mass / grows, tangent / grows) <= 0.0:
+        return None
+    for _ in range(40):
+        middle = np.sqrt(grows * decaying)
+        if growth(mass / middle, tangent / middle) > 0.0:
+            grows = middle
+        else:
+            decaying = middle
+    factor = float(share * grows)  # with little damping a spine may stand again
+    return factor if growth(mass / factor, tangent / factor) > 1e-6 else None
+
+
+@pytest.mark.parametrize("share", [0.9, 0.3, 1e-3])
+@pytest.mark.parametrize("n_joints", [1, 2, 4])
+def test_what_flutters_is_never_proven(n_joints: int, share: float) -> None:
+    """Springs hold, and moments that keep their direction in ground feed a growing motion.
+
+    There is a little less damping than it takes: only the tangent's skew part tells such a spine
+    from a stable one.
+    """
+    rng = np.random.default_rng(300 + n_joints)
+    made, models, places = [], [], []
+    for size in np.geomspace(0.5, 20.0, 60):
+        chain = loaded(rng, n_joints, size, 1.0)
+        q = rng.normal(0.0, 0.1, (n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
+        factor = fluttering(*by_pybullet(chain, q), share)
+        if factor is not None:
+            model = bridge.spine_model(chain)
+            made.append(chain)
+            models.append(replace(model, damping=factor * model.damping))
+            places.append(q)
+    assert len(made) >= 3
+    stack = Stack.of(models, [(n, bridge.load_case(chain)) for n, chain in enumerate(made)])
+    all_q = np.array(places)
+    tangents = stack.bound(np.arange(len(made)), {}).held(all_q).tangent
+    assert not stability.surely_stable(stack.chains, stack.loads, all_q, tangents).any()
+    lanes = stability.lanes_of(stack.chains, stack.loads, all_q, tangents)
+    assert not stability.proven_by_forms(lanes).any()

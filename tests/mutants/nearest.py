@@ -1,0 +1,83 @@
+"""Which test files are near a file of the library: those that reach it in fewest imports."""
+
+import ast
+from collections import deque
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+NEVER = ("workflow", "validation", "mutants", "generators", "cases")
+"""Folders of tests that run whole studies, or that are no tests."""
+
+HELPERS = ROOT / "tests" / "cases"
+
+
+def nearest(path: str, count: int, beyond: int = 0) -> list[str]:
+    """Test files near a file, the nearest first; of equally near ones those that import least.
+
+    A file named like the module is nearest of all.
+
+    Parameters
+    ----------
+    beyond : how many of the nearest are left out.
+    """
+    module, stem = path.removesuffix(".py").replace("/", "."), Path(path).stem
+    ranked = []
+    for test in _tests():
+        steps = _steps(test)
+        if module in steps:
+            named = test.stem in (f"test_{stem}", f"test_{stem}s")
+            ranked.append((not named, steps[module], len(steps), _name(test)))
+        elif stem in test.read_text():  # effects are asked for by name
+            ranked.append((True, 3, len(steps), _name(test)))
+    return [name for *_, name in sorted(ranked)][beyond : beyond + count]
+
+
+@cache
+def _tests() -> tuple[Path, ...]:
+    found = sorted((ROOT / "tests").rglob("test_*.py"))
+    return tuple(path for path in found if not {*path.relative_to(ROOT).parts} & {*NEVER})
+
+
+def _name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@cache
+def _steps(test: Path) -> dict[str, int]:
+    """How many imports each module is from a test file."""
+    found: dict[str, int] = {}
+    waiting = deque([(name, 1) for name in _imports(test)])
+    while waiting:
+        name, steps = waiting.popleft()
+        path = _source(name)
+        if path is None or name in found:
+            continue
+        found[name] = steps
+        # a package hands on what its modules define
+        further = steps if path.name == "__init__.py" else steps + 1
+        waiting.extend((one, further) for one in _imports(path))
+    return found
+
+
+def _source(name: str) -> Path | None:
+    base = ROOT.joinpath(*name.split("."))
+    for path in (base / "__init__.py", base.with_suffix(".py"), HELPERS / f"{name}.py"):
+        if path.is_file():
+            return path
+    return None
+
+
+@cache
+def _imports(path: Path) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_named(ast.walk(ast.parse(path.read_text())))))
+
+
+def _named(nodes: Iterable[ast.AST]) -> Iterable[str]:
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            yield node.module

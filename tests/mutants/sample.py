@@ -1,0 +1,111 @@
+"""Which mutants are tried: places of the code drawn evenly, at each one of the ways to spoil it.
+
+The ways are those of Cosmic Ray. Drawn by place, as an addition can be spoilt in ten ways and a
+comparison in seven, and the ten would be nearly one mutant ten times.
+"""
+
+import random
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosmic_ray.ast import ast_nodes, get_ast_from_path
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+from parso.tree import NodeOrLeaf
+
+ROOT = Path(__file__).resolve().parents[2]
+
+AREAS = {
+    "statics": ("spinepipe/statics",),
+    "effects": ("spinepipe/effects",),
+    "calibrate": ("spinepipe/calibrate",),
+    "statistics": ("spinepipe/statistics",),
+    "sensitivity": ("spinepipe/sensitivity",),
+    "search": ("spinepipe/studies/discrepancy/search", "spinepipe/studies/discrepancy/proof"),
+    "films": ("spinepipe/studies/scoliosis",),
+    "trunk": ("spinepipe/muscles",),
+    "tracking": ("spinepipe/motion",),
+}
+"""Folders of each area that must be safe."""
+
+LEFT_OUT = ("figures", "__init__.py", "settings.py", "tables.py", "kind.py", "page.py")
+"""Files of an area that compute nothing: words, drawings, declarations."""
+
+ANNOTATIONS = ("tfpdef", "annassign")
+"""Parts of the grammar that Python does not compute with."""
+
+_ENDS_AT_ONCE = ("LShift", "RShift", "BitOr", "BitAnd", "BitXor")
+"""Of floats these are errors, which any test sees: they would only make the share look good."""
+
+_NO_FAULT = ("core/ExceptionReplacer", "core/RemoveDecorator", "core/AddNot")
+"""Ways left out: what is raised is asked by name elsewhere; a decorator lost ends the import; `not`
+before a condition is its opposite comparison once more."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One fault: ``occurrence`` of an operator's places in a file."""
+
+    area: str
+    path: str
+    line: int
+    operator: str
+    occurrence: int
+
+    def code(self) -> str:
+        """The spoilt file.
+
+        Raises
+        ------
+        ValueError
+            Where there is nothing to spoil any more.
+        """
+        text = (ROOT / self.path).read_text()
+        spoilt = mutate_code(text, get_operator(self.operator)(), self.occurrence)
+        if spoilt is None:
+            raise ValueError(f"{self.path}:{self.line}: nothing to spoil by {self.operator}")
+        return str(spoilt)
+
+
+def drawn(area: str, count: int, seed: int) -> list[Mutant]:
+    """That many mutants of an area, at different places."""
+    rng = random.Random(f"{area}/{seed}")
+    places: dict[tuple[str, int, int], list[Mutant]] = defaultdict(list)
+    for path in _files(AREAS[area]):
+        for place, mutant in _every(area, path):
+            places[place].append(mutant)
+    chosen = rng.sample(sorted(places), min(count, len(places)))
+    return [rng.choice(places[place]) for place in chosen]
+
+
+def _files(folders: Sequence[str]) -> list[Path]:
+    every = (path for folder in folders for path in sorted((ROOT / folder).rglob("*.py")))
+    return [path for path in every if not {*path.relative_to(ROOT).parts} & {*LEFT_OUT}]
+
+
+def _every(area: str, path: Path) -> Iterator[tuple[tuple[str, int, int], Mutant]]:
+    """Each mutant of a file with its place: file, line, column."""
+    nodes = list(ast_nodes(get_ast_from_path(path)))
+    name = path.relative_to(ROOT).as_posix()
+    for operator in operator_names():
+        made = get_operator(operator)
+        if made.arguments() or operator in _NO_FAULT or operator.endswith(_ENDS_AT_ONCE):
+            continue
+        found = [(node, at) for node in nodes for at in made().mutation_positions(node)]
+        for occurrence, (node, ((line, column), _)) in enumerate(found):
+            if not _is_annotation(node):
+                yield (name, line, column), Mutant(area, name, line, operator, occurrence)
+
+
+def _is_annotation(node: NodeOrLeaf | None) -> bool:
+    """Whether a node stands in the type of an argument, a variable or what is returned."""
+    while node is not None and node.parent is not None:
+        parent = node.parent
+        if parent.type in ANNOTATIONS:
+            return True
+        if parent.type == "funcdef" and getattr(parent, "annotation", None) is node:
+            return True
+        node = parent
+    return False
