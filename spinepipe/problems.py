@@ -121,9 +121,13 @@ def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
     Messages stay as long as a person reads, however many rows a file has.
     """
     found = list(problems)
-    found = _told_in_one(found, lambda p: replace(p, row=None), MOST_THE_SAME, 1)
+    found = _told_in_one(found, _but_for_the_row, MOST_THE_SAME, 1)
     found = _told_in_one(found, _likeness, MOST_ALIKE, MOST_ALIKE)
     return tuple(_told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE))
+
+
+def _but_for_the_row(problem: Problem) -> Hashable:
+    return problem.file, problem.column, problem.found, problem.allowed, problem.remedy
 
 
 def _told_in_one(

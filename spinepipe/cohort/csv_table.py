@@ -16,11 +16,11 @@ from spinepipe.problems import Problem, Spelling
 
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
-MOST_ROWS = 300_000
+MOST_ROWS = 200_000
 
 MOST_COLUMNS = 1000
 
-MOST_CELLS = 8_000_000
+MOST_CELLS = 4_000_000
 """Cells of one file; files within these bounds are read and checked in seconds."""
 
 

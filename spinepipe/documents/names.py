@@ -7,6 +7,7 @@ alike must be alike, and none may mean anything to a shell, a path or a formula.
 import re
 import unicodedata
 from collections.abc import Iterator
+from functools import cache
 
 LONGEST_NAME = 60
 """Characters; a path of several names stays within what systems bear (255 bytes a folder)."""
@@ -29,6 +30,9 @@ ALLOWED_FOLDER = (
 RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 """Names that Windows keeps for devices."""
 
+PLAIN = re.compile(rf"[A-Za-z0-9][A-Za-z0-9 _]{{0,{LONGEST_NAME - 1}}}")
+"""Names that need no closer look, but for those that Windows keeps."""
+
 ALPHABETS = ("LATIN", "GREEK", "CYRILLIC", "ARMENIAN", "CHEROKEE", "COPTIC")
 """Those whose letters are taken for each other's (Japanese, for one, is written in three)."""
 
@@ -44,6 +48,8 @@ _TWINS = dict(
 
 def name_fault(name: str) -> str | None:
     """What is wrong with a name, in words; None where nothing is."""
+    if PLAIN.fullmatch(name) and not RESERVED.fullmatch(name):
+        return None
     return next(_faults(name), None)
 
 
@@ -79,6 +85,9 @@ def _is_part_of_a_word(character: str) -> bool:
 
 def look_alike(name: str) -> str | None:
     """Letters that look like others: of several alphabets, or of a form of their own."""
+    if name.isascii():
+        return None
+    name = name[:LONGEST_NAME]
     of_letters = [(c, _alphabet(c)) for c in name if _alphabet(c)]
     alphabets = list(dict.fromkeys(alphabet for _, alphabet in of_letters))
     if len(alphabets) > 1:
@@ -94,6 +103,7 @@ def look_alike(name: str) -> str | None:
     return None
 
 
+@cache
 def _alphabet(character: str) -> str | None:
     word = unicodedata.name(character, "").partition(" ")[0]
     return word if word in ALPHABETS and character.isalpha() else None
