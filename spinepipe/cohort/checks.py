@@ -298,9 +298,9 @@ def check_names(draft: Draft) -> Iterator[Problem]:
             if names and column in form.names and stem != "specimens":
                 wildcard = ("*",) if (stem, column) in FOR_ALL else ()
                 yield from _unknown(draft, stem, column, (*names, *wildcard))
-        for column in form.columns:
-            if column.name in form.keys and column.kind == "text" and column.name not in known:
-                yield from _unfit(draft, stem, column.name)
+        for one in form.columns:
+            if one.name in form.keys and one.kind == "text" and one.name not in known:
+                yield from _unfit(draft, stem, one.name)
 
 
 def _unfit(draft: Draft, stem: str, column: str) -> Iterator[Problem]:

@@ -96,7 +96,7 @@ def look_alike(name: str) -> str | None:
         return f"'{name}', in which {_shown(odd)} looks like another letter"
     twins = "".join(_TWINS.get(c, c) for c in name)
     if of_letters and all(c in _TWINS for c, _ in of_letters):
-        return f"'{name}', whose letters look like '{twins}' but are {alphabets[0].title()}"
+        return f"'{name}', whose letters look like '{twins}' but are {str(alphabets[0]).title()}"
     plain = unicodedata.normalize("NFKC", name)
     if plain != name:
         return f"'{name}', which looks like '{plain}' but is written with other characters"

@@ -68,7 +68,7 @@ def read_yaml(path: Path, file: str) -> tuple[Document | None, list[Problem]]:
 _PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-class _Loader(_PARSER):
+class _Loader(_PARSER):  # type: ignore[misc]
     """YAML's safe loader which also takes 1e5 for a number, as everybody means it."""
 
 
@@ -116,8 +116,12 @@ def _beyond_bounds(text: str, file: str) -> Iterator[Problem]:
             found, allowed = "more keys and values than are read", f"at most {MOST_VALUES}"
             fault = found, allowed, "take out what does not belong, or split it"
         if fault is not None:
-            yield Problem(file, event.start_mark.line + 1, None, *fault)
+            yield Problem(file, _line(event), None, *fault)
             return
+
+
+def _line(event: yaml.Event) -> int | None:
+    return None if event.start_mark is None else event.start_mark.line + 1
 
 
 def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
@@ -128,8 +132,9 @@ def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
         return None
     if event.anchor is not None:
         return f"the anchor '&{event.anchor}'", "values without anchors", "delete it, or quote text"
-    if getattr(event, "tag", None) is not None:
-        return f"the tag '{event.tag}'", "values without tags", "delete it, or put text in quotes"
+    tag = getattr(event, "tag", None)
+    if tag is not None:
+        return f"the tag '{tag}'", "values without tags", "delete it, or put text in quotes"
     if isinstance(event, yaml.ScalarEvent):
         return _length_fault(event.value)
     return None
