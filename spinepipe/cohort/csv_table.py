@@ -16,7 +16,7 @@ from spinepipe.problems import Problem, Spelling
 
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
-MOST_ROWS = 200_000
+MOST_ROWS = 150_000
 
 MOST_COLUMNS = 1000
 

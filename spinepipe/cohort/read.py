@@ -31,7 +31,7 @@ __all__ = ["read"]
 
 MOST_SPECIMENS = 1000
 
-MOST_APPLIED = 200_000
+MOST_APPLIED = 150_000
 """Rows of loads.csv with * and empty cycles written out: specimens x cycles x steps."""
 
 

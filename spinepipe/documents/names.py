@@ -78,6 +78,7 @@ def _faults(name: str) -> Iterator[str]:
         yield mixed
 
 
+@cache
 def _is_part_of_a_word(character: str) -> bool:
     """Letters, digits, and marks that belong to letters."""
     return unicodedata.category(character)[0] in "LNM"
