@@ -1,13 +1,21 @@
 """What is wrong with an input: one located sentence per problem, all problems at once."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from heapq import nsmallest
 
-__all__ = ["InputError", "Problem", "closest", "did_you_mean", "one_of"]
+__all__ = ["InputError", "Problem", "Spelling", "closest", "did_you_mean", "one_of"]
 
 LONGEST_FOUND = 160
 """Longer findings are cut: a message is read on a terminal."""
+
+LONGEST_ALLOWED = 1500
+
+MOST_LISTED = 60
+"""Allowed names that are listed; beyond them their number is told."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +30,8 @@ class Problem:
     found : what stands there.
     allowed : what may stand there.
     remedy : what to do.
+    others : how many more have the same fault and are told in this line.
+    rows : the lines of those.
     """
 
     file: str
@@ -30,18 +40,48 @@ class Problem:
     found: str
     allowed: str
     remedy: str
+    others: int = 0
+    rows: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         """The problem as one line."""
-        place = [self.file]
+        place = [_cut(self.file)]
         if self.row is not None:
             place.append(f"line {self.row}")
         if self.column is not None:
-            place.append(self.column)
-        text = (
-            f"{', '.join(place)}: found {_cut(self.found)}; allowed: {self.allowed}; {self.remedy}"
-        )
+            place.append(_cut(self.column))
+        parts = [
+            f"{', '.join(place)}: found {_cut(self.found)}",
+            f"allowed: {_cut(self.allowed, LONGEST_ALLOWED)}",
+            _cut(self.remedy, LONGEST_ALLOWED),
+        ]
+        if self.others:
+            parts.append(self._more())
+        text = "; ".join(parts)
         return " ".join(text.split())
+
+    def _more(self) -> str:
+        """How many others there are, and in which lines."""
+        if not self.rows:
+            return f"and {self.others} more"
+        return f"and {self.others} row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
+
+
+MOST_SPANS = 5
+
+
+def _spans(rows: Sequence[int]) -> str:
+    """Numbers in order, those in a row as first-last; of many spans the first few and the last."""
+    spans: list[list[int]] = []
+    for row in sorted(set(rows)):
+        if spans and row == spans[-1][1] + 1:
+            spans[-1][1] = row
+        else:
+            spans.append([row, row])
+    words = [str(low) if low == high else f"{low}-{high}" for low, high in spans]
+    return ", ".join(
+        words if len(words) <= MOST_SPANS else [*words[: MOST_SPANS - 1], "…", words[-1]]
+    )
 
 
 class InputError(Exception):
@@ -49,13 +89,14 @@ class InputError(Exception):
 
     Attributes
     ----------
-    problems : tuple of Problem, without repetitions, in the order in which they were found.
+    problems : tuple of Problem, without repetitions, in the order in which they were found; many
+        that are alike are told in one, see `gathered`.
     """
 
     problems: tuple[Problem, ...]
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(dict.fromkeys(problems))
+        self.problems = gathered(dict.fromkeys(problems))
         super().__init__(self.problems)
 
     def __str__(self) -> str:
@@ -65,10 +106,81 @@ class InputError(Exception):
         return "\n".join([f"{head}:", *(f"  {problem}" for problem in self.problems)])
 
 
+MOST_THE_SAME = 3
+"""Rows with the very same fault that are told one by one; of more the first alone is."""
+
+MOST_ALIKE = 10
+"""Faults of one column alike but for names and numbers that are told one by one."""
+
+MOST_OF_A_FILE = 100
+
+
+def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
+    """Problems with a bound on their number: what is alike is counted, with its lines.
+
+    Messages stay as long as a person reads, however many rows a file has.
+    """
+    found = list(problems)
+    found = _told_in_one(found, _but_for_the_row, MOST_THE_SAME, 1)
+    found = _told_in_one(found, _likeness, MOST_ALIKE, MOST_ALIKE)
+    return tuple(_told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE))
+
+
+def _but_for_the_row(problem: Problem) -> Hashable:
+    return problem.file, problem.column, problem.found, problem.allowed, problem.remedy
+
+
+def _told_in_one(
+    problems: list[Problem], alike: Callable[[Problem], Hashable], most: int, kept: int
+) -> list[Problem]:
+    """Of more than ``most`` problems that are alike the first ``kept``, the last with the rest."""
+    keys = list(map(alike, problems))
+    groups: dict[Hashable, list[Problem]] = defaultdict(list)
+    for key, problem in zip(keys, problems, strict=True):
+        groups[key].append(problem)
+    told: list[Problem] = []
+    met: Counter[Hashable] = Counter()
+    for key, problem in zip(keys, problems, strict=True):
+        met[key] += 1
+        if len(groups[key]) <= most or met[key] < kept:
+            told.append(problem)
+        elif met[key] == kept:
+            told.append(_with_rest(problem, groups[key][kept:]))
+    return told
+
+
+def _with_rest(problem: Problem, rest: list[Problem]) -> Problem:
+    rows = [row for one in rest for row in ((one.row,) if one.row else ()) + one.rows]
+    others = sum(1 + one.others for one in rest)
+    return replace(problem, others=problem.others + others, rows=(*problem.rows, *rows))
+
+
+_NAME_OR_NUMBER = re.compile(r"'[^']*'|[0-9][0-9.e+-]*")
+
+
+def _likeness(problem: Problem) -> Hashable:
+    """What problems have in common that differ in names and numbers alone."""
+    found = _NAME_OR_NUMBER.sub("#", _cut(problem.found))
+    keyed = problem.file.endswith(".csv")
+    return problem.file, problem.column if keyed else None, found, problem.allowed
+
+
+MOST_COMPARED = 300
+"""Known names that an unknown one is compared with, those of the most similar length."""
+
+LONGEST_COMPARED = 60
+"""Characters of a name that is compared with others."""
+
+
 def closest(name: str, known: Iterable[str]) -> str | None:
     """The known name that is most like ``name``, or the only one that begins with it."""
-    names = list(known)
-    matches = get_close_matches(name, names, n=1, cutoff=0.6)
+    if len(name) > LONGEST_COMPARED:
+        return None
+    names = [other for other in known if len(other) <= LONGEST_COMPARED]
+    near = names
+    if len(names) > MOST_COMPARED:
+        near = nsmallest(MOST_COMPARED, names, key=lambda other: abs(len(other) - len(name)))
+    matches = get_close_matches(name, near, n=1, cutoff=0.6)
     longer = [other for other in names if other.startswith(name)]
     if not matches and len(longer) == 1:
         return longer[0]
@@ -81,11 +193,33 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     return f"did you mean '{match}'?" if match else otherwise
 
 
+class Spelling:
+    """Remedies for unknown names in many rows; each name is looked up once, and only the first few.
+
+    More are not told one by one, see `gathered`.
+    """
+
+    def __init__(self, known: Iterable[str], otherwise: str) -> None:
+        """``known``, ``otherwise`` : as `did_you_mean` takes them."""
+        self.known = tuple(known)
+        self._otherwise = otherwise
+        self._found: dict[str, str] = {}
+        self.allowed = one_of(self.known)
+
+    def remedy(self, name: str) -> str:
+        """What to do about an unknown name."""
+        if name not in self._found and len(self._found) < 2 * MOST_ALIKE:
+            self._found[name] = did_you_mean(name, self.known, self._otherwise)
+        return self._found.get(name, self._otherwise)
+
+
 def one_of(names: Iterable[str]) -> str:
-    """The allowed names as text."""
+    """The allowed names as text; of very many the first ones and their number."""
     listed = list(names)
-    return "one of " + ", ".join(listed) if listed else "none"
+    rest = len(listed) - MOST_LISTED
+    more = f" and {rest} more" if rest > 0 else ""
+    return "one of " + ", ".join(listed[:MOST_LISTED]) + more if listed else "none"
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_FOUND else text[: LONGEST_FOUND - 3] + "..."
+def _cut(text: str, longest: int = LONGEST_FOUND) -> str:
+    return text if len(text) <= longest else text[: longest - 3] + "..."

@@ -37,6 +37,10 @@ def run(options: argparse.Namespace) -> int:
     root: Path = options.root
     told: set[Problem] = set()
     warned: dict[str, tuple[Problem, ...]] = {}
+    if not options.names:
+        warned["config/studies"] = tuple(studies.strays(root))
+        for warning in warned["config/studies"]:
+            print(f"warn  {warning}")
     sound = [_tell(title, look, told, warned) for title, look in _tasks(root, options.names)]
     if told:
         print(f"\n{count(len(told), 'problem')} in all; nothing was changed.")

@@ -5,22 +5,21 @@ from pathlib import Path
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.documents.strays import files_in, folders_in
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, Study
 
-STUDIES = Path("config") / "studies"
-
 
 def study_names(root: Path) -> list[str]:
     """Names of all study files."""
-    return sorted(path.stem for path in (root / STUDIES).glob("*.yaml"))
+    return [path.stem for path in files_in(root / studies.STUDIES, studies.ENDING)]
 
 
 def cohort_names(root: Path) -> list[str]:
     """Names of all cohort folders."""
-    return sorted(path.name for path in (root / COHORTS).glob("*") if path.is_dir())
+    return [path.name for path in folders_in(root / COHORTS)]
 
 
 def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:

@@ -6,6 +6,7 @@ for millimetres show here)? Can the bodies exist, and are all there that gravity
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from math import isnan
 
 import numpy as np
 
@@ -145,6 +146,8 @@ LARGEST_GYRATION_M = 1.0
 def check_bodies(draft: Draft) -> Iterator[Problem]:
     """Problems of ``bodies.csv`` beyond its cells and names."""
     for line, (mass, *inertia) in draft.rows("bodies", "mass_kg", *INERTIA):
+        if all(map(isnan, inertia)):
+            continue
         yield from _inertia_problems(draft.file("bodies"), line, mass, np.array(inertia))
     yield from _missing(draft)
     yield from _spacing(draft)
@@ -152,8 +155,6 @@ def check_bodies(draft: Draft) -> Iterator[Problem]:
 
 def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator[Problem]:
     empty = np.isnan(six)
-    if empty.all():
-        return
     if empty.any():
         column = INERTIA[int(np.argmax(empty))]
         remedy = "fill the row up, with 0 where a product is zero, or empty all six"

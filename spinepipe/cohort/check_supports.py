@@ -7,7 +7,7 @@ from spinepipe.cohort.cohort import EVERYONE
 from spinepipe.cohort.draft import Draft, applied_loads
 from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Fixed, fixed
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 WORDS = {"coordinate": COORDINATES, "state": STATES, "reaction": REACTIONS}
@@ -44,23 +44,24 @@ def _places(draft: Draft) -> Iterator[Problem]:
 
 
 def _words(draft: Draft) -> Iterator[Problem]:
-    for column, known in WORDS.items():
+    for column, words in WORDS.items():
+        known = Spelling(words, "correct it")
         for line, (cell,) in draft.rows("supports", column):
-            if isinstance(cell, str) and cell not in known:
+            if isinstance(cell, str) and cell not in words:
                 place = (draft.file("supports"), line, column)
-                remedy = did_you_mean(cell, known, "correct it")
-                yield Problem(*place, f"'{cell}'", one_of(known), remedy)
+                yield Problem(*place, f"'{cell}'", known.allowed, known.remedy(cell))
 
 
 def _tests(draft: Draft) -> Iterator[Problem]:
-    known = list(dict.fromkeys(load.test for load in applied_loads(draft)))
+    tests = dict.fromkeys((EVERYONE, *(load.test for load in applied_loads(draft))))
+    known = Spelling(tests, "add its loads, zeros where nothing acts")
     if "loads" not in draft.tables and "loads" not in draft.absent:
         return
     for line, (test,) in draft.rows("supports", "test"):
-        if isinstance(test, str) and test not in (EVERYONE, *known):
+        if isinstance(test, str) and test not in tests:
             place = (draft.file("supports"), line, "test")
-            remedy = did_you_mean(test, known, "add its loads, zeros where nothing acts")
-            yield Problem(*place, f"unknown test '{test}'", one_of((EVERYONE, *known)), remedy)
+            remedy = known.remedy(test)
+            yield Problem(*place, f"unknown test '{test}'", known.allowed, remedy)
 
 
 def _without_values(draft: Draft) -> Iterator[Problem]:

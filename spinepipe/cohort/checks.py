@@ -6,7 +6,7 @@ was caused by a load that is given.
 """
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isnan
@@ -14,8 +14,9 @@ from math import isnan
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.draft import AppliedLoad, Draft
 from spinepipe.cohort.text import Document
+from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, look_alike, name_fault
 from spinepipe.model import MOST_JOINTS
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 
 REGIONS = "SLTC"
 """Sacral, lumbar, thoracic, cervical: caudal to cranial."""
@@ -50,8 +51,9 @@ def _chain_problems(document: Document, names: list[str], count: int) -> Iterato
     if count - 1 > MOST_JOINTS:
         allowed = f"at most {MOST_JOINTS}"
         yield Problem(*place, f"{count - 1} joints", allowed, "leave vertebrae out at an end")
-    for name in dict.fromkeys(names):
-        if names.count(name) > 1:
+        return
+    for name, times in Counter(names).items():
+        if times > 1:
             yield Problem(*place, f"'{name}' twice", "each vertebra once", "delete one")
     for lower, upper in pairwise(names):
         low, high = _height(lower), _height(upper)
@@ -62,7 +64,7 @@ def _chain_problems(document: Document, names: list[str], count: int) -> Iterato
 
 def _height(name: str) -> tuple[int, int] | None:
     """Sort key of an anatomical name, growing cranially; None for other names."""
-    match = re.fullmatch(r"([SLTC])(\d+)", name)
+    match = re.fullmatch(r"([SLTC])([0-9]{1,3})", name)
     return (REGIONS.index(match[1]), -int(match[2])) if match else None
 
 
@@ -132,12 +134,13 @@ def _preload(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     """A preload belongs to a test, and to a point of a vertebra if it is a force."""
     if "loads" not in draft.tables and "loads" not in draft.absent:
         return
-    tests = ("*", *dict.fromkeys(load.test for load in applied))
+    tests = dict.fromkeys(("*", *(load.test for load in applied)))
+    known = Spelling(tests, "add its loads, zeros where nothing else acts")
     for line, (test, *cells) in draft.rows("preload", "test", *POINT, *FORCE):
         if isinstance(test, str) and test not in tests:
             place = (draft.file("preload"), line, "test")
-            remedy = did_you_mean(test, tests, "add its loads, zeros where nothing else acts")
-            yield Problem(*place, f"unknown test '{test}'", one_of(tests), remedy)
+            remedy = known.remedy(test)
+            yield Problem(*place, f"unknown test '{test}'", known.allowed, remedy)
         if _pulls_without_a_point(tuple(cells)):
             place = (draft.file("preload"), line, "px_mm")
             remedy = "fill px_mm, py_mm, pz_mm"
@@ -235,7 +238,7 @@ def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
         yield Problem(file, None, None, "motion without loads", "motion with loads.csv", remedy)
         return
     known = _prefixes(applied)
-    tests = sorted({load.test for load in applied})
+    tests = Spelling(sorted({load.test for load in applied}), "add the load or delete the motion")
     reported = set()
     rows = draft.rows("motion", "specimen", "test", "cycle", "step")
     specimens = set(draft.specimens)  # rows of an unknown one are reported as such
@@ -259,13 +262,13 @@ def _prefixes(applied: list[AppliedLoad]) -> set[tuple[object, ...]]:
     return known
 
 
-def _problem(file: str, line: int, key: tuple[object, ...], tests: list[str]) -> Problem:
+def _problem(file: str, line: int, key: tuple[object, ...], tests: Spelling) -> Problem:
     column = ("test", "cycle", "step")[len(key) - 2]
     found = f"{column} '{key[-1]}' of specimen '{key[0]}', which has no load"
     allowed = "a specimen, test, cycle and step of loads.csv"
     remedy = "add the load or delete the motion"
-    if column == "test" and key[1] not in tests:
-        remedy = did_you_mean(str(key[1]), tests, remedy)
+    if column == "test" and key[1] not in tests.known:
+        remedy = tests.remedy(str(key[1]))
     return Problem(file, line, column, found, allowed, remedy)
 
 
@@ -277,17 +280,14 @@ FOR_ALL = {
 }
 """Tables and columns in which * stands for all."""
 
-SPECIMEN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""Specimens become folder names of results."""
-
 
 def check_names(draft: Draft) -> Iterator[Problem]:
-    """Unknown names in every table, and specimen names no folder can have."""
+    """Unknown names in every table, and names that no folder, figure or row can have."""
     for line, (name,) in draft.rows("specimens", "specimen"):
-        if isinstance(name, str) and not SPECIMEN_NAME.fullmatch(name):
-            allowed = "letters, digits, _ . - and a letter or digit first"
+        fault = folder_fault(name) if isinstance(name, str) else None
+        if fault is not None:
             place = (draft.file("specimens"), line, "specimen")
-            yield Problem(*place, f"'{name}'", allowed, "rename the specimen in every file")
+            yield Problem(*place, fault, ALLOWED_FOLDER, "rename the specimen in every file")
     known = {
         "specimen": draft.specimens,
         "vertebra": draft.vertebrae,
@@ -298,24 +298,41 @@ def check_names(draft: Draft) -> Iterator[Problem]:
             if names and column in form.names and stem != "specimens":
                 wildcard = ("*",) if (stem, column) in FOR_ALL else ()
                 yield from _unknown(draft, stem, column, (*names, *wildcard))
+        for one in form.columns:
+            if one.name in form.keys and one.kind == "text" and one.name not in known:
+                yield from _unfit(draft, stem, one.name)
+
+
+def _unfit(draft: Draft, stem: str, column: str) -> Iterator[Problem]:
+    """Names of tests, landmarks and the like that nothing can be called by."""
+    faults: dict[str, str | None] = {"*": None}
+    for line, (name,) in draft.rows(stem, column):
+        if isinstance(name, str):
+            if name not in faults:
+                faults[name] = name_fault(name)
+            fault = faults[name]
+            if fault is not None:
+                place = (draft.file(stem), line, column)
+                yield Problem(*place, fault, ALLOWED, "rename it in every file")
 
 
 def _unknown(draft: Draft, stem: str, column: str, names: tuple[str, ...]) -> Iterator[Problem]:
     allowed = set(names)
+    source = "specimens.csv" if column == "specimen" else "vertebrae in cohort.yaml"
+    known = Spelling(names, f"correct the name or add it to {source}")
+    turned = dict(zip(joint_names(draft.vertebrae[::-1]), draft.joint_names[::-1], strict=True))
     for line, (name,) in draft.rows(stem, column):
         if isinstance(name, str) and name not in allowed:
             place = (draft.file(stem), line, column)
-            remedy = _remedy(draft, column, name, names)
-            yield Problem(*place, f"unknown {column} '{name}'", one_of(names), remedy)
+            remedy = known.remedy(name)
+            if column == "joint" and name in turned:
+                remedy = f"a joint is named upper vertebra first: '{turned[name]}'"
+            found = f"unknown {column} {look_alike(name) or _quoted(name)}"
+            yield Problem(*place, found, known.allowed, remedy)
 
 
-def _remedy(draft: Draft, column: str, name: str, names: tuple[str, ...]) -> str:
-    source = "specimens.csv" if column == "specimen" else "vertebrae in cohort.yaml"
-    otherwise = f"correct the name or add it to {source}"
-    if column == "joint" and name in joint_names(draft.vertebrae[::-1]):
-        swapped = names[::-1][joint_names(draft.vertebrae[::-1]).index(name)]
-        return f"a joint is named upper vertebra first: '{swapped}'"
-    return did_you_mean(name, names, otherwise)
+def _quoted(name: str) -> str:
+    return f"'{name}'"
 
 
 def check_steps(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:

@@ -13,10 +13,11 @@ import pandas as pd
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
 from spinepipe.cohort.doubt import Group
+from spinepipe.documents.names import LONGEST_NAME
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-VertebraName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9]*$")]
+VertebraName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9]*$", max_length=20)]
 
 
 def _all_or_some(value: object) -> object:
@@ -59,8 +60,14 @@ class CohortHeader(BaseModel):
 
     model_config = FORM
 
-    cohort: str = Field(pattern=r"^[a-z0-9_]+$", description="the folder's name, [a-z0-9_]+")
-    title: str = Field(min_length=1, description="one line that says what the cohort is")
+    cohort: str = Field(
+        pattern=r"^[a-z0-9_]+$",
+        max_length=LONGEST_NAME,
+        description="the folder's name, [a-z0-9_]+",
+    )
+    title: str = Field(
+        min_length=1, max_length=300, description="one line that says what the cohort is"
+    )
     source: str = Field(
         min_length=1, description="citation, how the numbers were obtained, licence"
     )

@@ -11,10 +11,17 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort.columns import Column, TableForm
-from spinepipe.cohort.text import read_text
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.documents.text import LONGEST_CELL, MOST_CSV_BYTES, read_text
+from spinepipe.problems import Problem, Spelling
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+MOST_ROWS = 150_000
+
+MOST_COLUMNS = 1000
+
+MOST_CELLS = 4_000_000
+"""Cells of one file; files within these bounds are read and checked in seconds."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +77,11 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
 
 
 def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
+    known = Spelling(form.names, "delete the column or correct its name")
     for name in rows.header:
         if name not in form.names and not form.carries:
-            remedy = did_you_mean(name, form.names, "delete the column or correct its name")
-            yield Problem(rows.file, 1, name, "an unknown column", one_of(form.names), remedy)
+            remedy = known.remedy(name)
+            yield Problem(rows.file, 1, name, "an unknown column", known.allowed, remedy)
     for column in form.columns:
         if column.required and column.name not in rows.header:
             yield Problem(
@@ -126,17 +134,16 @@ def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
 
     Wholly blank lines are skipped: they carry nothing.
     """
-    text, problems = read_text(path, file)
+    text, problems = read_text(path, file, MOST_CSV_BYTES)
+    problems = problems or list(_size_problems(text, file))
     if problems:
         return None, problems
-    try:
-        records = _records(text)
-    except csv.Error as error:
-        return None, [_not_csv(file, str(error))]
+    records, problems = _records(text, file)
+    problems = problems or _header_problems(file, records[0][1])
+    problems = problems or list(_long_cells(file, records))
+    if problems:
+        return None, problems
     header = records[0][1]
-    problems = _header_problems(file, header)
-    if problems:
-        return None, problems
     rows, problems = _squared(file, header, records[1:])
     if not rows.lines:
         problems.append(
@@ -145,23 +152,63 @@ def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
     return rows, problems
 
 
-def _records(text: str) -> list[tuple[int, list[str]]]:
+def _size_problems(text: str, file: str) -> Iterator[Problem]:
+    """More lines or cells than are read, said before they are."""
+    for what, sign, most in (
+        ("rows", "\n", MOST_ROWS),
+        ("rows", "\r", MOST_ROWS),
+        ("cells", ",", MOST_CELLS),
+    ):
+        number = text.count(sign)
+        if number > most:
+            remedy = "split the cohort, or leave steps out"
+            yield Problem(file, None, None, f"{number} {what}", f"at most {most} {what}", remedy)
+            return
+
+
+Records = list[tuple[int, list[str]]]
+"""Line and cells of each row, the header too."""
+
+
+def _records(text: str, file: str) -> tuple[Records, list[Problem]]:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    records: list[tuple[int, list[str]]] = []
+    records: Records = []
     line = 1
-    for cells in reader:
-        if cells:
-            records.append((line, [cell.strip() for cell in cells]))
-        line = reader.line_num + 1  # a quoted cell may span lines
-    return records
+    try:
+        for cells in reader:
+            if cells:
+                records.append((line, [cell.strip() for cell in cells]))
+            line = reader.line_num + 1  # a quoted cell may span lines
+    except csv.Error as error:
+        return [], [_not_csv(file, line, str(error))]
+    return records, [] if records else [_not_csv(file, 1, "blank lines alone")]
 
 
-def _not_csv(file: str, reason: str) -> Problem:
+def _not_csv(file: str, line: int, reason: str) -> Problem:
     allowed = "comma-separated cells, double quotes only in pairs around a cell"
-    return Problem(file, None, None, f"no CSV ({reason})", allowed, "look for a stray quote mark")
+    return Problem(file, line, None, f"no CSV ({reason})", allowed, "look for a stray quote mark")
+
+
+def _long_cells(file: str, records: Records) -> Iterator[Problem]:
+    """Cells that no table has; they are not looked into."""
+    header = records[0][1]
+    for line, cells in records:
+        if max(map(len, cells)) > LONGEST_CELL:
+            for number, cell in enumerate(cells):
+                if len(cell) > LONGEST_CELL:
+                    column = header[number][:LONGEST_CELL] if number < len(header) else None
+                    found = f"a cell of {len(cell)} characters, '{cell[:20]}…'"
+                    allowed, remedy = (
+                        f"at most {LONGEST_CELL}",
+                        "shorten it, or look for a quote mark",
+                    )
+                    yield Problem(file, line, column, found, allowed, remedy)
 
 
 def _header_problems(file: str, header: list[str]) -> list[Problem]:
+    if len(header) > MOST_COLUMNS:
+        found, allowed = f"{len(header)} columns", f"at most {MOST_COLUMNS}"
+        return [Problem(file, 1, None, found, allowed, "one header row, one thing per row")]
     separators = [mark for mark in (";", "\t") if len(header) == 1 and mark in header[0]]
     if separators:
         found = f"cells separated by {'semicolons' if separators[0] == ';' else 'tabs'}"

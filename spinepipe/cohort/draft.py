@@ -89,10 +89,22 @@ def applied_loads(draft: Draft) -> Iterator[AppliedLoad]:
                 yield AppliedLoad(line, name, test, number, known_step, vertebra)
 
 
+def number_of_applied_loads(draft: Draft) -> int:
+    """How many `applied_loads` gives, at most."""
+    cycles = _known_cycles(draft)
+    everyone = max(len(draft.specimens), 1)
+    return sum(
+        (everyone if specimen == "*" else 1) * (len(cycles[test]) if isnan(cycle) else 1)
+        for _, (specimen, test, cycle) in draft.rows("loads", "specimen", "test", "cycle")
+    )
+
+
 def _known_cycles(draft: Draft) -> dict[str, tuple[int, ...]]:
     """Cycles of each test that either file numbers; 1 when none does."""
     cycles: dict[str, set[int]] = defaultdict(set)
     for stem in ("loads", "motion"):
         for _, (test, cycle) in draft.rows(stem, "test", "cycle"):
-            cycles[test] |= set() if isnan(cycle) else {int(cycle)}
+            numbers = cycles[test]
+            if not isnan(cycle):
+                numbers.add(int(cycle))
     return {test: tuple(sorted(numbers)) or (1,) for test, numbers in cycles.items()}

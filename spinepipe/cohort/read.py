@@ -1,6 +1,7 @@
 """Read a cohort folder, or say everything that is wrong with it."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -20,12 +21,18 @@ from spinepipe.cohort.checks import (
 from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
-from spinepipe.cohort.draft import Draft, applied_loads
+from spinepipe.cohort.draft import Draft, applied_loads, number_of_applied_loads
+from spinepipe.cohort.misnamed import misnamed
 from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.problems import InputError, Problem
 
 __all__ = ["read"]
+
+MOST_SPECIMENS = 1000
+
+MOST_APPLIED = 150_000
+"""Rows of loads.csv with * and empty cycles written out: specimens x cycles x steps."""
 
 
 def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
@@ -49,13 +56,16 @@ def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
     document, header, problems = _read_header(folder, name)
     forms = TABLES | {form.stem: form for form in further}
     tables, absent = _read_tables(folder, name, forms, problems)
-    draft = Draft(
-        name=name,
-        vertebrae=usable_vertebrae(document) if document else (),
-        gravity=document.data.get("gravity") is True if document else None,
-        tables=tables,
-        absent=absent,
-        forms=forms,
+    draft = _within_bounds(
+        Draft(
+            name=name,
+            vertebrae=usable_vertebrae(document) if document else (),
+            gravity=document.data.get("gravity") is True if document else None,
+            tables=tables,
+            absent=absent,
+            forms=forms,
+        ),
+        problems,
     )
     problems += _checks(draft)
     problems += check_supports(draft, document)
@@ -69,8 +79,8 @@ def _read_header(
     folder: Path, name: str
 ) -> tuple[Document | None, CohortHeader | None, list[Problem]]:
     file = f"{name}/{COHORT_YAML}"
-    if not (folder / COHORT_YAML).is_file():
-        return None, None, [_missing(file)]
+    if not _is_there(folder / COHORT_YAML):
+        return None, None, [_missing(file), *misnamed(folder, name, [COHORT_YAML])]
     document, problems = read_yaml(folder / COHORT_YAML, file)
     if document is None:
         return None, None, problems
@@ -78,12 +88,18 @@ def _read_header(
     return document, header, [*problems, *faults, *check_header(document, name)]
 
 
+def _is_there(path: Path) -> bool:
+    """Whether there is something of this name, be it a folder or a dead link."""
+    return path.exists() or path.is_symlink()
+
+
 def _read_tables(
     folder: Path, name: str, forms: Mapping[str, TableForm], problems: list[Problem]
 ) -> tuple[dict[str, pd.DataFrame], frozenset[str]]:
     """Tables by stem and the stems without a file; what is wrong is added to ``problems``."""
     tables: dict[str, pd.DataFrame] = {}
-    absent = {stem for stem, form in forms.items() if not (folder / form.file).is_file()}
+    absent = {stem for stem, form in forms.items() if not _is_there(folder / form.file)}
+    problems += misnamed(folder, name, [f"{stem}.csv" for stem in absent])
     if "specimens" in absent:
         problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
     for stem, form in forms.items():
@@ -93,6 +109,28 @@ def _read_tables(
             if table is not None:
                 tables[stem] = table
     return tables, frozenset(absent)
+
+
+def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:
+    """The draft without tables that mean more than can be looked at, which is added to problems."""
+    number = len(draft.specimens)
+    if number > MOST_SPECIMENS:
+        allowed, remedy = f"at most {MOST_SPECIMENS}", "split the cohort"
+        place = (draft.file("specimens"), None, None)
+        problems.append(Problem(*place, f"{number} specimens", allowed, remedy))
+        return _without(draft, "specimens", "loads")
+    number = number_of_applied_loads(draft)
+    if number > MOST_APPLIED:
+        found = f"{number} loads, with * as every specimen and an empty cycle as every cycle"
+        place = (draft.file("loads"), None, None)
+        remedy = "look for wrong numbers in the columns cycle, or split the cohort"
+        problems.append(Problem(*place, found, f"at most {MOST_APPLIED}", remedy))
+        return _without(draft, "loads")
+    return draft
+
+
+def _without(draft: Draft, *stems: str) -> Draft:
+    return replace(draft, tables={s: t for s, t in draft.tables.items() if s not in stems})
 
 
 def _checks(draft: Draft) -> Iterator[Problem]:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from spinepipe.cohort.draft import Draft
 from spinepipe.cohort.text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS
 
 KEY = "zeroed_at_step_0"
@@ -24,13 +24,14 @@ def check_zeroing(draft: Draft, document: Document | None) -> Iterator[Problem]:
     motion = draft.tables.get("motion")
     if document is None or not isinstance(named, list) or motion is None:
         return
-    known = sorted(motion["test"].dropna().unique())
+    tests = Spelling(sorted(motion["test"].dropna().unique()), "correct it")
+    known = set(tests.known)
     for name in named:
         if isinstance(name, str) and name not in known:
             place = (document.file, document.line_of(KEY), KEY)
-            remedy = did_you_mean(name, known, "correct it")
-            yield Problem(*place, f"'{name}'", f"a test of motion.csv: {one_of(known)}", remedy)
-    if not {*named} & {*known}:
+            allowed = f"a test of motion.csv: {tests.allowed}"
+            yield Problem(*place, f"'{name}'", allowed, tests.remedy(name))
+    if not known.intersection(name for name in named if isinstance(name, str)):
         return
     for line, column in _without_start(motion, named):
         found = "a reading, but none at step 0 of its cycle"
@@ -42,12 +43,15 @@ def check_zeroing(draft: Draft, document: Document | None) -> Iterator[Problem]:
 def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple[int, str]]:
     """First line and column of what has readings but none at step 0, per cycle and joint."""
     kept = motion[~motion["test"].isin(named)]
-    for _, rows in kept.groupby(_PLACE, dropna=False, sort=False):
-        for column in COORDINATE_COLUMNS:
-            read = rows[rows[column].notna()]
-            if len(read) and not (read["step"] == 0).any():
-                yield int(read.index[0]), column
-                break
+    series = kept.groupby(_PLACE, dropna=False, sort=False).ngroup()
+    found: dict[int, tuple[int, str]] = {}
+    for column in COORDINATE_COLUMNS:
+        read = kept[column].notna()
+        started = set(series[read & (kept["step"] == 0)])
+        for number, line in zip(series[read], kept.index[read], strict=True):
+            if number not in started:
+                found.setdefault(int(number), (int(line), column))
+    yield from (found[number] for number in sorted(found))
 
 
 def zeroed_alike(

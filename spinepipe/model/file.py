@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from spinepipe.documents.settings import validate
+from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
 from spinepipe.marks import write_marked
@@ -98,47 +100,41 @@ def read_model(path: str | Path) -> ModelFile:
         With all problems at once.
     """
     name = str(path)
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        model = ModelFile.model_validate(data)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(
-            [Problem(name, None, None, str(error), "a YAML file", "mend it")]
-        ) from None
-    except ValidationError as error:
-        raise InputError([_of_pydantic(name, item) for item in error.errors()]) from None
+    document, problems = read_yaml(Path(path), name)
+    if document is None:
+        raise InputError(problems)
+    model, faults = validate(ModelFile, document)
+    if problems or model is None:
+        raise InputError([*problems, *faults])
     problems = [
-        p for number, entry in enumerate(model.effects) for p in _check(name, number, entry)
+        p for number, entry in enumerate(model.effects) for p in _check(document, number, entry)
     ]
     if problems:
         raise InputError(problems)
     return model
 
 
-def _of_pydantic(file: str, item: Any) -> Problem:
-    column = ".".join(str(part) for part in item["loc"])
-    return Problem(file, None, column, repr(item.get("input")), item["msg"], "change or remove it")
-
-
-def _check(file: str, number: int, entry: EffectEntry) -> list[Problem]:
+def _check(document: Document, number: int, entry: EffectEntry) -> list[Problem]:
     """Unknown effects, options and parameters, and values out of bounds."""
     place = f"effects.{number}"
+    file, line = document.file, document.line_of(place)
     try:
         effect = create(entry.effect, entry.options)
-    except (TypeError, ValueError) as error:
-        return [Problem(file, None, place, entry.effect, str(error), "correct it")]
+    except (TypeError, ValueError, ArithmeticError, LookupError) as error:
+        return [Problem(file, line, place, entry.effect, str(error), "correct it")]
     declared = {parameter.name: parameter for parameter in effect.parameters}
     problems = []
-    for row in entry.values:
+    for index, row in enumerate(entry.values):
         for name, value in row.parameters.items():
             where = f"{place}.values.{name}"
+            line = document.line_of(f"{place}.values.{index}.{name}")
             if name not in declared:
                 allowed = ", ".join(declared)
-                problems.append(Problem(file, None, where, name, allowed, "rename it"))
+                problems.append(Problem(file, line, where, name, allowed, "rename it"))
             elif not _within(value, declared[name].low, declared[name].high):
                 p = declared[name]
                 allowed = f"{p.low:.3g} to {p.high:.3g} {p.unit}"
-                problems.append(Problem(file, None, where, repr(value), allowed, "correct it"))
+                problems.append(Problem(file, line, where, repr(value), allowed, "correct it"))
     return problems
 
 

@@ -12,6 +12,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
 from spinepipe.cohort.text import Document, read_yaml, validate
+from spinepipe.documents.strays import files_in, folders_in, strays_in
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
@@ -19,6 +20,9 @@ from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import COHORTS, Study, cohort_folder
 
 STUDIES = Path("config") / "studies"
+
+ENDING = ".yaml"
+"""Of the files of studies."""
 
 
 def read(path: Path, root: Path) -> Study:
@@ -44,7 +48,7 @@ def load(path: Path, root: Path) -> tuple[Document | None, Study | None, list[Pr
     """The study file as data and as a study, None where it is neither; and its problems."""
     file = displayed(path, root)
     if not path.is_file():
-        known = sorted(other.stem for other in path.parent.glob("*.yaml"))
+        known = [other.stem for other in files_in(path.parent, ENDING)]
         remedy = did_you_mean(path.stem, known, "add it or correct the name")
         return None, None, [Problem(file, None, None, "no such file", one_of(known), remedy)]
     document, problems = read_yaml(path, file)
@@ -144,7 +148,7 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         return None, []
     folder = cohort_folder(name, root)
     if not folder.is_dir():
-        known = sorted(path.name for path in (root / COHORTS).glob("*") if path.is_dir())
+        known = [path.name for path in folders_in(root / COHORTS)]
         remedy = did_you_mean(name, known, f"add the folder {folder}")
         allowed = f"{one_of(known)}, or the path of a folder"
         place = (document.file, document.line_of("cohort"), "cohort")
@@ -213,7 +217,7 @@ def read_selection(root: Path) -> Selection:
 def names_by_kind(root: Path) -> dict[str, list[str]]:
     """Names of the study files of each kind, sound or not; those that cannot be read have none."""
     found: dict[str, list[str]] = {}
-    for path in sorted((root / STUDIES).glob("*.yaml")):
+    for path in files_in(root / STUDIES, ENDING):
         document, _ = read_yaml(path, displayed(path, root))
         kind = None if document is None else document.data.get("kind")
         if isinstance(kind, str):
@@ -221,8 +225,23 @@ def names_by_kind(root: Path) -> dict[str, list[str]]:
     return found
 
 
+def strays(root: Path) -> list[Problem]:
+    """What lies among the study files and is none, which stops nothing."""
+    remedy = "rename it, or leave it: no study is made of it"
+    return [
+        Problem(displayed(path, root), None, None, _what(path), f"files <study>{ENDING}", remedy)
+        for path in strays_in(root / STUDIES, ENDING)
+    ]
+
+
+def _what(path: Path) -> str:
+    if path.is_dir():
+        return "a folder"
+    return f"a file that ends with {path.suffix}" if path.is_file() else "a link to nothing"
+
+
 def _unknown_names(selection: Selection, document: Document, root: Path) -> list[Problem]:
-    known = sorted(path.stem for path in (root / STUDIES).glob("*.yaml"))
+    known = [path.stem for path in files_in(root / STUDIES, ENDING)]
     problems = []
     seen: set[str] = set()
     for key in ("studies", "full"):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field
 
+from spinepipe.documents.names import LONGEST_NAME
 from spinepipe.studies.parts import FORM
 
 __all__ = ["COHORTS", "Study", "cohort_folder"]
@@ -32,7 +33,9 @@ class Study(BaseModel):
     model_config = FORM
 
     study: str = Field(
-        pattern=r"^[a-z0-9_]+$", description="the name, equal to the file's without .yaml"
+        pattern=r"^[a-z0-9_]+$",
+        max_length=LONGEST_NAME,
+        description="the name, equal to the file's without .yaml",
     )
     kind: str = Field(description="kind of study")
     cohort: str = Field(

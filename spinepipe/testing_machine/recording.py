@@ -30,7 +30,7 @@ __all__ = ["Recording", "read_recording"]
 Array = NDArray[np.float64]
 
 MARKS = {"comma": ",", "semicolon": ";", "tab": "\t"}
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 WINDOW = 5
 JUMP = 0.1
 """Share of the range of a column by which a row must jump away to be left out."""

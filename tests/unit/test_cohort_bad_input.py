@@ -78,7 +78,7 @@ FILE_CASES = [
     Case("Latin-1", text(SPECIMENS, "specimen,note\na,\nb,M\xfcller\n".encode("latin-1")), SPECIMENS, 3, None, "UTF-8"),
     Case("UTF-16", text(LANDMARKS, UTF16), LANDMARKS, 1, None, "UTF-8"),
     Case("semicolons", text(SPECIMENS, "specimen;sex\na;\nb;\n"), SPECIMENS, 1, None, "semicolons"),
-    Case("stray quote", swap(SPECIMENS, "CT 2", '"CT 2'), SPECIMENS, None, None, "stray quote"),
+    Case("stray quote", swap(SPECIMENS, "CT 2", '"CT 2'), SPECIMENS, 3, None, "stray quote"),
     Case("column twice", swap(LANDMARKS, "y_mm", "x_mm"), LANDMARKS, 1, "x_mm", "same column name twice"),
     Case("nameless column", swap(SPECIMENS, "scanner", ""), SPECIMENS, 1, None, "without a name"),
     Case("unknown column", swap(LANDMARKS, "sd_mm", "sd_m"), LANDMARKS, 1, "sd_m", "did you mean 'sd_mm'"),

@@ -20,6 +20,7 @@ ROOMS = (
         "status",
         "units",
         "problems",
+        "documents",
         "files",
         "progress",
         "frames",

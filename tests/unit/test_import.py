@@ -4,6 +4,7 @@ The files are made by a generator that knows nothing of the library (tests/gener
 testing_machine.py); true values come from its closed forms.
 """
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -53,7 +54,8 @@ def written(folder: Path, text: str | None = None, **changes: object) -> Path:
     rows = record(linear, NOISY, seed=5)
     (folder / "raw.csv").write_text(text or german(*rows, offset=-3.21), encoding="utf-8")
     path = folder / "rig.yaml"
-    path.write_text(yaml.safe_dump({**DOCUMENT, **changes}))
+    plain = json.loads(json.dumps({**DOCUMENT, **changes}))  # nothing shared, so no aliases
+    path.write_text(yaml.safe_dump(plain))
     return path
 
 

@@ -98,7 +98,7 @@ def test_a_written_file_reads_back_the_same(tmp_path: Path) -> None:
         ("tests: [twist]", "trials: [twist]", r"effects\.1\.scope\.trials"),
         ("cohort: small", "cohort: [small]", "cohort.*string"),
         ("model: for a test", "model: [", "YAML"),
-        ("cohort: small\n", "", "cohort.*[Rr]equired"),
+        ("cohort: small\n", "", "cohort: found nothing: the key is missing"),
     ],
 )
 def test_bad_files_are_refused_with_place_and_remedy(tmp_path, old, new, expected) -> None:

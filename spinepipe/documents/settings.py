@@ -1,0 +1,150 @@
+"""A document as settings: what a pydantic model finds wrong with it, told at its line and key."""
+
+from collections.abc import Iterator
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, Tag, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from spinepipe.documents.yaml_text import Document
+from spinepipe.problems import Problem, did_you_mean, one_of
+
+MOST_TOLD = 100
+"""Faults of one file that are told one by one."""
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def validate(model: type[Model], document: Document) -> tuple[Model | None, list[Problem]]:
+    """The document as an instance of the model, None when it does not fit; and the problems."""
+    try:
+        return model.model_validate(document.data), []
+    except ValidationError as error:
+        details = list(_distinct(error.errors(include_url=False)))
+        problems = [_problem(model, document, detail) for detail in details[:MOST_TOLD]]
+        if len(details) > MOST_TOLD:
+            found = f"{len(details) - MOST_TOLD} faults more"
+            problems.append(Problem(document.file, None, None, found, "none", "mend these first"))
+        return None, problems
+
+
+def _distinct(details: list[ErrorDetails]) -> Iterator[ErrorDetails]:
+    """One error per place: pydantic reports one for each member of a union."""
+    seen = set()
+    for detail in details:
+        if detail["loc"] not in seen:
+            seen.add(detail["loc"])
+            yield detail
+
+
+def _problem(model: type[BaseModel], document: Document, detail: ErrorDetails) -> Problem:
+    owner, field, loc = _field_at(model, detail["loc"])
+    key = ".".join(map(str, loc))
+    place = (document.file, document.line_of(key), key or None)
+    if detail["type"].startswith("union_tag"):
+        return _no_such_form(document, key, detail)
+    if detail["type"] == "extra_forbidden":
+        names = list(owner.model_fields)
+        remedy = did_you_mean(str(loc[-1]), names, "delete it or correct its name")
+        return Problem(*place, "an unknown key", one_of(names), remedy)
+    meaning = field.description if field is not None and field.description else ""
+    if detail["type"] == "missing":
+        return Problem(*place, "nothing: the key is missing", meaning, f"add `{loc[-1]}:`")
+    allowed = _allowed(detail)
+    expected = detail.get("ctx", {}).get("expected", "")
+    remedy = f"correct it ({meaning})" if meaning else "correct it"
+    if detail["type"] == "literal_error":
+        remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
+    return Problem(*place, _shown(detail["input"]), allowed, remedy)
+
+
+def _no_such_form(document: Document, key: str, detail: ErrorDetails) -> Problem:
+    """An item that does not say which of several forms it has, or one that there is not."""
+    context = detail.get("ctx", {})
+    (name,) = _quoted(context["discriminator"])
+    key = f"{key}.{name}"
+    place = (document.file, document.line_of(key), key)
+    if detail["type"] == "union_tag_not_found":
+        found, allowed = "nothing: the key is missing", "a form, which decides on the other keys"
+        return Problem(*place, found, allowed, f"add `{name}:`")
+    tags = _quoted(context["expected_tags"])
+    remedy = did_you_mean(context["tag"], tags, "it decides which other keys are allowed")
+    return Problem(*place, repr(context["tag"]), one_of(tags), remedy)
+
+
+def _field_at(
+    model: type[BaseModel], loc: tuple[int | str, ...]
+) -> tuple[type[BaseModel], FieldInfo | None, tuple[int | str, ...]]:
+    """The innermost model on the way to a place, the field of it that was last named, the place.
+
+    Where an item may have several forms, pydantic's place names the form, which is no key.
+    """
+    owner, field = model, None
+    keys: list[int | str] = []
+    for name in loc:
+        forms = _forms(field)
+        if name in forms:
+            owner, field = forms[str(name)], None
+            continue
+        tagged = _tagged(field)
+        if name in tagged:
+            owner = tagged[str(name)] or owner
+            continue
+        keys.append(name)
+        inner = _inner_model(field)
+        if inner is not None:
+            owner, field = inner, None
+        if isinstance(name, str) and name in owner.model_fields:
+            field = owner.model_fields[name]
+    return owner, field, tuple(keys)
+
+
+def _forms(field: FieldInfo | None) -> dict[str, type[BaseModel]]:
+    """Models of a list of items with one of several forms, by what says which; else none."""
+    for item in get_args(field.annotation) if field is not None else ():
+        for told in getattr(item, "__metadata__", ()):
+            tag = getattr(told, "discriminator", None)
+            if isinstance(tag, str):
+                models = get_args(item.__origin__)
+                return {
+                    n: one for one in models for n in get_args(one.model_fields[tag].annotation)
+                }
+    return {}
+
+
+def _tagged(field: FieldInfo | None) -> dict[str, type[BaseModel] | None]:
+    """Models, and None for words, of a value with one of several forms, by what says which."""
+    return {
+        told.tag: _model(item.__origin__)
+        for item in (get_args(field.annotation) if field is not None else ())
+        for told in getattr(item, "__metadata__", ())
+        if isinstance(told, Tag)
+    }
+
+
+def _model(candidate: Any) -> type[BaseModel] | None:
+    is_model = isinstance(candidate, type) and issubclass(candidate, BaseModel)
+    return candidate if is_model else None
+
+
+def _inner_model(field: FieldInfo | None) -> type[BaseModel] | None:
+    if field is None:
+        return None
+    candidates: list[Any] = [field.annotation, *get_args(field.annotation)]
+    return next((model for one in candidates if (model := _model(one)) is not None), None)
+
+
+def _allowed(detail: ErrorDetails) -> str:
+    message = detail["msg"]
+    for start in ("Input should be ", "Value error, ", "Input should "):
+        message = message.removeprefix(start)
+    return message
+
+
+def _quoted(expected: str) -> list[str]:
+    return expected.split("'")[1::2]
+
+
+def _shown(value: object) -> str:
+    return "nothing" if value is None else repr(value)

@@ -1,0 +1,86 @@
+"""Text files of bounded size: read whole, as UTF-8 without characters that nobody sees."""
+
+import re
+from pathlib import Path
+from stat import S_ISREG
+
+from spinepipe.problems import Problem
+
+MOST_YAML_BYTES = 1_000_000
+
+MOST_CSV_BYTES = 100_000_000
+
+LONGEST_CELL = 200
+"""Characters of a cell of a CSV file, a key of a YAML file, and a word of its texts."""
+
+INVISIBLE = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]"
+)
+"""Control characters but tabs and line ends, marks that turn the direction of writing.
+
+Also the byte-order mark `U+FEFF`, unless it begins the file, and what is no character at all.
+"""
+
+
+def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem]]:
+    """Text of a UTF-8 file; a byte-order mark is allowed.
+
+    Parameters
+    ----------
+    path : the file.
+    file : its name in messages.
+    most_bytes : a larger file is refused before it is read.
+
+    Returns
+    -------
+    The text (empty when there is a problem) and the problems.
+    """
+    try:
+        status = path.stat()
+        if not S_ISREG(status.st_mode):
+            return "", [_no_file(file)]
+        if status.st_size > most_bytes:
+            return "", [_too_large(file, status.st_size, most_bytes)]
+        data = path.read_bytes()
+    except OSError as error:
+        return "", [_unreadable(file, error)]
+    if not data.strip():
+        return "", [Problem(file, None, None, "an empty file", "a file with content", "fill it")]
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        return "", [_not_utf8(file, data[: error.start].count(b"\n") + 1)]
+    if "\0" in text:
+        return "", [_not_utf8(file, text[: text.index("\0")].count("\n") + 1)]
+    hidden = INVISIBLE.search(text)
+    if hidden is not None:
+        return "", [_invisible(file, text[: hidden.start()].count("\n") + 1, hidden[0])]
+    return text, []
+
+
+def _no_file(file: str) -> Problem:
+    found = "a folder or device"
+    return Problem(file, None, None, found, "a file", "rename it, or put the file in its place")
+
+
+def _unreadable(file: str, error: OSError) -> Problem:
+    """A file that the system does not let us read."""
+    reason = (error.strerror or type(error).__name__).lower()
+    remedy = "look at what it is and who may read it"
+    return Problem(file, None, None, f"what cannot be read ({reason})", "a readable file", remedy)
+
+
+def _too_large(file: str, size: int, most: int) -> Problem:
+    found, allowed = f"{size / 1e6:.1f} MB", f"at most {most / 1e6:g} MB"
+    return Problem(file, None, None, found, allowed, "take out what does not belong, or split it")
+
+
+def _not_utf8(file: str, line: int) -> Problem:
+    found = "bytes that are not UTF-8 text"
+    return Problem(file, line, None, found, "UTF-8", "save the file again with encoding UTF-8")
+
+
+def _invisible(file: str, line: int, character: str) -> Problem:
+    found = f"the control character U+{ord(character):04X}"
+    allowed = "characters that can be seen, blanks, tabs and line ends"
+    return Problem(file, line, None, found, allowed, "delete it; retype the line if it hides")

@@ -1,0 +1,206 @@
+"""A YAML file as plain data, the line of every key known; whatever is wrong comes back located.
+
+What the parser meets is looked at piece by piece before anything is built of it: aliases, tags,
+depth, number and length. Python and YAML would follow all of them without an end.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from spinepipe.documents.text import LONGEST_CELL, MOST_YAML_BYTES, read_text
+from spinepipe.problems import Problem
+
+DEEPEST = 20
+"""Levels of lists and keys within each other."""
+
+MOST_VALUES = 100_000
+"""Keys, values and list items of one file."""
+
+LONGEST_VALUE = 10_000
+"""Characters of one text, such as the source of a cohort."""
+
+
+@dataclass(frozen=True)
+class Document:
+    """One YAML file whose top level is a list of keys.
+
+    Attributes
+    ----------
+    file : name in messages.
+    data : its content.
+    lines : line of every dotted key, list items by their number from 0.
+    """
+
+    file: str
+    data: dict[str, Any]
+    lines: dict[str, int]
+
+    def line_of(self, key: str) -> int | None:
+        """Line of a dotted key, or of the closest key above it that is there."""
+        while key and key not in self.lines:
+            key = key.rpartition(".")[0]
+        return self.lines.get(key)
+
+
+def read_yaml(path: Path, file: str) -> tuple[Document | None, list[Problem]]:
+    """Read a YAML file of keys and values, None when it is none.
+
+    Parameters
+    ----------
+    path : the file.
+    file : its name in messages.
+    """
+    text, problems = read_text(path, file, MOST_YAML_BYTES)
+    if problems:
+        return None, problems
+    try:
+        problems = list(_beyond_bounds(text, file))
+        return (None, problems) if problems else _document(text, file)
+    except (yaml.YAMLError, ValueError) as error:
+        return None, [_no_yaml(file, error)]
+
+
+_PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_PARSER):  # type: ignore[misc]
+    """YAML's safe loader which also takes 1e5 for a number, as everybody means it."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+
+
+def _document(text: str, file: str) -> tuple[Document | None, list[Problem]]:
+    """Keys and values of a text within bounds."""
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        if not isinstance(node, yaml.MappingNode):
+            return None, [_no_keys(file)]
+        problems = list(_no_names(node, file))
+        if problems:
+            return None, problems
+        lines: dict[str, int] = {}
+        problems = list(_walk(node, "", file, lines))
+        return Document(file, loader.construct_document(node), lines), problems
+    finally:
+        loader.dispose()
+
+
+def _beyond_bounds(text: str, file: str) -> Iterator[Problem]:
+    """The first thing in a file that is beyond what is read."""
+    depth, values = 0, 0
+    for event in yaml.parse(text, Loader=_PARSER):
+        fault = _fault(event)
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        values += isinstance(event, yaml.NodeEvent)
+        if fault is None and depth > DEEPEST:
+            fault = (
+                f"more than {DEEPEST} levels within each other",
+                f"at most {DEEPEST}",
+                "look for brackets or dashes too many",
+            )
+        if fault is None and values > MOST_VALUES:
+            found, allowed = "more keys and values than are read", f"at most {MOST_VALUES}"
+            fault = found, allowed, "take out what does not belong, or split it"
+        if fault is not None:
+            yield Problem(file, _line(event), None, *fault)
+            return
+
+
+def _line(event: yaml.Event) -> int | None:
+    return None if event.start_mark is None else event.start_mark.line + 1
+
+
+def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
+    """What was found, what is allowed and what to do, where one piece by itself is refused."""
+    if isinstance(event, yaml.AliasEvent):
+        return f"the alias '*{event.anchor}'", "values written out", "write the value again"
+    if not isinstance(event, yaml.NodeEvent):
+        return None
+    if event.anchor is not None:
+        return f"the anchor '&{event.anchor}'", "values without anchors", "delete it, or quote text"
+    tag = getattr(event, "tag", None)
+    if tag is not None:
+        return f"the tag '{tag}'", "values without tags", "delete it, or put text in quotes"
+    if isinstance(event, yaml.ScalarEvent):
+        return _length_fault(event.value)
+    return None
+
+
+def _length_fault(text: str) -> tuple[str, str, str] | None:
+    if len(text) > LONGEST_VALUE:
+        return f"a text of {len(text)} characters", f"at most {LONGEST_VALUE}", "shorten it"
+    longest = max(map(len, text.split()), default=0) if len(text) > LONGEST_CELL else 0
+    if longest > LONGEST_CELL:
+        found = f"a word or number of {longest} characters"
+        return found, f"at most {LONGEST_CELL}", "shorten it, or look for a missing blank"
+    return None
+
+
+def _no_names(node: yaml.Node, file: str) -> Iterator[Problem]:
+    """Keys below a node that are no names."""
+    if isinstance(node, yaml.SequenceNode):
+        for item in node.value:
+            yield from _no_names(item, file)
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            fault = _key_fault(key)
+            if fault is not None:
+                yield Problem(file, key.start_mark.line + 1, None, *fault)
+            yield from _no_names(value, file)
+
+
+def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Iterator[Problem]:
+    """Note the line of every key below a node, and report repeated keys."""
+    prefix = f"{path}." if path else ""
+    if isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            lines[f"{prefix}{index}"] = item.start_mark.line + 1
+            yield from _walk(item, f"{prefix}{index}", file, lines)
+    if isinstance(node, yaml.MappingNode):
+        seen: set[str] = set()
+        for key_node, value in node.value:
+            key, line = f"{prefix}{key_node.value}", key_node.start_mark.line + 1
+            if key in seen:
+                remedy = f"delete one (the other is in line {lines[key]})"
+                yield Problem(file, line, key, "the same key twice", "each key once", remedy)
+            seen.add(key)
+            lines.setdefault(key, line)
+            yield from _walk(value, key, file, lines)
+
+
+def _key_fault(node: yaml.Node) -> tuple[str, str, str] | None:
+    """What was found, what is allowed and what to do, where a key is no name."""
+    if not isinstance(node, yaml.ScalarNode) or node.tag != "tag:yaml.org,2002:str":
+        shown = repr(node.value) if isinstance(node, yaml.ScalarNode) else "a list or mapping"
+        return f"the key {shown}", "names as keys", "write a name; in quotes if it is like a number"
+    if len(node.value) > LONGEST_CELL:
+        found = f"a key of {len(node.value)} characters"
+        return found, f"at most {LONGEST_CELL}", "shorten it"
+    return None
+
+
+def _no_keys(file: str) -> Problem:
+    allowed = "lines of the form `key: value`"
+    return Problem(file, None, None, "no keys", allowed, "see the format's documentation")
+
+
+def _no_yaml(file: str, error: Exception) -> Problem:
+    mark = getattr(error, "problem_mark", None)
+    reason = getattr(error, "problem", None) or str(error)
+    line = mark.line + 1 if mark is not None else None
+    remedy = "check indentation, colons, brackets and quotes there"
+    return Problem(file, line, None, f"no YAML ({reason})", "YAML", remedy)
