@@ -26,6 +26,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import KEY, with_mark, write_marked
+from spinepipe.tables import write
 
 
 def run(root: str, study: str, **files: str) -> None:
@@ -36,7 +37,7 @@ def run(root: str, study: str, **files: str) -> None:
     for path in map(Path, files.values()):
         made = Path(root, "made_up", path.name)
         if path.suffix == ".parquet":
-            pq.write_table(pq.read_table(made).replace_schema_metadata(known), path)
+            write(pq.read_table(made), path, known)
         elif path.suffix == ".json":
             path.write_text(json.dumps(with_mark(json.loads(made.read_text()), known[KEY])))
         else:
