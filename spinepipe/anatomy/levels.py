@@ -10,6 +10,9 @@ Attitude: sacral slope 20 to 65 deg (Roussouly et al. 2005, Spine 30:346), lordo
 (doi 10.1038/s41598-022-21840-x, Table 2) and thoracic kyphosis up to 70 deg, and 83 spines in CT
 (T1 to L5, VerSe), whose joints reach -48 to 31 deg, and 41 deg sideways where spines are curved.
 The ranges here hold all of these with 15 deg to spare: specimens are mounted, grounds chosen.
+
+All printed sources but the lordosis and Shukri et al. were entered from memory and not looked up.
+The factors are choices, made wide enough that every shipped cohort and the CT pass.
 """
 
 import re

@@ -16,7 +16,10 @@ from spinepipe.anatomy.levels import spacing_mm
 from spinepipe.cli.program import main
 from spinepipe.cohort.doubts import doubts, refusals, suspicions
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.free import unmeasured
 from spinepipe.studies.registry import every_form
+from tests.generators.hidden import Recipe, make
 
 ROOT = Path(__file__).resolve().parents[2]
 REAL = ROOT.parent / "shared" / "data"
@@ -83,6 +86,27 @@ def test_every_mistake_is_told_at_its_place(name: str, tmp_path: Path) -> None:
             missed.add((name, mistake.name))
     assert tried >= 4
     assert missed == {one for one in UNTOLD if one[0] == name}
+
+
+@pytest.mark.parametrize("seed", [41, 42])
+def test_necks_are_not_doubted(seed: int, tmp_path: Path) -> None:
+    make(Recipe(seed=seed, region="cervical", joints=4), tmp_path / "necks")
+    assert told(tmp_path / "necks") == ()
+
+
+def test_a_free_coordinate_that_nobody_measured(tmp_path: Path) -> None:
+    """Rotations alone were read; the file frees a translation by name, or nothing."""
+    folder = good("linear_spines", tmp_path / "config" / "cohorts")
+    cohort = cohorts.read(folder, every_form())
+    (tmp_path / "config" / "studies").mkdir()
+    head = {"study": "fit", "kind": "cohort_stiffness", "cohort": "linear_spines"}
+    for free, lines in ((["extension", "anterior"], [4]), (["extension"], []), (None, [])):
+        keys = {**head, **({} if free is None else {"free": free})}
+        file = tmp_path / "config" / "studies" / "fit.yaml"
+        file.write_text(yaml.safe_dump(keys, sort_keys=False, default_flow_style=None))
+        found = unmeasured(tmp_path, CohortStiffness.model_validate(keys), cohort)
+        assert [one.row for one in found] == lines
+        assert all("anterior, which nobody measured" in one.found for one in found)
 
 
 @pytest.mark.parametrize("name", REAL_SPINES)
