@@ -12,11 +12,11 @@ from functools import cache
 LONGEST_NAME = 60
 """Characters; a path of several names stays within what systems bear (255 bytes a folder)."""
 
-SIGNS = " _-+.,:()%&*"
+SIGNS = " _-+.,:()%&*#·"
 """Signs that a name may have besides letters and digits."""
 
 ALLOWED = (
-    f"at most {LONGEST_NAME} letters of one alphabet, digits, blanks and _ - + . , : ( ) % & *"
+    f"at most {LONGEST_NAME} letters of one alphabet, digits, blanks and _ - + . , : ( ) % & * # ·"
     ", a letter or digit first, no two dots in a row, no dot at the end"
 )
 

@@ -23,6 +23,8 @@ OTHER_RANKING = """
 import json
 from pathlib import Path
 
+from spinepipe.marks import KEY, with_mark, without_mark
+
 _run = run
 
 
@@ -30,8 +32,9 @@ def run(**arguments):
     _run(**arguments)
     path = Path(arguments["output"])
     ranked = json.loads(path.read_text())
+    mark, ranked = ranked[KEY], without_mark(ranked)
     ranked["s01"][1]["stiffness"] = ranked["s01"][0]["stiffness"]
-    path.write_text(json.dumps(ranked, indent=1))
+    path.write_text(json.dumps(with_mark(ranked, mark), indent=1))
 """
 
 
