@@ -11,7 +11,7 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: all full test test-fast test-kernels lint bench validate figures report env dev-env lock clean
+.PHONY: all full test test-fast test-kernels lint bench validate mutants figures report env dev-env lock clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/snakemake -j$(CORES) all
@@ -41,6 +41,9 @@ bench: dev-env  ## measure speed side by side with OpenSim
 validate: dev-env  ## measure what is too slow for a test; goes on where it was cut off
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.validation
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/cases $(BIN)/python -m tests.validation.displaced_joints
+
+mutants: dev-env  ## put small faults into the code and count those that tests see; writes docs/mutants.md
+	$(BIN)/python -m tests.mutants --workers $(CORES)
 
 figures: all  ## renew the pictures of README and tutorial from results
 	$(BIN)/spinepipe docs --figures

@@ -114,3 +114,10 @@ def test_likeness_is_that_of_an_analysis_of_variance() -> None:
 def test_likeness_needs_numbers() -> None:
     with pytest.raises(ValueError, match="finite"):
         multiple_correlation(np.array([[0.0, np.nan], [1.0, 2.0]]))
+
+
+def test_two_points_are_enough_and_one_is_not() -> None:
+    """By hand: 1 - (0.02 / 2) / (1.23 / 3)."""
+    found = multiple_correlation(np.array([[0.0, 1.0], [0.0, 1.2]]))
+    assert found.value == pytest.approx(np.sqrt(1.0 - 0.01 / 0.41))
+    assert multiple_correlation(np.array([[0.0], [1.0]])).status == Likeness.TOO_FEW
