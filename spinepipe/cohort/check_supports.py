@@ -6,7 +6,7 @@ from math import isnan
 from spinepipe.cohort.cohort import EVERYONE
 from spinepipe.cohort.draft import Draft, applied_loads
 from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Fixed, fixed
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 

@@ -13,8 +13,8 @@ from math import isnan
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.draft import AppliedLoad, Draft
-from spinepipe.cohort.text import Document
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, look_alike, name_fault
+from spinepipe.documents.yaml_text import Document
 from spinepipe.model import MOST_JOINTS
 from spinepipe.problems import Problem, Spelling
 

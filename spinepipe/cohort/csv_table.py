@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort.columns import Column, TableForm
-from spinepipe.documents.text import LONGEST_CELL, MOST_CSV_BYTES, read_text
+from spinepipe.documents.text import LONGEST_CELL, MOST_CSV_BYTES, longest_word, read_text
 from spinepipe.problems import Problem, Spelling
 
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -208,9 +208,7 @@ def _long_cells(file: str, records: Records) -> Iterator[Problem]:
 
 def _is_too_long(cell: str) -> bool:
     """Remarks may be longer than names and numbers; they are told by their blanks."""
-    if len(cell) <= LONGEST_CELL:
-        return False
-    return len(cell) > LONGEST_REMARK or max(map(len, cell.split())) > LONGEST_CELL
+    return len(cell) > LONGEST_REMARK or longest_word(cell) > LONGEST_CELL
 
 
 def _header_problems(file: str, header: list[str]) -> list[Problem]:

@@ -14,6 +14,7 @@ whose loads a rig shares.
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import log, sqrt
 
 import numpy as np
@@ -103,8 +104,12 @@ def _refused(cohort: Cohort, one: Doubt) -> bool:
     return one.certain and one.group not in cohort.i_mean_it
 
 
+@lru_cache(maxsize=8)
 def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
-    """All that looks wrong, one for each column and what is behind it."""
+    """All that looks wrong, one for each column and what is behind it.
+
+    Kept per cohort object: doubts and refusals are asked one after the other.
+    """
     told = list(_told(cohort))
     answers = (*_sizes(cohort, told), *_signs(cohort, told))
     found = (

@@ -23,8 +23,9 @@ from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
 from spinepipe.cohort.draft import Draft, applied_loads, number_of_applied_loads
 from spinepipe.cohort.misnamed import misnamed
-from spinepipe.cohort.text import Document, read_yaml, validate
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
+from spinepipe.documents.settings import validate
+from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem
 
 __all__ = ["read"]

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS
 

@@ -22,6 +22,11 @@ Also the byte-order mark `U+FEFF`, unless it begins the file, and what is no cha
 """
 
 
+def longest_word(text: str) -> int:
+    """Characters of the longest run without blanks; 0 of texts that are short as a whole."""
+    return max(map(len, text.split()), default=0) if len(text) > LONGEST_CELL else 0
+
+
 def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem]]:
     """Text of a UTF-8 file; a byte-order mark is allowed.
 

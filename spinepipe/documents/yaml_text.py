@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from spinepipe.documents.text import LONGEST_CELL, MOST_YAML_BYTES, read_text
+from spinepipe.documents.text import LONGEST_CELL, MOST_YAML_BYTES, longest_word, read_text
 from spinepipe.problems import Problem
 
 DEEPEST = 20
@@ -143,7 +143,7 @@ def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
 def _length_fault(text: str) -> tuple[str, str, str] | None:
     if len(text) > LONGEST_VALUE:
         return f"a text of {len(text)} characters", f"at most {LONGEST_VALUE}", "shorten it"
-    longest = max(map(len, text.split()), default=0) if len(text) > LONGEST_CELL else 0
+    longest = longest_word(text)
     if longest > LONGEST_CELL:
         found = f"a word or number of {longest} characters"
         return found, f"at most {LONGEST_CELL}", "shorten it, or look for a missing blank"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import Kind, create
 from spinepipe.model.file import EffectEntry, ModelFile, effects_for, read_model
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of

@@ -14,7 +14,7 @@ from spinepipe.anatomy.stiffness_range import middle
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.answers import UNSURE_M, joint_loads
 from spinepipe.cohort.measured import measured_specimen
-from spinepipe.cohort.text import read_yaml
+from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem, one_of
 from spinepipe.studies.parts import AUTO

@@ -12,7 +12,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles

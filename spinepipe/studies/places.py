@@ -6,7 +6,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import motion_read
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 

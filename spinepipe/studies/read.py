@@ -11,8 +11,9 @@ from pydantic import BaseModel, Field
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
-from spinepipe.cohort.text import Document, read_yaml, validate
+from spinepipe.documents.settings import validate
 from spinepipe.documents.strays import files_in, folders_in, strays_in
+from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM

@@ -13,7 +13,8 @@ import yaml
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import COHORT_YAML
-from spinepipe.cohort.text import read_yaml, validate
+from spinepipe.documents.settings import validate
+from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.problems import InputError, Problem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.recording import Recording, read_recording

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from spinepipe.cohort.cohort import VertebraName, joint_names
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,

@@ -1,12 +1,11 @@
 """What a cohort study demands of its cohort."""
 
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import create
 from spinepipe.model.file import read_model
 from spinepipe.problems import InputError, Problem, one_of
@@ -22,9 +21,6 @@ from spinepipe.studies.cohort_stiffness.settings import (
 from spinepipe.studies.cohort_stiffness.stiffening import EFFECT
 from spinepipe.studies.places import at, readings, unknown_levels, unknown_tests
 from spinepipe.units import ROTATIONS
-
-_UNFIT = re.compile(r"[/={}\\\x00-\x1f]|^\.|^\s|\s$")
-"""What names of files, or of rules' wildcards, do not bear."""
 
 
 def check_cohort_stiffness(
@@ -55,12 +51,8 @@ def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterat
     yield from unknown_tests(document, study.tests, cohort.tests)
     for name in study.tests or cohort.tests:
         reserved = name in (ALL, NOTHING) or name.startswith(ALL_BUT)
-        if name in cohort.tests and (reserved or _UNFIT.search(name)):
-            allowed = (
-                "names without / \\ = { } and control characters, not beginning with a dot or a "
-                "space, not ending with a space, and other than "
-                f"'{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
-            )
+        if name in cohort.tests and reserved:
+            allowed = f"names other than '{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
             place = (f"{cohort.folder.name}/loads.csv", None, "test")
             yield Problem(*place, f"test {name!r}", allowed, "rename it in loads and motion")
     yield from _measured(document, study, cohort)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import MEASURED
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import registered
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.discrepancy.settings import Discrepancy

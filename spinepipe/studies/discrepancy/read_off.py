@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spinepipe.calibrate.profile import NORMAL_95
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
 from spinepipe.model import SpineModel
 from spinepipe.statics import moved
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import NORMAL_95, covariance
+from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY
 
 STEP = 0.05

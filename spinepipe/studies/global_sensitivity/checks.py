@@ -5,7 +5,7 @@ from math import log2
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.studies.global_sensitivity.change import Change, Of

@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.check_geometry import landmark_problems
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import Problem, one_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity

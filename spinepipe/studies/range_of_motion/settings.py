@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import LARGEST_FOLLOWER_N
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.parts import (
     FORM,

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
 from spinepipe.studies.places import at

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.motion.bounds import bounds
 from spinepipe.motion.joint_tables import STATUSES
 from spinepipe.motion.passive_elements import passive_elements

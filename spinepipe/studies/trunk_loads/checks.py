@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from chain_cases import DEGREES, MOMENT_OF, STUDY, Chains
 
+from spinepipe.documents.names import ALLOWED
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -149,9 +150,15 @@ def test_names_that_no_table_may_have(name: str, tmp_path: Path) -> None:
     made = chains()
     for table in (made.loads, made.motion):
         table["test"] = table["test"].replace("left_lateral_bending", name)
-    problems = complaints(made, tmp_path)
-    assert {problem.file for problem in problems} <= {"chains/loads.csv", "chains/motion.csv"}
-    assert problems[0].file == "chains/loads.csv"
+    loads, motion = complaints(made, tmp_path)
+    assert (loads.file, motion.file) == ("chains/loads.csv", "chains/motion.csv")
+    if "\x07" in name:
+        assert "control character" in loads.found
+        return
+    assert loads.column == "test"
+    assert f"'{name}'" in loads.found
+    assert loads.allowed == ALLOWED
+    assert "rename" in loads.remedy
 
 
 def test_a_test_that_is_not_chosen_may_be_called_anything(tmp_path: Path) -> None:

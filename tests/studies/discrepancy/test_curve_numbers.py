@@ -8,11 +8,12 @@ import pytest
 from search_cases import exponential, grounds_of, one_sided, readings
 from spring_chain_cases import Yield
 
+from spinepipe.calibrate.profile import NORMAL_95
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.curve_numbers import Reach, field_number_rows, reaches, unit_of
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
-from spinepipe.studies.discrepancy.search.model_files import NORMAL_95, covariance
+from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.units import DEG_PER_RAD
 
 RATE = 9.0

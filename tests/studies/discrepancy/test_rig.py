@@ -13,7 +13,7 @@ import pytest
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import check_discrepancy

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import InputError
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import CENTRE, FILMS, PATIENTS

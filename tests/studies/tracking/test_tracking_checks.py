@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from tracked_cohort import BODIES, NAME, RATE, Motion, Spoil, write
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking

@@ -11,7 +11,7 @@ from installed import need_male
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort.columns import Column, TableForm
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles import myo_sim
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.problems import InputError, Problem

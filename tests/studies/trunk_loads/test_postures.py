@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.text import Document
+from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles.task import Task
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_trunk

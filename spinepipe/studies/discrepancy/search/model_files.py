@@ -15,8 +15,6 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-NORMAL_95 = 1.959964
-
 BORDER = {
     "rad": ("deg", DEG_PER_RAD),
     "m": ("mm", MM_PER_M),
