@@ -9,12 +9,12 @@ from spinepipe.documents.strays import files_in, folders_in
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
-from spinepipe.studies.study import COHORTS, Study
+from spinepipe.studies.study import COHORTS, STUDIES, Study
 
 
 def study_names(root: Path) -> list[str]:
     """Names of all study files."""
-    return [path.stem for path in files_in(root / studies.STUDIES, studies.ENDING)]
+    return [path.stem for path in files_in(root / STUDIES, studies.ENDING)]
 
 
 def cohort_names(root: Path) -> list[str]:

@@ -26,6 +26,9 @@ from spinepipe.units import MM_PER_M, ROTATIONS
 Landmarks = Mapping[str, Mapping[str, Array]]
 """Points in m, ground: vertebra to landmark to (3,)."""
 
+FOLLOWER_LOAD = "follower_load"
+"""The effect by which a cohort's ``follower_n`` acts."""
+
 STRICTLY_INSIDE = 1e-6
 """Share of the largest moment by which an inertia keeps off the limit: PyBullet needs some."""
 
@@ -136,7 +139,7 @@ def followers(cohort: Cohort, specimen: str) -> dict[str, float]:
 
 def cables(tension_n: Mapping[str, float], n_joints: int) -> tuple[ScopedEffect, ...]:
     """Cables through the centres of all joints, one per test; its tension is known, not fitted."""
-    cable, joints = create("follower_load"), tuple(range(n_joints))
+    cable, joints = create(FOLLOWER_LOAD), tuple(range(n_joints))
     beside = [parameter.default for parameter in cable.parameters[1:]]
     return tuple(
         ScopedEffect(cable, joints, np.array([[force, *beside]]), (test,))

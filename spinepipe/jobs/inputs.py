@@ -8,16 +8,14 @@ from typing import TypeVar
 from spinepipe.cohort import Cohort
 from spinepipe.files import Stamp, stamp
 from spinepipe.studies.read import check, read
-from spinepipe.studies.study import Study
+from spinepipe.studies.study import STUDIES, Study
 
 AnyStudy = TypeVar("AnyStudy", bound=Study)
 
 
 @lru_cache(maxsize=8)
 def _folder(name: str, root: str, _study_file: Stamp) -> Path:
-    return read(Path(root) / "config" / "studies" / f"{name}.yaml", Path(root)).cohort_folder(
-        Path(root)
-    )
+    return read(Path(root) / STUDIES / f"{name}.yaml", Path(root)).cohort_folder(Path(root))
 
 
 @lru_cache(maxsize=8)
@@ -34,7 +32,7 @@ def study_of(root: str, name: str) -> tuple[Study, Cohort]:
 
 def study_of_kind(kind: type[AnyStudy], root: str, name: str) -> tuple[AnyStudy, Cohort]:
     """The validated study and its cohort; read once per worker and state of the files."""
-    study_file = stamp(os.path.join(root, "config", "studies", f"{name}.yaml"))
+    study_file = stamp(os.path.join(root, STUDIES, f"{name}.yaml"))
     with os.scandir(_folder(name, root, study_file)) as entries:
         files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in entries)
     study, cohort = _study(name, root, study_file, tuple(files))

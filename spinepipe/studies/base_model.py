@@ -8,6 +8,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.studies.parts import FORM
+from spinepipe.studies.study import STUDIES
 
 __all__ = ["BUSHING", "Base", "beside_bushings", "made_by", "own_values"]
 
@@ -43,7 +44,7 @@ def made_by(path: Path, root: Path) -> str | None:
     folder, *below = path.relative_to(root).parts
     if folder != RESULTS or len(below) < 2:
         return None
-    return below[0] if (root / "config" / "studies" / f"{below[0]}.yaml").is_file() else None
+    return below[0] if (root / STUDIES / f"{below[0]}.yaml").is_file() else None
 
 
 def beside_bushings(

@@ -18,6 +18,7 @@ from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem, one_of
 from spinepipe.studies.parts import AUTO
+from spinepipe.studies.study import STUDIES
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 LEAST_SHARE = 0.1
@@ -104,10 +105,11 @@ def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[Problem, ...]:
     nobody = [name for name in holder.free if name in COORDINATES and name not in known]
     if not nobody:
         return ()
-    document, _ = read_yaml(root / "config" / "studies" / f"{study.study}.yaml", study.study)
+    file = STUDIES / f"{study.study}.yaml"
+    document, _ = read_yaml(root / file, study.study)
     if document is None or not _names_free(document.data, key):
         return ()  # left to the default, or put there in place of `auto`
-    place = (f"config/studies/{study.study}.yaml", document.line_of(key), key)
+    place = (file.as_posix(), document.line_of(key), key)
     found = f"{', '.join(nobody)}, which nobody measured in cohort '{cohort.name}'"
     remedy = "take it out: its stiffness would keep its start or run to a bound"
     return (Problem(*place, found, one_of(known), remedy),)

@@ -18,9 +18,7 @@ from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
 from spinepipe.studies.registry import kind_names, kind_of
-from spinepipe.studies.study import COHORTS, Study, cohort_folder
-
-STUDIES = Path("config") / "studies"
+from spinepipe.studies.study import COHORTS, STUDIES, Study, cohort_folder
 
 ENDING = ".yaml"
 """Of the files of studies."""

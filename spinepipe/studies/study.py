@@ -8,9 +8,9 @@ from pydantic import BaseModel, Field
 from spinepipe.documents.names import LONGEST_NAME
 from spinepipe.studies.parts import FORM
 
-__all__ = ["COHORTS", "Study", "cohort_folder"]
+__all__ = ["COHORTS", "STUDIES", "Study", "cohort_folder"]
 
-COHORTS = Path("config") / "cohorts"
+COHORTS, STUDIES = Path("config") / "cohorts", Path("config") / "studies"
 COHORT_NAME = re.compile(r"[a-z0-9_]+")
 
 

@@ -12,7 +12,7 @@ from spinepipe.problems import Problem
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.read import STUDIES
+from spinepipe.studies.study import STUDIES
 from spinepipe.units import COORDINATES, to_si
 
 KEY = "calibration.free"

@@ -4,11 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from testable_cases import case_of
+from testable_cases import case_of, spine_of
 
+from spinepipe.cohort.specimen import cables
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.design.extra_tests import MENU
-from spinepipe.studies.discrepancy.design.plans import Plan, Planned, as_made, comes_back, thinned
+from spinepipe.studies.discrepancy.design.plans import (
+    Plan,
+    Planned,
+    as_made,
+    comes_back,
+    thinned,
+    with_preloads,
+)
+from spinepipe.studies.discrepancy.design.runs import PRELOAD_N, runs
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
 
@@ -44,6 +53,35 @@ def test_additions_change_loads_and_times_as_they_say():
     assert (read[1:] == 3).all()
     assert (read[0] == 0).all()
     assert (added("not zeroed", plan).repeats()[0].count[0, :, 3:] == 3).all()
+
+
+def tensions(plan_or_tests, test: str) -> list[float]:
+    """Of the cables that act in a test of a spine whose cohort presses flexion with 100 N."""
+    spine = spine_of(2)
+    known = spine.with_effects((*spine.effects, *cables({"flexion": 100.0}, 2)))
+    found = with_preloads(known, plan_or_tests).effects
+    return [float(one.values[0, 0]) for one in found[1:] if one.in_scope(test)]
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "beside"),
+    [("opposite", "opposite", []), ("follower load", "preloaded", [PRELOAD_N])],
+)
+def test_added_tests_keep_the_follower_load_of_their_rig(words, name, beside):
+    cases = [case_of(test, 2, (0.0, 2.0, 4.0)) for test in ("flexion", "turning")]
+    tests = added(words, plan_of(*cases)).tests
+    assert tensions(tests, "flexion") == [100.0]
+    assert tensions(tests, f"flexion, {name}") == [100.0, *beside]
+    assert tensions(tests, "turning") == []
+    assert tensions(tests, f"turning, {name}") == beside
+
+
+def test_a_spine_set_up_anew_or_bent_the_other_way_is_under_its_follower_load():
+    menu = runs(plan_of(case_of("flexion", 2, (0.0, 2.0, 4.0))).tests, zeroed=True)
+    others = [one.test for one in menu if one.test.case.test != "flexion"]
+    assert {"flexion, set up anew", "added extension"} <= {one.case.test for one in others}
+    for one in others:
+        assert tensions([one], one.case.test) == [100.0]
 
 
 def test_what_a_plan_has_is_not_added():

@@ -198,7 +198,7 @@ def _unloaded(plan: Plan) -> Plan | None:
 def _opposite(plan: Plan) -> Plan | None:
     loads = [load for one in plan.tests for load in summed_loads(one.case)]
     missing = [
-        replace(one, case=replace(scaled(one.case, -1.0), test=f"{one.case.test}, opposite"))
+        one.renamed(replace(scaled(one.case, -1.0), test=f"{one.case.test}, opposite"))
         for one in plan.tests
         if not any(_is_opposite(load, peak(one.case)) for load in loads)
     ]
@@ -216,8 +216,8 @@ def _larger(plan: Plan) -> Plan | None:
 
 def _preloaded(plan: Plan) -> Plan | None:
     again = [
-        replace(one, case=replace(one.case, test=f"{one.case.test}, preloaded"), preload=PRELOAD_N)
-        for one in plan.tests
+        replace(one.renamed(replace(one.case, test=f"{name}, preloaded")), preload=PRELOAD_N)
+        for name, one in ((one.case.test, one) for one in plan.tests)
     ]
     return replace(plan, tests=(*plan.tests, *again))
 

@@ -3,15 +3,15 @@
 A plan says which loads there are, what is read, and which base is fitted to it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.cohort.specimen import cables
+from spinepipe.cohort.specimen import FOLLOWER_LOAD, cables
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, LoadStep, SpineModel
+from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import without_step_0
 
@@ -122,18 +122,37 @@ def largest_held(case: LoadCase) -> LoadCase:
 class Planned:
     """A test: its loads, and how often each coordinate of each joint is read, ``count`` (J, 6).
 
-    ``preload``: of a follower load through the joints' centres, N.
+    ``preload``: of a follower load through the joints' centres, N, beside that of the rig.
+    ``rig``: the test whose rig it is done in, if it is not called so itself.
     """
 
     case: LoadCase
     count: Indices
     preload: float = 0.0
+    rig: str = ""
+
+    def renamed(self, case: LoadCase) -> "Planned":
+        """A test of another name in the same rig."""
+        return replace(self, case=case, rig=self.rig or self.case.test)
 
 
 def with_preloads(model: SpineModel, tests: Sequence[Planned]) -> SpineModel:
-    """The model under the follower load of each test that has one: it is known and not fitted."""
+    """The model under the follower load of each test that has one: it is known and not fitted.
+
+    A follower load of the cohort acts in each test that is done in its rig.
+    """
+    rigs = {one.case.test: one.rig for one in tests if one.rig}
     tension_n = {one.case.test: one.preload for one in tests if one.preload > 0.0}
-    return model.with_effects((*model.effects, *cables(tension_n, model.n_joints)))
+    effects = (_in_rigs(scoped, rigs) for scoped in model.effects)
+    return model.with_effects((*effects, *cables(tension_n, model.n_joints)))
+
+
+def _in_rigs(scoped: ScopedEffect, rigs: Mapping[str, str]) -> ScopedEffect:
+    """A cable with the tests that are done under it; any other effect as it is."""
+    if scoped.effect.name != FOLLOWER_LOAD:
+        return scoped
+    more = (name for name, rig in rigs.items() if rig in scoped.tests and name not in scoped.tests)
+    return replace(scoped, tests=(*scoped.tests, *more))
 
 
 @dataclass(frozen=True)

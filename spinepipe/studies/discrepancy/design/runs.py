@@ -108,8 +108,8 @@ def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
             return Run(words, replace(once, case=changed), zeroed)
 
         yield run(f"{name}: once more", case)
-        anew = replace(case, test=f"{name}, set up anew")
-        yield run(f"{name}: specimen taken out, set up anew, once more", anew)
+        anew = once.renamed(replace(case, test=f"{name}, set up anew"))
+        yield Run(f"{name}: specimen taken out, set up anew, once more", anew, zeroed)
         yield from _read_more(once, zeroed)
         yield run(f"{name}: in twice as many load steps", refined(case))
         if not comes_back(case):
@@ -181,7 +181,7 @@ def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
                     case = replace(_turned(template.case, start, axis, sign), test=f"added {name}")
                     loads += _large(case)  # a test to both sides needs no other
                     words = f"new test: {name} ({_axis(start, axis, sign)})"
-                    yield Run(words, replace(once, case=case), zeroed)
+                    yield Run(words, once.renamed(case), zeroed)
 
 
 def _axis(start: int, axis: int, sign: float) -> str:
