@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from spinepipe.studies.registry import place_of
 
@@ -97,17 +98,23 @@ class Project:
         return {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end; `stdout` holds both streams."""
-        return subprocess.run(
-            [sys.executable, "-m", "snakemake", *arguments],
-            cwd=self.folder,
-            env=self.environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=_HANGS_S,
-            check=False,
-        )
+        """Run Snakemake to its end; `stdout` holds both streams.
+
+        A run that ends well leaves nothing in the system's temporary folder.
+        """
+        with TemporaryDirectory(prefix="run-", ignore_cleanup_errors=True) as temporary:
+            done = subprocess.run(
+                [sys.executable, "-m", "snakemake", *arguments],
+                cwd=self.folder,
+                env={**self.environment(), "TMPDIR": temporary},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=_HANGS_S,
+                check=False,
+            )
+            assert done.returncode or not os.listdir(temporary)
+        return done
 
     def run(self, *targets: str, cores: int = 2) -> str:
         """`snakemake` for these targets, or for `all`, that has to succeed; what it said."""
