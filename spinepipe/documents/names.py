@@ -20,7 +20,7 @@ SIGNS = " _-+.,:()%&*#·"
 
 ALLOWED = (
     f"at most {LONGEST_NAME} letters of one alphabet, digits, blanks and _ - + . , : ( ) % & * # ·"
-    f", at most {MOST_BYTES} bytes, a letter or digit first, no two dots in a row, no dot at the end"
+    f", {MOST_BYTES} bytes, a letter or digit first, no two dots in a row, no dot at the end"
 )
 
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")

@@ -23,6 +23,15 @@ def check_record():
         )
 
 
+def check_inventory():
+    """Refuse the one option with which Snakemake unpickles what lies on the disk."""
+    if workflow.dag_settings.trust_io_cache:
+        stop(
+            "--trust-io-cache reads .snakemake/iocache/latest.pkl, and to read a pickle is to run it. "
+            "Leave the option out: it saves seconds."
+        )
+
+
 @cache
 def sweep_temporary_files(study):
     """Remove what processes that are no more were writing into the results of a study."""
@@ -80,3 +89,4 @@ def bear_with_disks():
 leave_log = DAG.handle_log
 bear_with_disks()
 check_record()
+check_inventory()
