@@ -80,10 +80,9 @@ def test_damage_is_named_and_computed_again_by_the_same_run(done: Project) -> No
 def test_snakemake_is_not_let_unpickle_anything(done: Project) -> None:
     sprung = done.folder.parent / "sprung"
     planted.plant(done.folder, sprung)
-    refused = done.snakemake("-n", "--trust-io-cache", *TABLES)
-    assert refused.returncode != 0
-    assert "to read a pickle is to run it" in refused.stdout
-    assert "Traceback" not in refused.stdout
+    looked = done.snakemake("-n", "--trust-io-cache", *TABLES)
+    assert looked.returncode == 0, looked.stdout
+    assert "--trust-io-cache is ignored" in looked.stdout
     assert not sprung.exists()
 
 

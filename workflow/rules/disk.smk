@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 
 from snakemake.dag import DAG
+from snakemake.persistence import PersistenceBase
 
 from spinepipe.files import sweep
 
@@ -23,13 +24,12 @@ def check_record():
         )
 
 
-def check_inventory():
-    """Refuse the one option with which Snakemake unpickles what lies on the disk."""
-    if workflow.dag_settings.trust_io_cache:
-        stop(
-            "--trust-io-cache reads .snakemake/iocache/latest.pkl, and to read a pickle is to run it. "
-            "Leave the option out: it saves seconds."
-        )
+def load_no_inventory(self):
+    """Do without what a dry run left for --trust-io-cache: it is a pickle, and to read one is to run it."""
+    print(
+        "warn  --trust-io-cache is ignored: it reads a pickle, and to read one is to run it",
+        file=sys.stderr,
+    )
 
 
 @cache
@@ -84,9 +84,10 @@ def bear_with_disks():
         assert found == arguments, "see decision 0034"
     DAG.check_output_mtime = check_output_mtime
     DAG.handle_log = handle_log
+    assert hasattr(PersistenceBase, "load_iocache"), "see decision 0036"
+    PersistenceBase.load_iocache = load_no_inventory
 
 
 leave_log = DAG.handle_log
 bear_with_disks()
 check_record()
-check_inventory()
