@@ -1,7 +1,7 @@
 """Copies of the project that run small studies, so that no test touches its results.
 
 A project that several tests look at is built once per run of the tests (`Shared`); a test that
-changes something takes a copy of it.
+changes something takes a copy of it. Its results say nothing of the machine (`whereabouts`).
 """
 
 import fcntl
@@ -16,6 +16,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from whereabouts import told_of_the_machine
 
 from spinepipe.studies.registry import place_of
 
@@ -216,7 +218,9 @@ class Shared:
         folder, listing = self.folder / name, self.folder / f"{name}.json"
         if not listing.exists():
             assert not folder.exists(), f"the shared project {name} could not be built, see above"
-            listing.write_text(json.dumps(build(folder).files()))
+            built = build(folder)
+            assert told_of_the_machine(folder) == []
+            listing.write_text(json.dumps(built.files()))
         return Project(folder)
 
     def check(self) -> None:
