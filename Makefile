@@ -11,7 +11,7 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: all full test test-fast test-kernels lint bench validate mutants figures report env dev-env lock clean
+.PHONY: all full test test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/snakemake -j$(CORES) all
@@ -69,6 +69,9 @@ $(VENV)/dev.done: $(VENV)/runtime.done requirements-dev.lock
 lock:  ## renew the lock files from requirements*.in (needs uv)
 	uv pip compile requirements.in $(LOCK) -o requirements.lock
 	uv pip compile requirements-dev.in $(LOCK) -o requirements-dev.lock
+
+audit:  ## ask for known faults of the locked packages (needs uv and the network)
+	uvx pip-audit --require-hashes --disable-pip --requirement requirements.lock
 
 LOCK := --python-version 3.11 --generate-hashes --no-emit-index-url --no-header \
 	--no-annotate --prerelease=if-necessary

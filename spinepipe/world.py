@@ -12,7 +12,6 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -61,22 +60,23 @@ class _Client:
     def __init__(self) -> None:
         self.id = pybullet.connect(pybullet.DIRECT)
         self.generation = 0
-        self.folder = tempfile.TemporaryDirectory(prefix="spinepipe-urdf-")
 
     def load(self, model: SpineModel) -> int:
-        """Reset and load; the file name is new each time, PyBullet caches by name."""
+        """Reset and load; the file name is new each time, PyBullet caches by name.
+
+        No folder is kept between models: workers end without cleaning up behind them.
+        """
         pybullet.resetSimulation(physicsClientId=self.id)
         self.generation += 1
-        path = Path(self.folder.name) / f"{os.getpid()}-{self.generation}.urdf"
-        path.write_text(urdf(model), encoding="ascii")
+        file, path = tempfile.mkstemp(".urdf", f"spinepipe-{os.getpid()}-{self.generation}-")
         try:
-            body = pybullet.loadURDF(
-                str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=self.id
-            )
+            with open(file, "w", encoding="ascii") as opened:
+                opened.write(urdf(model))
+            body = pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS, physicsClientId=self.id)
         except pybullet.error as error:
             raise RefusedModel(f"{model.specimen}: PyBullet refused the model ({error})") from error
         finally:
-            path.unlink()
+            os.unlink(path)
         return int(body)
 
 

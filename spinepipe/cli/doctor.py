@@ -13,6 +13,8 @@ from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
+from spinepipe.reference.licences import pinned
+
 LOCK = "requirements.lock"
 PROFILE = Path("profiles") / "default" / "config.yaml"
 TUNED = {"force-use-threads": "true", "scheduler": "greedy"}
@@ -23,7 +25,6 @@ LARGEST_ERROR = 1e-9
 """Relative; Newton ends below 1e-9 rad of the closed form."""
 
 SECONDS_FOR_ENGINE = 120
-_PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^\s;\\]+)", re.MULTILINE)
 
 
 class Trouble(Exception):
@@ -77,7 +78,7 @@ def check_libraries(root: Path) -> str:
     lock = root / LOCK
     if not lock.is_file():
         raise Trouble(f"no {LOCK} in {root}", "go to the folder of the Snakefile or pass --root")
-    pins = dict(_PIN.findall(lock.read_text(encoding="utf-8")))
+    pins = pinned(lock)
     wrong = [told for name, wanted in pins.items() if (told := _deviation(name, wanted))]
     if wrong:
         remedy = f"run `pip install --require-hashes -r {LOCK}`"

@@ -24,6 +24,7 @@ from spinepipe.cohort.csv_table import read_table
 from spinepipe.cohort.draft import Draft, applied_loads, number_of_applied_loads
 from spinepipe.cohort.misnamed import misnamed
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
+from spinepipe.documents.inside import outside
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem
@@ -82,6 +83,9 @@ def _read_header(
     file = f"{name}/{COHORT_YAML}"
     if not _is_there(folder / COHORT_YAML):
         return None, None, [_missing(file), *misnamed(folder, name, [COHORT_YAML])]
+    led_out = outside(folder / COHORT_YAML, folder, (file, None, None), COHORT_YAML)
+    if led_out is not None:
+        return None, None, [led_out]
     document, problems = read_yaml(folder / COHORT_YAML, file)
     if document is None:
         return None, None, problems
@@ -105,11 +109,19 @@ def _read_tables(
         problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
     for stem, form in forms.items():
         if stem not in absent:
-            table, faults = read_table(folder / form.file, form, f"{name}/{form.file}")
+            table, faults = _read_one(folder / form.file, form, f"{name}/{form.file}")
             problems += faults
             if table is not None:
                 tables[stem] = table
     return tables, frozenset(absent)
+
+
+def _read_one(
+    path: Path, form: TableForm, file: str
+) -> tuple[pd.DataFrame | None, Sequence[Problem]]:
+    """A table of the folder; a link that leads out of it is not followed."""
+    led_out = outside(path, path.parent, (file, None, None), form.file)
+    return read_table(path, form, file) if led_out is None else (None, [led_out])
 
 
 def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:

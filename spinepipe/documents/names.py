@@ -12,12 +12,15 @@ from functools import cache
 LONGEST_NAME = 60
 """Characters; a path of several names stays within what systems bear (255 bytes a folder)."""
 
+MOST_BYTES = 200
+"""Of a name in UTF-8: with what stands before it in a folder's name it stays within 255."""
+
 SIGNS = " _-+.,:()%&*#·"
 """Signs that a name may have besides letters and digits."""
 
 ALLOWED = (
     f"at most {LONGEST_NAME} letters of one alphabet, digits, blanks and _ - + . , : ( ) % & * # ·"
-    ", a letter or digit first, no two dots in a row, no dot at the end"
+    f", {MOST_BYTES} bytes, a letter or digit first, no two dots in a row, no dot at the end"
 )
 
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -64,6 +67,8 @@ def _faults(name: str) -> Iterator[str]:
     if len(name) > LONGEST_NAME:
         yield f"a name of {len(name)} characters, '{name[:20]}…'"
         return
+    if len(name.encode()) > MOST_BYTES:
+        yield f"a name of {len(name.encode())} bytes in UTF-8, '{name[:20]}…'"
     strange = next((c for c in name if not (_is_part_of_a_word(c) or c in SIGNS)), None)
     if strange is not None:
         yield f"'{name}' with {_shown(strange)}"

@@ -37,6 +37,7 @@ _SECONDS_TO_DIE = 5
 _REMEDIES = {
     errno.ENOSPC: "no space is left on the disk of {folder}; free some space",
     errno.EDQUOT: "your disk quota is used up in {folder}; free some space",
+    errno.EFBIG: "a file in {folder} is larger than allowed here; raise the limit (ulimit -f)",
     errno.EACCES: "no permission to use {folder}; change its permissions or owner",
     errno.EPERM: "no permission to use {folder}; change its permissions or owner",
     errno.EROFS: "{folder} is on a read-only disk; run from a folder that can be written",

@@ -26,6 +26,7 @@ from spinepipe.cohort.cohort import CohortHeader
 from spinepipe.effects import Effect, Parameter, Trial, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.reference.licences import licences
 from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_form, every_kind
 from spinepipe.tables.schema import Column, Table
@@ -100,7 +101,7 @@ def generators() -> dict[str, Callable[[], str]]:
 
     A table with the name of another kind's is called by its kind as well.
     """
-    parts: dict[str, Callable[[], str]] = {"effects": effects}
+    parts: dict[str, Callable[[], str]] = {"effects": effects, "licences": licence_table}
     kinds = every_kind()
     shapes: dict[str, Table] = {}
     for name, kind in kinds.items():
@@ -120,6 +121,12 @@ def generators() -> dict[str, Callable[[], str]]:
     parts["keys model"] = partial(key_table, ModelFile)
     parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts
+
+
+def licence_table() -> str:
+    """Packages that the product runs on, and their licences."""
+    rows = [(code(one.package), one.version, one.licence, one.remark) for one in licences()]
+    return table(("package", "version", "licence", "remark"), rows)
 
 
 def result_table(shape: Table) -> str:

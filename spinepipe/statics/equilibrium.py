@@ -143,7 +143,8 @@ def _continue(
         elif increment > SMALLEST_FRACTION:
             increment *= 0.5
         else:
-            return _stopped(start if last is None else last.q, found, reached, iterations)
+            turned_too_far = found is None and _stands_beyond_motion(system, q, loading, states)
+            return _stopped(q, found, turned_too_far, reached, iterations)
     assert last is not None
     assert verdict is not None
     return _converged(last, iterations, verdict)
@@ -155,20 +156,37 @@ def _converged(found: _Newton, iterations: int, verdict: Stability) -> Equilibri
     return Equilibrium(found.q, found.factored, Status.CONVERGED, warning, iterations, 1.0)
 
 
-def _stopped(q: Array, found: _Newton | None, reached: float, iterations: int) -> Equilibrium:
+def _stopped(
+    q: Array, found: _Newton | None, turned_too_far: bool, reached: float, iterations: int
+) -> Equilibrium:
     """Continuation stalled: past the last stable pose there is an unstable one, or none near."""
     share = f"{100.0 * reached:.1f} % of the load increment"
+    message = f"no equilibrium near the last one beyond {share}: it tips over or snaps"
     if found is not None:
         message = f"the segment loses stability beyond {share}"
-        return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
-    message = f"no equilibrium near the last one beyond {share}: it tips over or snaps"
+    elif turned_too_far:
+        limit = f"{np.rad2deg(LARGEST_ROTATION):.0f} degrees"
+        message = f"a joint turns beyond {limit}, the limit of joint motion, beyond {share}"
     return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
 
 
-def _newton(system: System, start: Array, loading: Loading, states: States) -> _Newton | None:
+def _stands_beyond_motion(system: System, start: Array, loading: Loading, states: States) -> bool:
+    """Whether there is a stable pose nearby, but one that no joint reaches."""
+    found = _newton(system, start, loading, states, largest=np.inf)
+    return found is not None and _stability(system, found).stable
+
+
+def _newton(
+    system: System,
+    start: Array,
+    loading: Loading,
+    states: States,
+    largest: float = LARGEST_ROTATION,
+) -> _Newton | None:
     """Newton from ``start``; None unless the steps contract onto a pose within joint motion.
 
-    A step beyond the ends of a law, where it carries without limit, is halved.
+    A step beyond the ends of a law, where it carries without limit, is halved. ``largest`` is the
+    rotation where joint motion ends, rad.
     """
     q, last = system.start(start, loading), np.inf
     step: Array | None = None
@@ -185,16 +203,12 @@ def _newton(system: System, start: Array, loading: Loading, states: States) -> _
         step = factored.solve(-balance.residual)
         size = float((np.abs(step).reshape(-1, 6) / STEP_TOLERANCE).max())
         q = q + step
-        if not size < 4.0 * last or _beyond_motion(q):
+        if not size < 4.0 * last or np.abs(q.reshape(-1, 6)[:, 3:]).max() > largest:
             return None
         if size < 1.0:
             return _Newton(q, factored, balance.tangent, iteration)
         last = size
     return None
-
-
-def _beyond_motion(q: Array) -> bool:
-    return bool(np.abs(q.reshape(-1, 6)[:, 3:]).max() > LARGEST_ROTATION)
 
 
 def _stability(system: System, found: _Newton) -> Stability:

@@ -1,7 +1,7 @@
 """Copies of the project that run small studies, so that no test touches its results.
 
 A project that several tests look at is built once per run of the tests (`Shared`); a test that
-changes something takes a copy of it.
+changes something takes a copy of it. Its results say nothing of the machine (`whereabouts`).
 """
 
 import fcntl
@@ -15,6 +15,9 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from whereabouts import told_of_the_machine
 
 from spinepipe.studies.registry import place_of
 
@@ -97,17 +100,23 @@ class Project:
         return {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end; `stdout` holds both streams."""
-        return subprocess.run(
-            [sys.executable, "-m", "snakemake", *arguments],
-            cwd=self.folder,
-            env=self.environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=_HANGS_S,
-            check=False,
-        )
+        """Run Snakemake to its end; `stdout` holds both streams.
+
+        A run that ends well leaves nothing in the system's temporary folder.
+        """
+        with TemporaryDirectory(prefix="run-", ignore_cleanup_errors=True) as temporary:
+            done = subprocess.run(
+                [sys.executable, "-m", "snakemake", *arguments],
+                cwd=self.folder,
+                env={**self.environment(), "TMPDIR": temporary},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=_HANGS_S,
+                check=False,
+            )
+            assert done.returncode or not os.listdir(temporary)
+        return done
 
     def run(self, *targets: str, cores: int = 2) -> str:
         """`snakemake` for these targets, or for `all`, that has to succeed; what it said."""
@@ -209,7 +218,9 @@ class Shared:
         folder, listing = self.folder / name, self.folder / f"{name}.json"
         if not listing.exists():
             assert not folder.exists(), f"the shared project {name} could not be built, see above"
-            listing.write_text(json.dumps(build(folder).files()))
+            built = build(folder)
+            assert told_of_the_machine(folder) == []
+            listing.write_text(json.dumps(built.files()))
         return Project(folder)
 
     def check(self) -> None:

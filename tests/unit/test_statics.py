@@ -148,8 +148,19 @@ def test_the_same_weight_stands_on_stiffer_springs() -> None:
 def test_a_weight_off_centre_tips_over_without_another_pose() -> None:
     solved = under(upright(2, (1e5, 3e5, 1e5, 5.0, 50.0, 90.0), 10.0, (0.01, 0.1, 0.0), 1e-3))
     assert solved.equilibrium.status is Status.UNSTABLE
+    assert "a joint turns beyond 80 degrees" in solved.equilibrium.message
     assert "%" in solved.equilibrium.message
     assert np.abs(solved.equilibrium.q).max() < np.deg2rad(80.0)
+
+
+def test_a_joint_that_turns_too_far_is_not_said_to_tip_over() -> None:
+    """2 N m on 1 N m/rad would stand at 115 degrees; 80 are reached at 70 % of it."""
+    solved = under(upright(1, (1e5, 3e5, 1e5, 1.0, 40.0, 90.0)), moment(0, 0.0, 0.0, 2.0))
+    assert solved.equilibrium.status is Status.UNSTABLE
+    # the load goes on in fractions of 1/1024
+    assert solved.equilibrium.reached == pytest.approx(np.deg2rad(80.0) / 2.0, abs=1.0 / 1024.0)
+    assert "a joint turns beyond 80 degrees" in solved.equilibrium.message
+    assert "tips over" not in solved.equilibrium.message
 
 
 def test_a_chain_is_not_used_after_another_was_loaded() -> None:

@@ -4,6 +4,7 @@ import os
 import time
 from pathlib import Path
 
+import planted
 import pytest
 from small_project import Project, Shared
 from small_tables import TABLES, project_with_tables, simulation
@@ -11,7 +12,7 @@ from small_tables import TABLES, project_with_tables, simulation
 pytestmark = pytest.mark.slow
 
 FLIPPED, EMPTY, CUT = simulation(0, "best01"), simulation(1, "best01"), simulation(2, "best01")
-LATE = simulation(3, "best01")
+LATE, PICKLED = simulation(3, "best01"), simulation(0, "best02")
 RANKED, BLOCK = "small/best.json", "small/blocks/simulations/specimen=s01/block=001.parquet"
 
 REMOVED = """
@@ -56,19 +57,33 @@ def test_damage_is_named_and_computed_again_by_the_same_run(done: Project) -> No
     dead, living = (f".stiffness=best01.parquet.{pid}" for pid in (2**30, os.getpid()))
     for name in (dead, living):
         (folder / name).write_bytes(b"PAR1")
+    sprung = done.folder.parent / "sprung"
+    spoil(done, PICKLED, planted.a_pickle(sprung))
+    strays = planted.plant(done.folder, sprung)
 
     planned = done.snakemake("-n", *TABLES)
     assert planned.returncode == 0, planned.stdout
     assert (folder / dead).exists()  # a look changes nothing
     said = done.run(*TABLES)
-    for name in (FLIPPED, EMPTY, CUT, RANKED):  # the block is made again as its jobs are
+    for name in (FLIPPED, EMPTY, CUT, PICKLED, RANKED):  # the block is made again as its jobs are
         assert said.count(f"results/{name} is damaged") == 1
     assert f"results/{LATE} is dated" in said
     assert "Traceback" not in said
     assert not (folder / dead).exists()
-    (folder / living).unlink()
+    assert not sprung.exists()  # nothing that was planted has run
+    for path in (folder / living, *strays):
+        path.unlink(missing_ok=True)
     assert done.contents() == content
     assert done.planned(*TABLES) == set()
+
+
+def test_snakemake_is_not_let_unpickle_anything(done: Project) -> None:
+    sprung = done.folder.parent / "sprung"
+    planted.plant(done.folder, sprung)
+    looked = done.snakemake("-n", "--trust-io-cache", *TABLES)
+    assert looked.returncode == 0, looked.stdout
+    assert "--trust-io-cache is ignored" in looked.stdout
+    assert not sprung.exists()
 
 
 def test_of_many_damaged_files_five_are_named(done: Project) -> None:

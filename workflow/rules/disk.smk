@@ -7,6 +7,8 @@ import time
 from contextlib import suppress
 
 from snakemake.dag import DAG
+from snakemake.persistence import PersistenceBase
+from snakemake.persistence.file import FilePersistence
 
 from spinepipe.files import sweep
 
@@ -21,6 +23,14 @@ def check_record():
             f"{Path(kept[0]).resolve()} cannot be written, where Snakemake keeps its record. Change "
             "its permissions or owner, or copy the project to a folder of your own."
         )
+
+
+def load_no_inventory(self):
+    """Do without what a dry run left for --trust-io-cache: it is a pickle, and to read one is to run it."""
+    print(
+        "warn  --trust-io-cache is ignored: it reads a pickle, and to read one is to run it",
+        file=sys.stderr,
+    )
 
 
 @cache
@@ -64,19 +74,32 @@ async def handle_log(self, job):
         await leave_log(self, job)
 
 
+def read_record(self, key):
+    """Snakemake's own record of a file; none where it is damaged, as the file's mark decides."""
+    try:
+        return read_sound_record(self, key)
+    except ValueError:
+        return None
+
+
 def bear_with_disks():
-    """Have Snakemake say in a sentence what it ends a run for."""
+    """Have Snakemake say in a sentence what it ends a run for, and believe nothing that is damaged."""
     asked = {
-        "check_output_mtime": ["self", "job", "expanded_output"],
-        "handle_log": ["self", "job"],
+        (DAG, "check_output_mtime"): ["self", "job", "expanded_output"],
+        (DAG, "handle_log"): ["self", "job"],
+        (FilePersistence, "_read_record"): ["self", "key"],
+        (PersistenceBase, "load_iocache"): ["self"],
     }
-    for name, arguments in asked.items():
-        found = list(inspect.signature(getattr(DAG, name)).parameters)
-        assert found == arguments, "see decision 0034"
+    for (owner, name), arguments in asked.items():
+        found = list(inspect.signature(getattr(owner, name)).parameters)
+        assert found == arguments, "see decisions 0034 and 0036"
     DAG.check_output_mtime = check_output_mtime
     DAG.handle_log = handle_log
+    FilePersistence._read_record = read_record
+    PersistenceBase.load_iocache = load_no_inventory
 
 
 leave_log = DAG.handle_log
+read_sound_record = FilePersistence._read_record
 bear_with_disks()
 check_record()

@@ -99,9 +99,13 @@ def say_where():
 
 
 def sweep_logs():
-    """Remove the empty logs that Snakemake leaves for every job that went well."""
-    for name in studies_at_work():
-        for folder, _, files in os.walk(f"results/{name}/logs", topdown=False):
+    """Remove the empty logs that Snakemake leaves for every job that went well.
+
+    A folder of logs that is a link is somebody's own.
+    """
+    folders = (f"results/{name}/logs" for name in studies_at_work())
+    for logs in (folder for folder in folders if not os.path.islink(folder)):
+        for folder, _, files in os.walk(logs, topdown=False):
             for path in (os.path.join(folder, file) for file in files):
                 if not os.path.getsize(path):
                     os.unlink(path)

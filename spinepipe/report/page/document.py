@@ -181,7 +181,7 @@ class Document:
             left_out=self.left_out,
             space=space,
             still=_address(space.still),
-            scenes=Markup(as_script(space.scenes)),  # nothing in it could end the element
+            scenes=Markup(as_script(space.as_data())),  # nothing in it could end the element
             style=Markup(_part("page.css")),
             script=Markup(_part("page.js.html")),
             plotly=Markup(get_plotlyjs()) if space.scenes else "",

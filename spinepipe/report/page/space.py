@@ -1,5 +1,6 @@
 """The 3-D view of a page: scenes of which one is shown at a time, by default of the specimens."""
 
+import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -42,6 +43,28 @@ class Space:
     def moves(self) -> bool:
         """Whether some scene has frames."""
         return any(scene.get("frames") for scene in self.scenes.values())
+
+    def as_data(self) -> dict[str, Any]:
+        """The scenes for plotly, which reads its texts as markup: names are no tags of its own."""
+        return {name: {**one, "data": _as_text(one["data"])} for name, one in self.scenes.items()}
+
+
+_TEXTS = ("name", "text")
+"""Keys of a trace that plotly shows."""
+
+
+def _as_text(traces: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {**trace, **{key: _escaped(trace[key]) for key in _TEXTS if key in trace}}
+        for trace in traces
+    ]
+
+
+def _escaped(words: Any) -> Any:
+    """A text, or texts, without what begins a tag or an entity."""
+    if isinstance(words, list | tuple):
+        return [_escaped(one) for one in words]
+    return html.escape(words, quote=False) if isinstance(words, str) else words
 
 
 def segment(

@@ -194,4 +194,6 @@ def _class(name: str) -> type:
         found = getattr(found, part)
     if not (isinstance(found, type) and (is_dataclass(found) or issubclass(found, Enum))):
         raise ValueError(f"{name} is no class of data")
+    if _name(found) != name:  # found through an import, so by another name than its own
+        raise ValueError(f"{name} is called {_name(found)}")
     return found

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.inside import outside
 from spinepipe.effects.contract import Array
 from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.points import marker_places
@@ -41,6 +42,7 @@ def row_problems(cohort: Cohort) -> Iterator[Problem]:
         rows = trial_rows(cohort, specimen)
         for row in rows:
             yield from _words(file, row)
+            yield from _led_out(file, row, cohort.folder)
             yield from _crop(file, row)
         yield from _needed(file, cohort, specimen, rows)
 
@@ -64,6 +66,13 @@ def _words(file: str, row: Row) -> Iterator[Problem]:
             allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
             remedy = "name each axis once, a minus where it points the other way"
             yield Problem(file, row["line"], "axes", str(error), allowed, remedy)
+
+
+def _led_out(file: str, row: Row, folder: Path) -> Iterator[Problem]:
+    name = str(row["file"])
+    led_out = outside(folder / name, folder, (file, row["line"], "file"), name)
+    if led_out is not None:
+        yield led_out
 
 
 def _crop(file: str, row: Row) -> Iterator[Problem]:

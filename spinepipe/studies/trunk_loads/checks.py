@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.inside import outside
 from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
@@ -41,7 +42,7 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
         yield from _without_geometry(document, cohort)
         yield from _several_trunks(cohort)
     yield from muscle_problems(cohort)
-    yield from _regressions(study, cohort)
+    yield from _regressions(document, study, cohort)
 
 
 def check_source(
@@ -86,8 +87,13 @@ def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
             yield Problem(f"{cohort.name}/joints.csv", line, "specimen", found, allowed, remedy)
 
 
-def _regressions(study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
+def _regressions(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
     """Faults of a table of the user's own."""
+    name, folder = study.regressions, cohort.folder
+    led_out = outside(folder / name, folder, at(document, "regressions"), name)
+    if led_out is not None:
+        yield led_out
+        return
     try:
         regressions_of(study, cohort.folder)
     except InputError as error:

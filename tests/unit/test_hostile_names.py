@@ -1,0 +1,192 @@
+"""No name and no text of anybody becomes markup, in page or figures of any kind of study."""
+
+import json
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from drawn import caption, drawings
+from hostile import HARMLESS, PAYLOAD, Structure, mapped, renamed
+from made_results import MAKERS, Made, made
+
+from spinepipe.documents.names import folder_fault, name_fault
+from spinepipe.marks import marked
+from spinepipe.report.page import document as page
+from spinepipe.report.page import space
+from spinepipe.report.page.document import Document, Picture, Results, origin
+from spinepipe.report.style import picture, style
+from spinepipe.studies.registry import PACKAGE, kind_names, kind_of
+from spinepipe.studies.tracking import in_space_still as tracking_still
+from spinepipe.studies.trunk_loads import in_space as trunk_space
+
+ROOT = Path(__file__).resolve().parents[2]
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
+SHORT = "<script>&\"'-->]]></svg>"
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the library, five megabytes that are the same in every page, and without stills."""
+    monkeypatch.setattr(page, "get_plotlyjs", lambda: "/* drawing library */")
+    for module in (space, tracking_still, trunk_space):
+        monkeypatch.setattr(module, "picture", lambda figure, kind: SVG.encode())
+
+
+def document_of(found: Made) -> Document:
+    """What the kind puts on its page."""
+    metadata = {name: {"seed": "7", "study": found.study.study} for name in found.tables}
+    titles = {one.name: one.title for one in kind_of(found.study.kind).figures}
+    pictures = {name: Picture.of(name, title, SVG, "Words.") for name, title in titles.items()}
+    write = import_module(f"{PACKAGE}.{found.study.kind}.page").document
+    shown: Document = write(found.study, found.cohort, Results(found.tables, metadata, pictures))
+    return shown
+
+
+def scenes_of(text: str) -> Any:
+    """What the script of a page is given to draw; nothing of a page without a view in space."""
+    read = re.findall(r'<script type="application/json" id="scenes">(.*?)</script>', text)
+    return json.loads(read[0]) if read else {}
+
+
+def assert_alike(hostile: str, harmless: str) -> None:
+    """Both pages have the same elements and attributes, and run the same scripts."""
+    found, expected = Structure(hostile), Structure(harmless)
+    assert found.elements == expected.elements
+    assert not [one for one in found.elements if re.search(r" on\w+( |$)", one)]
+    for address in found.addresses:
+        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
+    own = [script for script in found.scripts if not script.startswith("{")]
+    assert own == [script for script in expected.scripts if not script.startswith("{")]
+    assert all("<" not in script for script in found.scripts if script.startswith("{"))
+
+
+@pytest.fixture(params=sorted(MAKERS), scope="module")
+def results(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """Made-up results of each kind in turn."""
+    return made(request.param, tmp_path_factory.mktemp(request.param))
+
+
+def test_every_kind_is_tried() -> None:
+    assert set(MAKERS) == set(kind_names())
+
+
+@pytest.mark.filterwarnings("ignore:constrained_layout not applied:UserWarning")
+def test_names_of_people_never_become_markup(results: Made, tmp_path: Path) -> None:
+    """Specimens, vertebrae, tests, tasks, persons, trials, messages: all end with the payload."""
+    pages = []
+    for payload in (PAYLOAD, HARMLESS):
+        found = renamed(results, payload, tmp_path)
+        pages.append(document_of(found).html(found.study, found.cohort))
+    assert pages[0].count("&lt;script&gt;alert(1)") > 10, "they do stand in the page"
+    assert_alike(*pages)
+    hostile, harmless = map(scenes_of, pages)
+    assert len(hostile) == len(harmless)
+    shown = [words for scene in hostile.values() for words in _texts_of(scene)]
+    assert not [words for words in shown if re.search(r"<[a-z/]", words)]
+
+
+def _texts_of(scene: Any) -> Iterator[str]:
+    for trace in scene["data"]:
+        for words in (trace.get("name", ""), trace.get("text", "")):
+            yield from [words] if isinstance(words, str) else words
+
+
+@pytest.mark.parametrize("kind", ["joint_pose_sensitivity", "discrepancy"])
+def test_no_text_of_a_page_becomes_markup(kind: str, tmp_path: Path) -> None:
+    """Each text of document, settings and cohort ends with the payload, with and without a verdict.
+
+    All kinds have one template.
+    """
+    results = made(kind, tmp_path)
+    whole = document_of(results)
+    pages = []
+    for payload in (PAYLOAD, HARMLESS):
+
+        def change(text: str, payload: str = payload) -> str:
+            return text if text in ("data", "frames", "name", "text") else text + payload
+
+        study, told = mapped(results.study, change), mapped(whole, change)
+        words = {"title": change("t"), "source": change("s")}
+        cohort = type(results.cohort)(**{**vars(results.cohort), **words})
+        pages.append(told.html(_as_settings(study), cohort))
+    assert_alike(*pages)
+
+
+def _as_settings(study: Any) -> Any:
+    """Settings that may hold any text when they are written out."""
+    plain = json.loads(json.dumps(mapped(dict(study), lambda text: text), default=str))
+
+    class Written:
+        study, kind = plain["study"], plain["kind"]
+
+        def model_dump(self, mode: str) -> Any:
+            return plain
+
+    return Written()
+
+
+def test_settings_are_shown_as_text(results: Made) -> None:
+    """YAML of settings is written by the safe writer, which names no types to build."""
+    assert "!!" not in origin(results.study, {}).settings
+
+
+@pytest.mark.filterwarnings("ignore:constrained_layout not applied:UserWarning")
+def test_no_name_becomes_an_element_of_a_figure(results: Made, tmp_path: Path) -> None:
+    """Text is drawn as outlines; what is left of it is a comment of matplotlib's."""
+    found = renamed(results, SHORT, tmp_path)
+    kind = kind_of(found.study.kind)
+    figures = [f for f in kind.figures if set(f.tables) <= set(found.tables)]
+    figure = next((f for f in figures if set(f.reads) <= {*found.tables, "verdict.json"}), None)
+    assert figure is not None
+    with style():
+        drawing = drawings(found.study.kind)[figure.name](found.study, found.cohort, found.tables)
+        svg = picture(drawing, "svg")
+    assert_is_a_drawing(marked(svg, ".svg", "0" * 64))
+
+
+DRAWN = {"svg", "g", "path", "defs", "use", "clipPath", "rect", "style", "image", "text", "pattern"}
+DRAWN |= {"metadata", "RDF", "Work", "type", "format", "creator", "Agent", "title"}
+
+
+def assert_is_a_drawing(svg: bytes) -> None:
+    """Shapes and nothing that runs, is fetched or ends the drawing early."""
+    for element in ElementTree.fromstring(svg).iter():
+        assert element.tag.split("}")[-1] in DRAWN
+        for name, value in element.attrib.items():
+            assert not name.split("}")[-1].startswith("on")
+            if name.endswith("href"):
+                assert value.startswith(("#", "data:image/png;base64,"))
+    assert b"<script" not in svg
+
+
+@pytest.mark.parametrize("text", [PAYLOAD, SHORT, "<b>", "a&lt;b", "javascript:alert(1)//<"])
+def test_such_names_are_refused_already(text: str) -> None:
+    assert name_fault(text)
+    assert folder_fault(text)
+
+
+def test_only_the_page_vouches_for_markup() -> None:
+    """`Markup` is said of its own parts alone; no template switches the escaping off."""
+    vouching = re.compile(r"Markup|from_string|get_template|markupsafe|jinja2")
+    users = {
+        path.relative_to(ROOT / "spinepipe").as_posix()
+        for path in (ROOT / "spinepipe").rglob("*.py")
+        if vouching.search(path.read_text(encoding="utf-8"))
+    }
+    assert users == {"report/page/document.py"}
+    template = (ROOT / "spinepipe/report/page/page.html").read_text()
+    assert not re.search(r"\|\s*safe|autoescape", template)
+    scripts = (ROOT / "spinepipe/report/page/page.js.html").read_text()
+    assert not re.search(r"innerHTML|outerHTML|document\.write|insertAdjacentHTML|eval\(", scripts)
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_captions_hold_no_names_and_no_directives(kind: str) -> None:
+    """They come with the kind, so in `snakemake --report` nobody's name meets reStructuredText."""
+    for figure in kind_of(kind).figures:
+        text = caption(kind, figure.name).read_text(encoding="utf-8")
+        assert not re.search(r"^\s*\.\. |\{\{|\{%|::\s*$|`_", text, re.MULTILINE), figure.name
