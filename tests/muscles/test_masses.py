@@ -91,6 +91,32 @@ def test_centres_of_parts_of_a_straight_trunk() -> None:
     assert found["upper trunk"].here_cm == pytest.approx(float(expected))
 
 
+def test_centres_of_parts_go_with_the_vertebrae() -> None:
+    """A bent trunk moves the centre of a part by the mean of its vertebrae, and its level too."""
+    trunk = made_up_trunk()
+    forwards = np.random.default_rng(4).uniform(-0.05, 0.05, 17)
+    bent = trunk.vertebrae * [0, 1, 1] + np.outer(forwards, [1, 0, 0])
+    checks = {c.part: c.here_cm for c in centre_checks(replace(trunk, vertebrae=bent))}
+    straight = {
+        c.part: c.here_cm
+        for c in centre_checks(replace(trunk, vertebrae=trunk.vertebrae * [0, 1, 1]))
+    }
+    weights = np.linspace(1.1, 2.6, 17)
+    cuts = {"upper trunk": (0.0, 18.5), "middle trunk": (18.5, 30.7)}
+    cuts["trunk, T1 to L5"] = (0.0, weights.sum())
+    levels = {"upper trunk": ("T7", "T8"), "middle trunk": ("L3", "L4")}
+    levels["trunk, T1 to L5"] = ("L1", "L2")
+    assert set(checks) == set(cuts)
+    for part, (low, high) in cuts.items():
+        moved, kg, end = 0.0, 0.0, 0.0
+        for weight, x in zip(weights, forwards, strict=True):
+            inside = max(0.0, min(high, end + weight) - max(low, end))
+            moved, kg, end = moved + inside * x, kg + inside, end + weight
+        level = np.mean([forwards[SLICES.index(name)] for name in levels[part]])
+        assert kg == pytest.approx(high - low)
+        assert checks[part] - straight[part] == pytest.approx(100.0 * (moved / kg - level))
+
+
 def test_arms_that_hang_pull_straight_down_from_the_shoulders() -> None:
     loads = arm_loads(REFERENCE, SHOULDERS, Hands(kg=10.0), arm_length=0.65)
     assert sum(load.force[1] for load in loads) == pytest.approx(-G * (0.0988 * 75.1 + 10.0))

@@ -263,9 +263,7 @@ def test_packaged_trends_are_the_published_ones() -> None:
 
 
 @pytest.mark.parametrize("sex", ["male", "female"])
-def test_each_form_is_what_its_line_says(
-    tmp_path: Path, sex: Literal["male", "female"]
-) -> None:
+def test_each_form_is_what_its_line_says(tmp_path: Path, sex: Literal["male", "female"]) -> None:
     """Five coefficients of which none is nought or one, written out from the module's words."""
     person = Subject(sex, 40.0, 1.60, 70.0)
     male = 1.0 if sex == "male" else 0.0

@@ -33,8 +33,9 @@ def nearest(path: str, count: int, beyond: int = 0) -> list[str]:
         if module in steps:
             named = test.stem in (f"test_{stem}", f"test_{stem}s")
             ranked.append((not named, steps[module], len(steps), _name(test)))
-        elif any(name in _text(test) for name in called):
-            ranked.append((True, 3, len(steps), _name(test)))
+        elif often := sum(_text(test).count(name) for name in called):
+            far = 4 if "studies" in test.parts else 3  # these try many effects
+            ranked.append((True, far, -often, _name(test)))
     found = [name for *_, name in sorted(ranked)][beyond : beyond + count]
     return [*found, *OF_ALL] if beyond else found
 

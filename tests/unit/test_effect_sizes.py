@@ -30,7 +30,9 @@ def variants() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 EVERY = pytest.mark.parametrize(
-    ("name", "options"), tuple(variants()), ids=lambda one: one if isinstance(one, str) else str(one)
+    ("name", "options"),
+    tuple(variants()),
+    ids=lambda one: one if isinstance(one, str) else str(one),
 )
 
 
