@@ -133,6 +133,17 @@ def test_cross_sections_follow_their_muscle_and_stated_factors_come_on_top(
     np.testing.assert_array_equal(found.disc_area, 1.5 * trunk.disc_area)
 
 
+def test_a_cross_section_follows_the_vertebra_nearest_to_its_middle(tmp_path: Path) -> None:
+    """Half way up multifidus is 40 mm, at L5; longissimus 160 mm, L1; obliques 200 mm, T11."""
+    trunk = made_up_trunk()
+    heavy = replace(REFERENCE, mass_kg=1.5 * REFERENCE.mass_kg)
+    rows = [f"*,{level},pcsa,power,0,0,0,0,{k}" for k, level in ((1, "L5"), (2, "L1"), (3, "T11"))]
+    found = scaled(trunk, heavy, REFERENCE, table(tmp_path, *rows))
+    times = dict(zip(trunk.muscles.names, found.muscles.pcsa / trunk.muscles.pcsa, strict=True))
+    expected = {"multifidus_r": 1.5, "longissimus_r": 1.5**2, "oblique_r": 1.5**3}
+    assert {name: times[name] for name in expected} == pytest.approx(expected)
+
+
 def test_what_ends_in_the_rectus_sheath_moves_with_the_sheath(tmp_path: Path) -> None:
     trunk = made_up_trunk()
     sheath = trunk.sheath.copy()
