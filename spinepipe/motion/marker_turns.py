@@ -7,7 +7,10 @@ from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 
 FLAT = 1e-6
-"""Second extent of a group over its first below which it is a line, which tells no turn."""
+"""Second extent of a group over its first below which it is a line, which tells no turn.
+
+Two markers are a line, and one has no extent.
+"""
 
 
 def turns(model: Array, places: Array, seen: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
@@ -25,7 +28,7 @@ def turns(model: Array, places: Array, seen: NDArray[np.bool_]) -> tuple[Array, 
     from_middle = seen[..., None] * (model - (share * model).sum(axis=1, keepdims=True))
     apart = seen[..., None] * (places - (share * places).sum(axis=1, keepdims=True))
     left, sizes, right = svd(np.einsum("fki,fkj->fij", apart, from_middle))
-    told = np.asarray((count > 2) & (sizes[:, 1] > FLAT * np.maximum(sizes[:, 0], FLAT**3)))
+    told = np.asarray(sizes[:, 1] > FLAT * np.maximum(sizes[:, 0], FLAT**3))
     hand = np.ones((len(places), 3))
     hand[:, 2] = np.sign(np.linalg.det(left) * np.linalg.det(right))
     found = np.einsum("fij,fj,fjk->fik", left, hand, right)

@@ -34,12 +34,12 @@ def read_c3d(path: Path, file: str) -> Recorded:
     point = content["parameters"]["POINT"]
     raw = content["data"]["points"][:3].transpose(2, 1, 0)
     names = _labels(point)[: raw.shape[1]]
-    rate = float(np.ravel(_value(point, "RATE") or [0.0])[0])
+    rate = float(next(iter(_value(point, "RATE")), 0.0))
     if not rate > 0.0 or not raw.size:
         found = f"{rate:g} frames a second, {raw.shape[0]} frames of {raw.shape[1]} markers"
         remedy = "export the motion again"
         raise InputError([Problem(file, None, "POINT:RATE", found, "all above 0", remedy)])
-    scale = unit_of(file, None, "POINT:UNITS", str((_value(point, "UNITS") or [""])[0]))
+    scale = unit_of(file, None, "POINT:UNITS", str(next(iter(_value(point, "UNITS")), "")))
     lost = content["data"]["meta_points"]["residuals"][0].T < 0.0
     places = np.where(lost[..., None], np.nan, scale * raw)
     time_s = (content["header"]["points"]["first_frame"] + np.arange(len(raw))) / rate

@@ -11,7 +11,7 @@ height of T12L1 lies midway between its neighbours. They are no ground for accep
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.trunk import LEVELS, SLICES
+from spinepipe.muscles.trunk import LEVELS
 
 _L4L5_AREA_MM2 = 1455.0
 
@@ -73,7 +73,5 @@ def disc_tilts(vertebrae: Array) -> Array:
 
 def vertebra_centres(joints: Array) -> Array:
     """(17, 3) m, T1 to L5, midway between their joints, (18, 3) m, from L5S1 to that above T1."""
-    names = (*(f"L{n}" for n in range(5, 0, -1)), *(f"T{n}" for n in range(12, 0, -1)))
-    middle = 0.5 * (joints[1:] + joints[:-1])
-    found: Array = middle[[names.index(name) for name in SLICES]]
+    found: Array = 0.5 * (joints[1:] + joints[:-1])[::-1]
     return found

@@ -9,7 +9,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES, LEVELS, Mass, Trunk
 
-UP = np.array([0.0, 1.0, 0.0])
 _SMALL = 1e-9
 
 

@@ -113,6 +113,57 @@ def test_inertias_are_those_of_de_leva_s_lengths_and_radii() -> None:
     np.testing.assert_allclose(woman["right_hand"].about_com, np.diag(hand), rtol=1e-14)
 
 
+DE_LEVA = {
+    "male": {
+        "head": (0.0694, 0.2429, 0.303, 0.315, 0.261),
+        "upper_arm": (0.0271, 0.2817, 0.285, 0.269, 0.158),
+        "forearm": (0.0162, 0.2689, 0.276, 0.265, 0.121),
+        "hand": (0.0061, 0.1879, 0.288, 0.235, 0.184),
+    },
+    "female": {
+        "head": (0.0668, 0.2437, 0.271, 0.295, 0.261),
+        "upper_arm": (0.0255, 0.2751, 0.278, 0.260, 0.148),
+        "forearm": (0.0138, 0.2643, 0.261, 0.257, 0.094),
+        "hand": (0.0056, 0.1701, 0.244, 0.208, 0.154),
+    },
+}
+"""Entered again from Table 4: share of mass, length m, radii over length (sagittal, transverse,
+longitudinal)."""
+
+
+@pytest.mark.parametrize("person", [MAN, WOMAN], ids=lambda person: person.sex)
+def test_every_segment_has_the_moments_of_inertia_of_its_row(person: Subject) -> None:
+    """Moments do not hang on axes: those of the head are its three, an arm's across are alike."""
+    for part in carried_parts("crossed", person, ANYWHERE):
+        row = part.name.removeprefix("right_").removeprefix("left_")
+        share, length, sagittal, transverse, along = DE_LEVA[person.sex][row]
+        across = (sagittal**2 + transverse**2) / 2.0
+        squares = [along**2, across, across]
+        if row == "head":
+            squares = [along**2, sagittal**2, transverse**2]
+        kg = share * person.mass_kg
+        assert part.kg == pytest.approx(kg, rel=1e-14)
+        found = eigh(part.about_com)[0]
+        np.testing.assert_allclose(found, kg * length**2 * np.sort(squares), rtol=1e-12)
+
+
+def test_arms_reach_where_lengths_of_the_table_take_them() -> None:
+    """Straight pieces from the shoulder: their centres are as far along as the table says."""
+    for person, centres in ((MAN, (0.5772, 0.4574)), (WOMAN, (0.5754, 0.4559))):
+        table = DE_LEVA[person.sex]
+        parts = {part.name: part.com for part in carried_parts("behind_head", person, ANYWHERE)}
+        tall = person.height_m / 1.730
+        shoulder = ANYWHERE + tall * np.array([0.0325, -0.012, 0.17])
+        np.testing.assert_allclose(
+            parts["head"], ANYWHERE + tall * np.array([0.0173, 0.155, 0.0]), atol=1e-14
+        )
+        upper = parts["right_upper_arm"] - shoulder
+        assert np.linalg.norm(upper) == pytest.approx(centres[0] * table["upper_arm"][1])
+        elbow = shoulder + upper / centres[0]
+        fore = np.linalg.norm(parts["right_forearm"] - elbow)
+        assert fore == pytest.approx(centres[1] * table["forearm"][1])
+
+
 def test_hanging_arms_hang() -> None:
     parts = {part.name: part for part in carried_parts("hanging", MAN, ANYWHERE)}
     shoulder = ANYWHERE + 1.741 / 1.730 * np.array([0.0325, -0.012, 0.17])

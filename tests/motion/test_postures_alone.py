@@ -1,12 +1,16 @@
 """Postures of frames: each settles, and is what it would be were its frame alone."""
 
-import numpy as np
-from moving_spine import markers, postures, spine
+from dataclasses import replace
 
-from spinepipe.motion.asked import SHAPE, Ask, watched
+import numpy as np
+import pytest
+from moving_spine import law, markers, postures, spine
+
+from spinepipe.motion.asked import SHAPE, Ask, Sizes, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures as fitted
-from spinepipe.motion.skeleton import Trial
+from spinepipe.motion.skeleton import JOINTS, Trial
+from spinepipe.motion.terms import Loads, Markers, beyond
 
 FRAMES = 6
 SKIN_M = 1e-3
@@ -37,3 +41,98 @@ def test_frames_of_a_trial_are_as_alone() -> None:
         alone = found([frame])
         assert alone.settled.all()
         np.testing.assert_allclose(together.q[frame], alone.q[0], rtol=0.0, atol=SAME_RAD)
+
+
+def cost(ask: Ask, seen: Watched, q: np.ndarray) -> np.ndarray:
+    """(F,) of postures at rest, added up from what each kind of error costs."""
+    found = np.sum(Markers(seen, ask).residuals(q) ** 2, axis=1)
+    found += np.sum(beyond(ask, q)[0] ** 2, axis=(1, 2))
+    still = np.zeros_like(q)
+    if ask.loads:
+        return found + np.sum(
+            Loads.of(seen, ask).residuals(ask.passive, (q, still, still)) ** 2, axis=1
+        )
+    if ask.passive is not None:
+        force = ask.passive.forces(q[:, 1:]) / np.array([200.0] * 3 + [10.0] * 3)
+        found += np.sum(force**2, axis=(1, 2))
+    return found
+
+
+def narrow(ask: Ask) -> Ask:
+    """Ranges that the markers ask to leave: half a degree about another posture."""
+    high = np.full(SHAPE, np.inf)
+    high[1:, 3:] = 0.01
+    return replace(ask, high=high, low=-high)
+
+
+ROTATIONS = np.broadcast_to(np.arange(6) > 2, SHAPE).copy()
+ROTATIONS[0] = True
+
+ASKS = {
+    "markers alone, within ranges": narrow(Ask(free=ROTATIONS, loads=False)),
+    "springs": Ask(passive=law(), loads=False),
+    "loads from joint to joint": Ask(passive=law(), force_cost="level_difference"),
+}
+
+
+@pytest.mark.parametrize("name", ASKS)
+def test_a_posture_has_the_least_cost(name: str) -> None:
+    """No way that is free leads down: the cost has no slope there, beside that of a step away."""
+    ask = ASKS[name]
+    q = postures(31, 1, 0.02) * ask.free
+    places = marker_places(spine(), markers(), q)
+    whole = np.ones(places.shape[:2], bool)
+    trial = Trial("made", "stance", np.zeros(1), places, whole, "hanging")
+    seen = watched(spine(), markers(), trial, 0)
+    found = fitted(ask, seen)
+    assert found.settled.all()
+    assert not found.q[:, ~ask.free].any()
+    at, step = cost(ask, seen, found.q), 1e-4
+    assert (at > 1e-3).all()
+    for way in np.random.default_rng(5).normal(size=(12, *SHAPE)):
+        move = step * way * ask.free * ([0.1] * 3 + [1.0] * 3)
+        up, down = cost(ask, seen, found.q + move), cost(ask, seen, found.q - move)
+        bend = up + down - 2.0 * at
+        assert (bend > 0.0).all()
+        # where a parabola through the three is least: a fortieth of the step away at most
+        assert (np.abs(up - down) < 0.05 * bend).all()
+
+
+def test_ratios_move_all_joints_as_fewer_numbers_say() -> None:
+    """One number bends all joints alike; the pelvis is free."""
+    shares = np.zeros((np.prod(SHAPE), 7))
+    shares[np.arange(6), np.arange(6)] = 1.0
+    shares[6 * np.arange(1, SHAPE[0]) + 3, 6] = 1.0
+    q = np.zeros((2, *SHAPE))
+    q[:, 0] = [[0.1, 0.2, -0.1, 0.2, -0.1, 0.3], [0.0, 0.1, 0.0, -0.2, 0.05, 0.0]]
+    q[:, 1:, 3] = [[-0.03], [0.02]]
+    places = marker_places(spine(), markers(), q)
+    seen = np.ones(places.shape[:2], bool)
+    trial = Trial("made", "stance", np.array([0.0, 0.1]), places, seen, "hanging")
+    found = fitted(Ask(loads=False), watched(spine(), markers(), trial, 1), shares)
+    np.testing.assert_allclose(found.q, q, atol=1e-7)
+
+
+def test_what_counts_as_one() -> None:
+    """5 mm of a marker; 200 N and 10 N m of muscles; 0.02 rad and 1 mm beyond a range."""
+    q = np.zeros((1, *SHAPE))
+    places = marker_places(spine(), markers(), q) + np.array([0.0, 5e-3, 0.0])
+    seen = np.ones(places.shape[:2], bool)
+    one = watched(
+        spine(), markers(), Trial("made", "stance", np.zeros(1), places, seen, "hanging"), 0
+    )
+    off = Markers(one, Ask()).residuals(q).reshape(-1, 3)
+    np.testing.assert_allclose(np.abs(off), np.tile([0.0, 1.0, 0.0], (len(off), 1)), atol=1e-12)
+    held = Ask(low=np.zeros(SHAPE), high=np.zeros(SHAPE))
+    bent = np.tile([1e-3, -1e-3, 1e-3, -0.02, 0.02, 0.02], (1, SHAPE[0], 1))
+    np.testing.assert_allclose(np.abs(beyond(held, bent)[0]), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(beyond(held, bent)[0], np.sign(bent), rtol=1e-14)
+    still = np.zeros_like(q)
+    for loads in (1.0, 4.0, 0.0):
+        ask = Ask(sizes=Sizes(loads=loads))
+        muscles = Loads.of(one, ask)
+        active = muscles.active(None, (q, still, still))
+        rows = muscles.residuals(None, (q, still, still)).reshape(len(JOINTS), 6)
+        expected = np.sqrt(loads) * active[0] / ([200.0] * 3 + [10.0] * 3)
+        np.testing.assert_allclose(rows, expected, rtol=1e-13)
+    np.testing.assert_array_equal(Sizes().of_accelerations, [2.0] * 3 + [10.0] * 3)

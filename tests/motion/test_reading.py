@@ -191,6 +191,66 @@ def test_times_come_from_the_rate_where_the_column_is_empty(tmp_path: Path) -> N
     assert found.repaired == ("times are from DataRate, the column has none",)
 
 
+def test_times_of_nought_alone_are_none(tmp_path: Path) -> None:
+    """A column of noughts tells nothing; one frame at nought does."""
+    lines = trc(places_mm())
+    noughts = [cells.split("\t") for cells in lines[6:]]
+    lines[6:] = ["\t".join([frame, "0", *cells]) for frame, _, *cells in noughts]
+    found = read_motion(write(tmp_path / "m.trc", lines))
+    np.testing.assert_allclose(found.time_s, np.arange(5) / RATE)
+    one = read_motion(write(tmp_path / "one.trc", trc(places_mm(1))))
+    assert (one.time_s.tolist(), one.repaired) == ([0.0], ())
+
+
+def test_tabs_at_the_end_of_a_line_may_be_missing_or_too_many(tmp_path: Path) -> None:
+    """Editors cut off what is empty; laboratories write a tab after each cell."""
+    places = places_mm()
+    places[2, 2], places[4, 1:] = np.nan, np.nan
+    cut = [line.rstrip("\t") for line in trc(places)]
+    longer = [*cut[:6], *(f"{line}\t\t" for line in trc(places)[6:])]
+    for lines in (cut, longer):
+        found = read_motion(write(tmp_path / "m.trc", lines))
+        assert {(int(f), int(k)) for f, k in np.argwhere(~found.seen)} == {(2, 2), (4, 1), (4, 2)}
+        gone = np.isnan(places)
+        np.testing.assert_allclose(1e3 * found.places[~gone], places[~gone], atol=HELD_MM)
+
+
+@pytest.mark.parametrize(
+    ("line", "was", "becomes", "row", "column", "says"),
+    [
+        (1, "PathFileType", "Path", 1, None, "no header of a .trc"),
+        (3, "50.0\t50.0", "\t50.0", 3, "DataRate", "nothing"),
+        (3, "50.0\t50.0", "fast\t50.0", 3, "DataRate", "'fast'"),
+        (3, "50.0\t50.0", "inf\t50.0", 3, "DataRate", "'inf'"),
+        (3, "50.0\t50.0", "0\t50.0", 3, "DataRate", "0"),
+        (3, "50.0\t50.0", "50.6\t50.0", 3, "DataRate", "50.6 frames a second, and times 0.02 s"),
+        (3, "\t5\t3\t", "\t6\t3\t", 3, "NumFrames", "5 frames"),
+        (3, "\t5\t3\t", "\t5\t4\t", 4, None, "3 names"),
+        (3, "\tmm\t", "\tyard\t", 3, "Units", "'yard'"),
+        (8, "0.0200", "", 8, "Time", "nothing"),
+        (9, "0.0400", "0.0200", 9, "Time", "0.02 s after 0.02 s"),
+        (9, "0.0400", "late", 9, "Time", "'late'"),
+        (9, "3\t0.0400", "third\t0.0400", 9, "Frame#", "'third'"),
+        (9, "3\t0.0400", "3\t0.0400\t1.0", 9, None, "12 cells in frame 3"),
+    ],
+)
+def test_what_is_wrong_in_a_trc_is_named_at_its_line(
+    tmp_path: Path, line: int, was: str, becomes: str, row: int, column: str | None, says: str
+) -> None:
+    lines = trc(places_mm())
+    assert was in lines[line - 1]
+    lines[line - 1] = lines[line - 1].replace(was, becomes, 1)
+    problem = problem_of(write(tmp_path / "m.trc", lines))
+    assert (problem.file, problem.row, problem.column) == ("m.trc", row, column)
+    assert problem.found.startswith(says)
+
+
+def test_a_rate_that_is_off_by_rounding_is_the_same(tmp_path: Path) -> None:
+    """Up to one in a hundred."""
+    found = read_motion(write(tmp_path / "m.trc", trc(places_mm(), rate=50.4)))
+    np.testing.assert_allclose(found.time_s, np.arange(5) / RATE, atol=1e-12)
+
+
 def test_a_laboratory_with_z_up_is_turned(tmp_path: Path) -> None:
     """Its x is forwards, y to the left, z up; a point 1 forwards, 2 left, 3 up."""
     places = np.tile([1.0, 2.0, 3.0], (2, 1, 1))
@@ -236,18 +296,22 @@ def test_what_is_no_file_of_motion_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "row", "says"),
+    ("header", "rows", "line", "column", "says"),
     [
-        ("time,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3", "no such column"),
-        ("time_s,T1_x_mm,T1_y_mm", "0,1,2", "only x, y"),
-        ("time_s,T1_x,T1_y_mm,T1_z_mm", "0,1,2,3", "no marker"),
-        ("time_s,T1_x_mm,T1_y_mm,T1_z_m", "0,1,2,3", "columns in m, mm"),
-        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2", "3 cells"),
-        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,b,3", "'b'"),
-        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3\n0,1,2,3", "0 s"),
+        ("time,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3", 1, "time_s", "no such column"),
+        ("time_s,T1_x_mm,T1_y_mm", "0,1,2", 1, "T1", "only x, y"),
+        ("time_s,T1_x,T1_y_mm,T1_z_mm", "0,1,2,3", 1, "T1_x", "no marker"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_m", "0,1,2,3", 1, None, "columns in m, mm"),
+        ("time_s,time_s,T1_x_m,T1_y_m,T1_z_m", "0,0,1,2,3", 1, None, "columns in m"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2", 2, None, "3 cells"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "\n0,1,b,3", 3, "T1_y_mm", "'b'"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,inf,3", 2, "T1_y_mm", "'inf'"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3\n\n0,1,2,3", 4, "time_s", "0 s"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "", 1, None, "no frames"),
     ],
 )
 def test_a_csv_that_cannot_be_read_is_named(
-    tmp_path: Path, header: str, row: str, says: str
+    tmp_path: Path, header: str, rows: str, line: int, column: str | None, says: str
 ) -> None:
-    assert problem_of(write(tmp_path / "m.csv", [header, row])).found == says
+    problem = problem_of(write(tmp_path / "m.csv", [header, rows]))
+    assert (problem.row, problem.column, problem.found) == (line, column, says)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinepipe.muscles.joint_laws import CURVES, Curve, JointLaws
+from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, Curve, JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 
 ALL = [(name, axis) for name in CURVES for axis in range(3)]
@@ -40,6 +40,75 @@ def test_curves_run_through_measured_points(
 ) -> None:
     found = CURVES[name][axis].moment(np.deg2rad(np.array([degrees])))[0]
     assert found == pytest.approx(moment, rel=1e-9)
+
+
+HEUER_NM, JARAMILLO_NM = (1.0, 2.5, 5.0, 7.5), (2.0, 4.0, 6.0, 8.0)
+MEASURED = {
+    "disc_heuer": (
+        ((2.27, 3.6, 5.08, 6.43), HEUER_NM, (2.27, 3.6, 5.08, 6.43), HEUER_NM),
+        ((1.32, 2.7, 4.36, 5.73), HEUER_NM, (1.32, 2.7, 4.36, 5.73), HEUER_NM),
+        ((4.95, 6.64, 8.38, 10.11), HEUER_NM, (1.23, 5.15, 7.92, 10.28), HEUER_NM),
+    ),
+    "disc_jaramillo": (
+        ((4.39, 5.77, 6.58, 7.1), JARAMILLO_NM, (4.39, 5.77, 6.58, 7.1), JARAMILLO_NM),
+        ((3.21, 4.51, 5.43, 5.79), JARAMILLO_NM, (3.21, 4.51, 5.43, 5.79), JARAMILLO_NM),
+        ((7.32, 9.26, 10.76, 11.87), JARAMILLO_NM, (5.47, 6.77, 7.65, 8.27), JARAMILLO_NM),
+    ),
+    "disc_han": (
+        *(
+            (deg, nm, deg, nm)
+            for deg, nm in (
+                ((2.0, 4.0, 6.0, 8.0, 10.0), (1.43, 2.93, 4.51, 6.15, 7.86)),
+                ((1.0, 2.0, 3.0, 4.0), (1.03, 2.09, 3.22, 4.47)),
+                ((2.0, 4.0, 6.0, 8.0, 10.0), (0.90, 1.79, 2.76, 3.90, 5.32)),
+            )
+        ),
+    ),
+    # 2.3 and 8.4 N m/deg; 1.8 in flexion and 2.6 in extension
+    "segment": (
+        ((4.0, 10.0), (9.2, 23.0), (4.0, 10.0), (9.2, 23.0)),
+        ((4.0, 10.0), (33.6, 84.0), (4.0, 10.0), (33.6, 84.0)),
+        ((0.5, 5.0, 10.0), (0.9, 9.0, 18.0), (0.5, 5.0, 10.0), (1.3, 13.0, 26.0)),
+    ),
+}
+"""Entered again: about x, y, z the degrees and N m to the negative side, and to the positive."""
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_curves_run_through_all_that_was_measured(name: str) -> None:
+    for curve, (back, back_nm, fore, fore_nm) in zip(CURVES[name], MEASURED[name], strict=True):
+        at = np.deg2rad([*(-deg for deg in back), *fore])
+        np.testing.assert_allclose(curve.moment(at), [*(-m for m in back_nm), *fore_nm], rtol=1e-12)
+        ends = np.deg2rad([-2.0 * back[-1], 2.0 * fore[-1]])
+        # straight on, as steep as from the last but one measured point to the last
+        (b1, b0), (f1, f0) = [0.0, *back][:-3:-1], [0.0, *fore][:-3:-1]
+        (bm1, bm0), (fm1, fm0) = [0.0, *back_nm][:-3:-1], [0.0, *fore_nm][:-3:-1]
+        beyond = [
+            -bm1 - (bm1 - bm0) / (b1 - b0) * back[-1],
+            fm1 + (fm1 - fm0) / (f1 - f0) * fore[-1],
+        ]
+        np.testing.assert_allclose(curve.moment(ends), beyond, rtol=1e-12)
+
+
+def test_mixed_joints_are_a_disc_sideways_and_whole_segments_else() -> None:
+    assert CURVES["mixed"] == (CURVES["disc_heuer"][0], *CURVES["segment"][1:])
+    angle = np.deg2rad([3.0])
+    for curve, stiffness in zip(CURVES["segment_gould"], (68.8, 291.0, 51.0), strict=True):
+        assert curve.moment(angle)[0] == pytest.approx(stiffness * angle[0])
+
+
+def test_axial_stiffness_is_that_of_kitazaki_and_griffin() -> None:
+    """Entered again from Table 4, MN/m."""
+    printed = {
+        "L5S1": 1.47,
+        "L4L5": 1.87,
+        "L3L4": 2.0,
+        "L2L3": 2.0,
+        "L1L2": 2.13,
+        "T12L1": 1.8,
+        "T11T12": 1.5,
+    }
+    assert {name: value / 1e6 for name, value in AXIAL_N_PER_M.items()} == pytest.approx(printed)
 
 
 def test_a_curve_that_falls_is_refused() -> None:

@@ -1,6 +1,7 @@
 """Every kilogram has a place: shares, centres, arms along a line, loads in one hand or two."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from trunk_to_scale import made_up_trunk
 from spinepipe.muscles.masses import (
     ahead_cm,
     arm_loads,
+    arm_masses,
     centre_checks,
     centre_shares,
     masses_of,
@@ -89,6 +91,32 @@ def test_centres_of_parts_of_a_straight_trunk() -> None:
     assert found["upper trunk"].here_cm == pytest.approx(float(expected))
 
 
+def test_centres_of_parts_go_with_the_vertebrae() -> None:
+    """A bent trunk moves the centre of a part by the mean of its vertebrae, and its level too."""
+    trunk = made_up_trunk()
+    forwards = np.random.default_rng(4).uniform(-0.05, 0.05, 17)
+    bent = trunk.vertebrae * [0, 1, 1] + np.outer(forwards, [1, 0, 0])
+    checks = {c.part: c.here_cm for c in centre_checks(replace(trunk, vertebrae=bent))}
+    straight = {
+        c.part: c.here_cm
+        for c in centre_checks(replace(trunk, vertebrae=trunk.vertebrae * [0, 1, 1]))
+    }
+    weights = np.linspace(1.1, 2.6, 17)
+    cuts = {"upper trunk": (0.0, 18.5), "middle trunk": (18.5, 30.7)}
+    cuts["trunk, T1 to L5"] = (0.0, weights.sum())
+    levels = {"upper trunk": ("T7", "T8"), "middle trunk": ("L3", "L4")}
+    levels["trunk, T1 to L5"] = ("L1", "L2")
+    assert set(checks) == set(cuts)
+    for part, (low, high) in cuts.items():
+        moved, kg, end = 0.0, 0.0, 0.0
+        for weight, x in zip(weights, forwards, strict=True):
+            inside = max(0.0, min(high, end + weight) - max(low, end))
+            moved, kg, end = moved + inside * x, kg + inside, end + weight
+        level = np.mean([forwards[SLICES.index(name)] for name in levels[part]])
+        assert kg == pytest.approx(high - low)
+        assert checks[part] - straight[part] == pytest.approx(100.0 * (moved / kg - level))
+
+
 def test_arms_that_hang_pull_straight_down_from_the_shoulders() -> None:
     loads = arm_loads(REFERENCE, SHOULDERS, Hands(kg=10.0), arm_length=0.65)
     assert sum(load.force[1] for load in loads) == pytest.approx(-G * (0.0988 * 75.1 + 10.0))
@@ -99,11 +127,26 @@ def test_arms_that_hang_pull_straight_down_from_the_shoulders() -> None:
     assert all(load.at[0] == 0.0 for load in loads)
 
 
-def test_centres_of_the_arm_rise_along_it_to_the_hand() -> None:
-    for sex in ("male", "female"):
-        upper, fore, hand = centre_shares(sex)
-        assert 0.25 < upper < 0.35 < 0.6 < fore < 0.75
-        assert hand == 1.0
+@pytest.mark.parametrize(
+    ("sex", "centres", "percents"),
+    [
+        ("male", (0.5772, 0.4574, 0.3624), (2.71, 1.62, 0.61)),
+        ("female", (0.5754, 0.4559, 0.3427), (2.55, 1.38, 0.56)),
+    ],
+)
+def test_arms_are_those_of_de_leva_on_lengths_of_drillis(
+    sex: Literal["male", "female"], centres: tuple[float, ...], percents: tuple[float, ...]
+) -> None:
+    """Entered again: de Leva 1996 Table 4; 0.186, 0.146, 0.108 of the height (Drillis 1966)."""
+    hand = 0.186 + 0.146 + centres[2] * 0.108
+    along = np.array([centres[0] * 0.186, 0.186 + centres[1] * 0.146, hand]) / hand
+    np.testing.assert_allclose(centre_shares(sex), along, rtol=1e-14)
+    person = replace(REFERENCE, sex=sex)
+    shoulder, at = np.array([0.1, 0.5, 0.2]), np.array([0.4, 0.3, 0.1])
+    arm = arm_masses("right", shoulder, at, person)
+    assert [mass.kg for mass in arm] == pytest.approx([p / 100.0 * 75.1 for p in percents])
+    for mass, share in zip(arm, along, strict=True):
+        np.testing.assert_allclose(mass.at, (1.0 - share) * shoulder + share * at, atol=1e-15)
 
 
 def test_a_load_in_both_hands_acts_at_its_middle() -> None:

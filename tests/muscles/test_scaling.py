@@ -133,6 +133,17 @@ def test_cross_sections_follow_their_muscle_and_stated_factors_come_on_top(
     np.testing.assert_array_equal(found.disc_area, 1.5 * trunk.disc_area)
 
 
+def test_a_cross_section_follows_the_vertebra_nearest_to_its_middle(tmp_path: Path) -> None:
+    """Half way up multifidus is 40 mm, at L5; longissimus 160 mm, L1; obliques 200 mm, T11."""
+    trunk = made_up_trunk()
+    heavy = replace(REFERENCE, mass_kg=1.5 * REFERENCE.mass_kg)
+    rows = [f"*,{level},pcsa,power,0,0,0,0,{k}" for k, level in ((1, "L5"), (2, "L1"), (3, "T11"))]
+    found = scaled(trunk, heavy, REFERENCE, table(tmp_path, *rows))
+    times = dict(zip(trunk.muscles.names, found.muscles.pcsa / trunk.muscles.pcsa, strict=True))
+    expected = {"multifidus_r": 1.5, "longissimus_r": 1.5**2, "oblique_r": 1.5**3}
+    assert {name: times[name] for name in expected} == pytest.approx(expected)
+
+
 def test_what_ends_in_the_rectus_sheath_moves_with_the_sheath(tmp_path: Path) -> None:
     trunk = made_up_trunk()
     sheath = trunk.sheath.copy()
@@ -260,6 +271,34 @@ def test_packaged_trends_are_the_published_ones() -> None:
     assert 1 / known.row("pcsa").ratio(woman, REFERENCE) == rounded(men_over_women, abs=1e-4)
     area = known.row("rib_cage_area").value(REFERENCE)
     assert area == rounded(172.698 + 44.2022 + 36.814 - 158.503 + 393.152, abs=0.01)
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+def test_each_form_is_what_its_line_says(tmp_path: Path, sex: Literal["male", "female"]) -> None:
+    """Five coefficients of which none is nought or one, written out from the module's words."""
+    person = Subject(sex, 40.0, 1.60, 70.0)
+    male = 1.0 if sex == "male" else 0.0
+    written = {
+        "linear": 3.0 + 0.5 * male + 0.3 * 40.0 - 0.02 * 160.0 + 0.1 * 70.0,
+        "exponential": exp(3.0 + 0.5 * male + 0.3 * 40.0 - 0.02 * 160.0 + 0.1 * 70.0),
+        "power": exp(3.0 + 0.5 * male) * 40.0**0.3 * 160.0**-0.02 * 70.0**0.1,
+    }
+    for form, expected in written.items():
+        rows = table(tmp_path, f"psoas,L3,pcsa,{form},3,0.5,0.3,-0.02,0.1")
+        assert rows.row("pcsa", "psoas", "L3").value(person) == pytest.approx(expected, rel=1e-13)
+
+
+def test_the_row_that_names_most_applies_and_a_muscle_before_a_level(tmp_path: Path) -> None:
+    places = (("psoas", "L3"), ("psoas", "*"), ("*", "L3"), ("*", "*"))
+    known = table(
+        tmp_path,
+        *(f"{m},{lv},pcsa,linear,{k},0,0,0,0" for k, (m, lv) in enumerate(places[:3], start=1)),
+    )
+    asked = (("psoas", "L3"), ("psoas", "L4"), ("multifidus", "L3"), ("multifidus", "L4"))
+    found = [known.row("pcsa", *one) for one in asked]
+    assert [(row.muscle, row.level) for row in found] == list(places)
+    told = ["psoas at L3", "psoas", "all at L3", "all"]
+    assert [row.of for row in found] == told
 
 
 @pytest.mark.parametrize(

@@ -12,26 +12,46 @@ NEVER = ("workflow", "validation", "mutants", "generators", "cases")
 
 HELPERS = ROOT / "tests" / "cases"
 
+OF_ALL = ("tests/unit/test_frozen.py",)
+"""Tests that look at every file of the library without importing any, and are quick."""
+
 
 def nearest(path: str, count: int, beyond: int = 0) -> list[str]:
     """Test files near a file, the nearest first; of equally near ones those that import least.
 
-    A file named like the module is nearest of all.
+    A file named like the module is nearest of all. Effects are asked for by name, so that a test
+    which names one is near to it, and to a module that this effect alone reaches.
 
     Parameters
     ----------
     beyond : how many of the nearest are left out.
     """
     module, stem = path.removesuffix(".py").replace("/", "."), Path(path).stem
-    ranked = []
+    ranked, called = [], {stem, *_effects_on(module)}
     for test in _tests():
         steps = _steps(test)
         if module in steps:
             named = test.stem in (f"test_{stem}", f"test_{stem}s")
             ranked.append((not named, steps[module], len(steps), _name(test)))
-        elif stem in test.read_text():  # effects are asked for by name
-            ranked.append((True, 3, len(steps), _name(test)))
-    return [name for *_, name in sorted(ranked)][beyond : beyond + count]
+        elif often := sum(_text(test).count(name) for name in called):
+            far = 4 if "studies" in test.parts else 3  # these try many effects
+            ranked.append((True, far, -often, _name(test)))
+    found = [name for *_, name in sorted(ranked)][beyond : beyond + count]
+    return [*found, *OF_ALL] if beyond else found
+
+
+@cache
+def _text(test: Path) -> str:
+    """A test file, and the cases that it takes from beside."""
+    cases = [HELPERS / f"{name}.py" for name, steps in _steps(test).items() if steps == 1]
+    return "\n".join(path.read_text() for path in (test, *cases) if path.is_file())
+
+
+@cache
+def _effects_on(module: str) -> tuple[str, ...]:
+    """Names of the effects that are built on a module of their room."""
+    room = ROOT / "spinepipe" / "effects"
+    return tuple(path.stem for path in sorted(room.glob("*.py")) if module in _imports(path))
 
 
 @cache

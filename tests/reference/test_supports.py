@@ -130,6 +130,23 @@ def test_a_prescribed_rotation_bends_by_the_coupling() -> None:
         assert r[0, 0, ROTATION] == pytest.approx(expected, rel=1e-12)
 
 
+def test_a_solve_starts_where_the_rig_has_the_joint() -> None:
+    """Nothing hangs on a fixed coordinate, so all steps have to be taken with it in its place."""
+    model, places = coupled(), np.arange(6) == ROTATION
+    values = (0.1, -0.37)
+    steps = [LoadStep(k, (), None, (Support(0, ROTATION, v),)) for k, v in enumerate(values)]
+    system = System(Chain(model), model, LoadCase("turn", 2, tuple(steps)))
+    anywhere = np.linspace(-0.2, 0.3, 6)
+    for step, value in zip(steps, values, strict=True):
+        start = system.start(anywhere, system.loading(step))
+        np.testing.assert_array_equal(start, np.where(places, value, anywhere))
+        assert anywhere[ROTATION] == 0.3  # the pose that was given is left alone
+    assert [step.equilibrium.q[ROTATION] for step in follow(system)] == list(values)
+    assert system.free is not None
+    np.testing.assert_array_equal(system.free, np.flatnonzero(~places))
+    assert System(Chain(model), model, twisted()).free is None
+
+
 def test_a_measured_load_that_is_listed_leaves_no_reaction() -> None:
     """Prescribed to where the listed load brings it, the joint needs no rig."""
     free, *_ = solved(coupled(), twisted())

@@ -1,6 +1,8 @@
 """Joint laws: derivatives against differences, what off means, and what is symmetric."""
 
 from collections.abc import Callable
+from fractions import Fraction
+from math import factorial
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from joint_law_cases import (
 from spinepipe.effects import JointLaw, Parameter, create, knee
 from spinepipe.effects.contract import Array
 from spinepipe.effects.knee import chord, inside
+from spinepipe.effects.nonlinear_stiffening import exponential_rise
 from spinepipe.units import COORDINATES
 
 
@@ -130,6 +133,36 @@ def test_laws_near_zero_are_as_exact_as_elsewhere(shape: str) -> None:
     np.testing.assert_allclose(found, share.astype(float), rtol=0, atol=4e-16)
     slopes = law.by_parameter(q, values, carried)[:, 3, 0] / size
     np.testing.assert_allclose(slopes, by_v.astype(float), rtol=5e-13, atol=0)
+
+
+def test_series_near_zero_are_exact_to_the_last_bit() -> None:
+    """Against sums of exact fractions: what the closed forms would lose there is not lost."""
+    for v in (1e-12, 1e-6, 3e-4, 9.99e-4, -9.99e-4):
+        exact, terms = Fraction(v), range(1, 12)
+        # (exp(v) - 1) / v - 1 = sum of v^k / (k + 1)!
+        value = sum(exact**k / factorial(k + 1) for k in terms)
+        by_v = sum(k * exact ** (k - 1) / factorial(k + 1) for k in terms)
+        found = exponential_rise(np.array([v]))
+        # the value is a share beside 1, of which the next term of the series is 1e-18
+        expected = [float(value), float(by_v)]
+        np.testing.assert_allclose(np.ravel(found), expected, rtol=5e-16, atol=2e-18)
+    # tan(x) / x - 1 in v = x^2: sin(x) / x over cos(x), series of each
+    for v in (1e-12, 1e-6, 3e-4, 9.99e-4):
+        exact = Fraction(v)
+        sine, by_sine, cosine, by_cosine = (
+            sum((-1) ** k * exact**k / factorial(2 * k + 1) for k in range(12)),
+            sum((-1) ** k * k * exact ** (k - 1) / factorial(2 * k + 1) for k in range(1, 12)),
+            sum((-1) ** k * exact**k / factorial(2 * k) for k in range(12)),
+            sum((-1) ** k * k * exact ** (k - 1) / factorial(2 * k) for k in range(1, 12)),
+        )
+        value = sine / cosine - 1
+        by_v = (by_sine * cosine - sine * by_cosine) / cosine**2
+        q, values = np.zeros((1, 6)), np.array([[v / 0.01]])
+        q[:, 3] = 0.1
+        law, carried = law_of(("nonlinear_stiffening", {"shape": "tangent"})), np.ones((1, 6))
+        load = law.respond(q, values, carried).load[0, 3]
+        slope = law.by_parameter(q, values, carried)[0, 3, 0] / 0.01
+        np.testing.assert_allclose([load, slope], [float(value), float(by_v)], rtol=2e-15)
 
 
 # Off, and what is symmetric

@@ -1,6 +1,8 @@
 """Hysteresis and creep: closed forms of one joint, derivatives along a path, corners passed."""
 
 from dataclasses import replace
+from fractions import Fraction
+from math import factorial
 
 import numpy as np
 import pytest
@@ -365,3 +367,26 @@ def test_options_that_cannot_be_are_refused() -> None:
     with pytest.raises(ValueError, match="coordinate 'twist' is not one of anterior"):
         create("creep", {"coordinate": "twist"})
     assert create("creep", {"coordinate": "superior"}).coordinate == "superior"
+
+
+@pytest.mark.parametrize("x", [1e-9, 1e-6, 1e-3, 9.9e-3, 1.01e-2, 0.5])
+def test_a_short_ramp_of_creep_moves_with_its_time_as_exact_sums_say(x: float) -> None:
+    """With a carried load C that comes on over x relaxation times, one element holds
+    M = C / (1 + l (1 - m)), m = sum of (-x)^k / (k + 1)!; x falls with the time as 1 / T."""
+    f, time, load = 0.3, 40.0, 7.0
+    exact, lost = Fraction(x), Fraction(f) / (1 - Fraction(f))
+    terms = range(1, 30)
+    mean = 1 + sum((-exact) ** k / factorial(k + 1) for k in terms)
+    slope = sum(-k * (-exact) ** (k - 1) / Fraction(factorial(k + 1)) for k in terms)
+    whole = Fraction(load) / (1 + lost * (1 - mean))
+    by_time = -(whole**2) / Fraction(load) * lost * slope * exact / Fraction(time)
+    effect = create("creep", {"load": "ramped"})
+    q, carried = np.zeros((1, 6)), np.zeros((1, 6))
+    carried[0, 3] = load
+    start, values = np.zeros((1, effect.n_states)), np.array([[f, time, 0.0]])
+    step = (q, values, start, x * time / (1.0 - f), carried)
+    held = carried + effect.respond_on_path(*step).load
+    assert held[0, 3] == pytest.approx(float(whole), rel=1e-14)
+    found = effect.by_parameter_on_path(*step)[0, 3, 1]
+    # terms that the series leaves out, and what differences of nearly equal numbers lose
+    assert found == pytest.approx(float(by_time), rel=2e-12)

@@ -11,7 +11,7 @@ from trunk_cases import made_up_trunk
 
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.folder import Tables, source_of_folder
-from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY, THORAX, Trunk
+from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY, SLICES, THORAX, Trunk
 
 ROUNDING_M = 1e-12
 ABOVE = {f"T{n}T{n + 1}": n for n in range(10, 0, -1)}
@@ -95,6 +95,53 @@ def test_a_trunk_comes_back_as_it_was_written(tables: Tables) -> None:
         np.testing.assert_allclose(
             getattr(found.muscles, name), getattr(expected.muscles, name), atol=ROUNDING_M
         )
+
+
+def test_what_tables_do_not_say_is_that_of_the_generic_male_at_this_height(tables: Tables) -> None:
+    """Entered again: T1T2 is 450.66 mm above L5S1 in the male of Allaire 2020."""
+    found = read(tables)
+    at = tables.joints.set_index("joint")[["x_mm", "y_mm", "z_mm"]] / 1e3
+    at -= at.loc["L5S1"]
+    top = at.loc["T1T2"].to_numpy(float)
+    size = top[1] / 0.45066
+    head, shoulder = np.array([4.2, 143.0, 0.0]), np.array([17.6, -50.1, 170.6])
+    np.testing.assert_allclose(found.head, top + size * head / 1e3, atol=ROUNDING_M)
+    right = top + size * shoulder / 1e3
+    np.testing.assert_allclose(found.shoulders, [right, right * [1, 1, -1]], atol=ROUNDING_M)
+    assert found.arm_length == pytest.approx(0.6 * size)
+
+
+def test_vertebrae_lie_midway_between_their_joints(tables: Tables) -> None:
+    """T1, above which no joint is told, is as high as T2 and stands as its frame does: upright."""
+    at = tables.joints.set_index("joint")[["x_mm", "y_mm", "z_mm"]] / 1e3
+    at -= at.loc["L5S1"]
+    below = dict(zip(SLICES, [*ABOVE][::-1] + [*LEVELS][::-1], strict=True))
+    found = dict(zip(SLICES, read(tables).vertebrae, strict=True))
+    for vertebra, above in zip(SLICES[1:], SLICES, strict=False):
+        middle = at.loc[[below[vertebra], below[above]]].mean().to_numpy(float)
+        np.testing.assert_allclose(found[vertebra], middle, atol=ROUNDING_M, err_msg=vertebra)
+    high = np.linalg.norm((at.loc["T1T2"] - at.loc["T2T3"]).to_numpy(float))
+    upwards = at.loc["T1T2"].to_numpy(float) + np.array([0.0, 0.5 * high, 0.0])
+    np.testing.assert_allclose(found["T1"], upwards, atol=ROUNDING_M)
+
+
+def test_discs_are_as_high_and_wide_as_their_sources_say(tables: Tables) -> None:
+    """Entered again: mm, and shares of the area of L4L5, 1455 mm2 (Ghezelbash 2016)."""
+    found = read(tables)
+    high = {
+        "L5S1": 12.99,
+        "L4L5": 13.82,
+        "L3L4": 12.45,
+        "L2L3": 11.59,
+        "L1L2": 10.0,
+        "T12L1": 8.25,
+        "T11T12": 6.5,
+    }
+    wide = {"L5S1": 1406, "L4L5": 1550, "L3L4": 1478, "L2L3": 1438, "L1L2": 1457}
+    shares = {name: area / 1550 for name, area in wide.items()} | {"T12L1": 0.83, "T11T12": 0.72}
+    np.testing.assert_allclose(found.disc_height, [high[name] / 1e3 for name in LEVELS], rtol=1e-14)
+    areas = [1455e-6 * shares[name] for name in LEVELS]
+    np.testing.assert_allclose(found.disc_area, areas, rtol=1e-14)
 
 
 def test_points_in_frames_of_bodies_are_the_same_trunk(tables: Tables) -> None:
