@@ -16,7 +16,7 @@ import pytest
 
 LOADED = (
     *("numpy", "scipy.linalg", "scipy.optimize", "scipy.spatial", "scipy.stats", "numba"),
-    *("pandas", "pyarrow.parquet", "pydantic", "yaml", "matplotlib.pyplot", "pybullet"),
+    *("pandas", "pyarrow.parquet", "pydantic", "yaml", "matplotlib.pyplot"),
 )
 """What most test files load: 3 s of 4 in a run of small tests."""
 
