@@ -1,19 +1,10 @@
 """What tests need that need not lie on this machine: skipped with a reason where it does not."""
 
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pytest
 
 MALE = Path(__file__).resolve().parents[3] / "shared" / "data" / "thoracolumbar_male"
-
-
-def need_myo_sim() -> None:
-    """Skip the test where the package is not installed."""
-    try:
-        version("myo-sim")
-    except PackageNotFoundError:
-        pytest.skip("the package myo-sim is not installed")
 
 
 def need_male() -> Path:

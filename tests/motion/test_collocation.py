@@ -1,6 +1,5 @@
 """Motions of least cost against CasADi and IPOPT, on a chain of two joints."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
 
 
-@pytest.mark.skipif(importlib.util.find_spec("casadi") is None, reason="CasADi is not installed")
 @pytest.mark.parametrize("cost", ["squared", "minus_gravity", "level_difference"])
 def test_the_least_cost_is_that_of_collocation(cost: ForceCost, tmp_path: Path) -> None:
     """To 0.1 %, which is ten times by what a last step changes it."""

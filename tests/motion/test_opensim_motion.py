@@ -16,8 +16,7 @@ from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted
 from spinepipe.motion.rigid_body import bodies_of
 from spinepipe.motion.skeleton import BODIES, MarkerSet, Trial
-
-peer = pytest.importorskip("tests.reference.peers.opensim_motion")
+from tests.reference.peers import opensim_motion as peer
 
 REPLAYED_M = 1e-9
 """Fifteen digits of metres and degrees, along 18 bodies."""

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import opensim
 import pytest
 from ezc3d import c3d
 
@@ -10,8 +11,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.recorded import Recorded
 from spinepipe.problems import InputError, Problem
-
-opensim = pytest.importorskip("opensim")
 
 NAMES = ("LPSI", "RPSI", "T1")
 RATE = 50.0

@@ -68,6 +68,17 @@ class Mutant:
             raise ValueError(f"{self.path}:{self.line}: nothing to spoil by {self.operator}")
         return str(spoilt)
 
+    def change(self) -> tuple[str, str]:
+        """The first line that is spoilt, as it is and as it becomes, without indentation.
+
+        Lines whose numbers move as the file grows are known again by it.
+        """
+        before = (ROOT / self.path).read_text().splitlines()
+        for was, becomes in zip(before, self.code().splitlines(), strict=False):
+            if was != becomes:
+                return was.strip(), becomes.strip()
+        raise ValueError(f"{self.path}:{self.line}: {self.operator} changes nothing")
+
 
 def drawn(area: str, count: int, seed: int) -> list[Mutant]:
     """That many mutants of an area, at different places."""

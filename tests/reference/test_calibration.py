@@ -9,6 +9,7 @@ from spinepipe.status import Status
 from spinepipe.units import STIFFNESS_COLUMNS
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_calibration as calibration
 from tests.reference.peers.chain import Load
 
 MOMENTS = 7.5 * np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -19,7 +20,6 @@ ROTATIONS_ONLY = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
 @pytest.mark.parametrize(("grouping", "unknowns"), [("per_specimen", 3), ("per_joint", 18)])
 def test_stiffness_comes_back(grouping: str, unknowns: int) -> None:
-    calibration = pytest.importorskip("tests.reference.peers.opensim_calibration")
     start = chains.t12_s1_chain()
     rng = np.random.default_rng(unknowns)
     factors = np.ones((6, 6))

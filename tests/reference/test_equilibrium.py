@@ -12,7 +12,7 @@ from spinepipe.statics import follow
 from spinepipe.status import Status
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
-from tests.reference.peers import newton
+from tests.reference.peers import newton, opensim_peer, pinocchio_peer
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
 
 ROUND_OFF = 1e-13
@@ -20,17 +20,9 @@ ROUND_OFF = 1e-13
 over stiffness: angles of order 0.1 are good to some 1e-16, less where the chain is nearly loose."""
 
 
-def solve_opensim(chain: Chain) -> Array:
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
-    return peer.equilibrium(chain)
-
-
-def solve_pinocchio(chain: Chain) -> Array:
-    peer = pytest.importorskip("tests.reference.peers.pinocchio_peer")
-    return peer.equilibrium(chain)
-
-
-PEERS = pytest.mark.parametrize("solve", [solve_opensim, solve_pinocchio], ids=["opensim", "pin"])
+PEERS = pytest.mark.parametrize(
+    "solve", [opensim_peer.equilibrium, pinocchio_peer.equilibrium], ids=["opensim", "pin"]
+)
 
 
 def upright(stiffness: float = 51.0, mass: float = 0.1, arm: tuple[float, float] = (0.0, 0.0)):
@@ -74,9 +66,12 @@ def test_a_chain_of_twenty_joints(solve) -> None:
 def test_the_load_path_leads_to_the_stable_one_of_two_equilibria() -> None:
     """A slender chain bends under its weight; Newton by itself jumps to the upright pose, which
     has two growing modes and so a positive determinant."""
-    peer = pytest.importorskip("tests.reference.peers.pinocchio_peer")
     chain = long_chain(100, mass_share=1.0, force_share=0.1)
-    built, jumped, followed = peer.build(chain), peer.equilibrium(chain), bridge.pose(chain)
+    built, jumped, followed = (
+        pinocchio_peer.build(chain),
+        pinocchio_peer.equilibrium(chain),
+        bridge.pose(chain),
+    )
     assert np.abs(built.residual(followed)).max() < 1e-9
     slowest = {}
     for name, q in (("jumped", jumped), ("followed", followed)):
@@ -211,11 +206,10 @@ def test_loads_without_moments_are_the_slope_of_an_energy(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_tangent_is_the_slope_of_the_peers_residual(seed: int) -> None:
     """With moments, far from equilibrium: residual and slope both from pinocchio."""
-    peer = pytest.importorskip("tests.reference.peers.pinocchio_peer")
     rng = np.random.default_rng(seed)
     chain = chains.random_chain(rng, (1, 2, 4, 6)[seed])
     q = random_pose(rng, chain.n_joints)
-    prepared, built = bridge.system(chain), peer.build(chain)
+    prepared, built = bridge.system(chain), pinocchio_peer.build(chain)
     loading = prepared.slots.loading(prepared.case.steps[0].wrenches)
     found = prepared.balance(q, loading, prepared.initial_states())
     expected = built.residual(q)

@@ -6,6 +6,7 @@ import pytest
 from spinepipe.calibrate.forward_runs import forward_run
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer as peer
 from tests.reference.peers.chain import Array, Chain, Load
 
 ACCURACY = 1e-5
@@ -20,7 +21,6 @@ def ours(chain: Chain, duration_s: float, accuracy: float = ACCURACY) -> Array:
 
 @pytest.mark.parametrize("duration_s", [0.02, 0.3])
 def test_it_ends_where_opensim_ends(duration_s: float) -> None:
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     chain = chains.l1_l4_chain().with_loads(BENDING)
     expected = peer.settle(chain, duration_s, accuracy=1e-6)[-1]
     found = ours(chain, duration_s, 1e-7)
@@ -31,7 +31,6 @@ def test_it_ends_where_opensim_ends(duration_s: float) -> None:
 
 def test_careful_differences_of_both_are_the_exact_derivative() -> None:
     """Differences over 1e-3 of all stiffnesses against those of equilibria, central and smaller."""
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     chain = chains.l1_l4_chain().with_loads(BENDING)
     built = peer.build(chain)
 

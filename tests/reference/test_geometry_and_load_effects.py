@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import opensim
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -17,17 +18,13 @@ from spinepipe.statics import System, follow, observe
 from spinepipe.world import Chain as LoadedChain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
 
 ROUND_OFF = 1e-13
 """m and rad; poses of order 0.1 from two engines, re-expressed."""
 
 SEEDS = pytest.mark.parametrize("seed", range(4))
-
-
-@pytest.fixture(scope="module")
-def opensim_peer():
-    return pytest.importorskip("tests.reference.peers.opensim_peer")
 
 
 def random_chain(seed: int, n_joints: int = 4) -> Chain:
@@ -51,7 +48,7 @@ def assert_moved(found: Array, chain: Chain) -> None:
 
 
 @SEEDS
-def test_a_displaced_centre_is_a_joint_that_stands_there(opensim_peer, seed: int) -> None:
+def test_a_displaced_centre_is_a_joint_that_stands_there(seed: int) -> None:
     chain = random_chain(seed)
     offset = np.random.default_rng(seed).uniform(-0.01, 0.01, (4, 3))
     stand = chain.origins + np.einsum("jxy,jy->jx", chain.rotations, offset)
@@ -71,7 +68,7 @@ def seen_from(tilt: Rotation, q: Array) -> Array:
 
 
 @SEEDS
-def test_tilted_axes_are_a_tilted_joint(opensim_peer, seed: int) -> None:
+def test_tilted_axes_are_a_tilted_joint(seed: int) -> None:
     chain = random_chain(seed)
     tilts = np.random.default_rng(seed).uniform(-0.2, 0.2, (4, 3))
     tilt = Rotation.from_euler("ZXY", tilts)
@@ -83,7 +80,7 @@ def test_tilted_axes_are_a_tilted_joint(opensim_peer, seed: int) -> None:
 
 
 @SEEDS
-def test_tilted_markers_report_the_motion_in_tilted_axes(opensim_peer, seed: int) -> None:
+def test_tilted_markers_report_the_motion_in_tilted_axes(seed: int) -> None:
     chain = random_chain(seed)
     tilts = np.random.default_rng(seed).uniform(-0.1, 0.1, (4, 3))
     expected = seen_from(Rotation.from_euler("ZXY", tilts), opensim_peer.equilibrium(chain))
@@ -94,7 +91,7 @@ def test_tilted_markers_report_the_motion_in_tilted_axes(opensim_peer, seed: int
 
 @SEEDS
 @pytest.mark.parametrize("where", ["each", "top"])
-def test_a_weight_left_out_is_a_heavier_body(opensim_peer, seed: int, where: str) -> None:
+def test_a_weight_left_out_is_a_heavier_body(seed: int, where: str) -> None:
     chain = random_chain(seed)
     more = np.full(4, 2.0) if where == "each" else np.array([0.0, 0.0, 0.0, 2.0])
     expected = opensim_peer.equilibrium(replace(chain, masses=chain.masses + more))
@@ -112,7 +109,7 @@ def turned_loads(chain: Chain, axes: tuple[int, int], tilts: tuple[float, float]
 
 
 @SEEDS
-def test_a_misaligned_load_is_a_turned_one(opensim_peer, seed: int) -> None:
+def test_a_misaligned_load_is_a_turned_one(seed: int) -> None:
     """With forces and moments on every body, and the main axis that of all moments together."""
     chain = random_chain(seed)
     main = int(np.argmax(np.sum([np.abs(load.moment) for load in chain.loads], axis=0)))
@@ -124,7 +121,7 @@ def test_a_misaligned_load_is_a_turned_one(opensim_peer, seed: int) -> None:
 
 
 @SEEDS
-def test_gain_and_offset_are_other_loads(opensim_peer, seed: int) -> None:
+def test_gain_and_offset_are_other_loads(seed: int) -> None:
     chain, extra = random_chain(seed), np.array([0.3, -0.2, 0.4])
     larger = (replace(w, force=1.05 * w.force, moment=1.05 * w.moment) for w in chain.loads)
     cases = (
@@ -158,7 +155,6 @@ CABLES = {"joints": through_joints, "centres": through_centres}
 
 def with_cable(peer, chain: Chain, tension: float, guides: Array):
     """The chain in OpenSim with a path actuator from ground through all bodies, pulling always."""
-    opensim = pytest.importorskip("opensim")
     built = peer.build(chain, ramp_time=1.0)
     cable = opensim.PathActuator()
     cable.setName("cable")
@@ -184,7 +180,7 @@ def with_cable(peer, chain: Chain, tension: float, guides: Array):
 @pytest.mark.parametrize("tension", [60.0, 300.0])
 @pytest.mark.parametrize(("guides", "anterior"), [*((g, 0.0) for g in CABLES), ("joints", -0.01)])
 def test_a_follower_load_is_a_path_actuator(
-    opensim_peer, seed: int, tension: float, guides: str, anterior: float
+    seed: int, tension: float, guides: str, anterior: float
 ) -> None:
     chain = random_chain(seed)
     points = CABLES[guides](chain) + ahead(chain, anterior)

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import opensim
 import pytest
 from scipy.optimize import least_squares
 
@@ -34,6 +35,7 @@ from tests.generators.hidden.scene import scene
 from tests.generators.hidden.scene import with_effect as with_the_effect
 from tests.generators.hidden.solve import solve
 from tests.generators.hidden.world import Now
+from tests.reference.peers import opensim_peer
 from tests.reference.peers.chain import Chain, Load
 
 VOCABULARY = {
@@ -83,7 +85,6 @@ def test_spinepipe_finds_the_same_null_motion_from_the_files(
 
 def test_opensims_own_forces_hold_the_same_pose() -> None:
     """Weight, springs and loads by OpenSim's force elements."""
-    opensim_peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     stage = scene(replace(SMALL, preload_n=150.0))
     world = stage.plain(0)
     found = solve(world, Spine(world.bones), np.zeros((6, 7, 6, 6))).q
@@ -99,9 +100,6 @@ def test_opensims_own_forces_hold_the_same_pose() -> None:
 
 
 def test_opensim_has_the_same_poses_and_jacobian() -> None:
-    opensim = pytest.importorskip("opensim")
-    from tests.reference.peers import opensim_peer
-
     bones = scene(SMALL).bones[0]
     free = np.zeros((6, 6))
     built = opensim_peer.build(Chain(**vars(bones), stiffness=free, damping=free))

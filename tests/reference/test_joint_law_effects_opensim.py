@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import opensim
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -19,10 +20,8 @@ from spinepipe.units import COORDINATES
 from spinepipe.world import Chain as LoadedChain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer as peer
 from tests.reference.peers.chain import Array, Chain
-
-opensim = pytest.importorskip("opensim")
-peer = pytest.importorskip("tests.reference.peers.opensim_peer")
 
 Values = tuple[float, ...]
 Add = Callable[[Any], None]

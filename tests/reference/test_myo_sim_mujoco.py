@@ -9,14 +9,12 @@ from dataclasses import replace
 from importlib.metadata import distribution
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
-from installed import need_myo_sim
 from trunk_posture import lengths, lever_arms, random_bends
 
 from spinepipe.muscles.myo_sim import trunk_of_myo_sim
-
-mujoco = pytest.importorskip("mujoco")
 
 ROUND_OFF_M = 1e-12
 """Lengths of half a metre, summed from nine differences of coordinates."""
@@ -33,7 +31,6 @@ JOINTS = (
 @pytest.fixture(scope="module")
 def model():
     """MuJoCo's model of the torso without shapes."""
-    need_myo_sim()
     package = distribution("myo-sim")
     assets = Path(str(package.locate_file("myo_sim/models/torso/assets")))
     chain, tendons = (
@@ -62,7 +59,6 @@ def stripped(element: ET.Element) -> None:
 @pytest.fixture(scope="module")
 def trunk():
     """Without the multifidus that is repeated above L1, which the file has not."""
-    need_myo_sim()
     whole = trunk_of_myo_sim()
     own = np.array(["_at_" not in name for name in whole.muscles.names])
     return replace(whole, muscles=whole.muscles.of(own))

@@ -12,10 +12,8 @@ from spinepipe.model import LoadCase, RefusedModel, ScopedEffect
 from spinepipe.model.osim import osim, write_osim
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer, pinocchio_peer
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
-
-opensim_peer = pytest.importorskip("tests.reference.peers.opensim_peer")
-pinocchio_peer = pytest.importorskip("tests.reference.peers.pinocchio_peer")
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from spinepipe.model import ScopedEffect
 from spinepipe.statics import System, follow
 from spinepipe.world import Chain as LoadedChain
 from tests.generators.phantom import SEED, Phantom, phantom
+from tests.reference.peers import opensim_peer as peer
 from tests.reference.peers.chain import Array, Chain, Load
 
 COHORT = Path(__file__).parents[2] / "config" / "cohorts" / "t12s1_phantom"
@@ -54,7 +55,6 @@ def top_moment(of: Phantom, *state: int) -> Load:
 @pytest.mark.parametrize("specimen", range(6))
 @pytest.mark.parametrize("test", range(3), ids=TESTS)
 def test_opensim_finds_the_same_poses(specimen: int, test: int) -> None:
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     of = made()
     unloaded = chain(of, specimen, of.stiffness[specimen])
     for cycle, step in SAMPLE:
@@ -78,7 +78,6 @@ def secant_stiffness(stiffness: Array, q: Array) -> Array:
 @pytest.mark.parametrize("test", range(3), ids=TESTS)
 def test_opensim_agrees_on_the_stiffening_law(specimen: int, test: int) -> None:
     """Linear springs as stiff as the law is at the phantom's pose have that pose's equilibrium."""
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     of = made("stiffening")
     state = (specimen, test, 1, 10)
     secant = secant_stiffness(of.stiffness[specimen], of.motion[state])

@@ -9,6 +9,7 @@ from spinepipe.statics import Program, settle
 from spinepipe.status import Status
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer as peer
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
 
 TIMES = np.array([0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.45, 0.6, 1.0, 1.5])
@@ -63,7 +64,6 @@ def peak(history: Array, kind: slice) -> float:
 @CHAINS
 @pytest.mark.parametrize("ramp_s", [0.0, 0.5], ids=["constant", "ramped"])
 def test_the_way_is_that_of_opensim(name: str, ramp_s: float) -> None:
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     chain = chain_and_loads(name)
     expected = peer.settle(chain, 1.5, times=TIMES, accuracy=PEER_ACCURACY, ramp_time=ramp_s)
     system = bridge.system(chain)

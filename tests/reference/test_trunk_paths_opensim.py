@@ -1,17 +1,15 @@
 """Lengths and lever arms of a trunk's fascicles against OpenSim's, bodies and points the same.
 
-The made-up trunk bends in all seven joints; that of myo-sim too where it is installed.
+The made-up trunk bends in all seven joints, that of myo-sim too.
 """
 
 import numpy as np
 import pytest
-from installed import need_myo_sim
 from trunk_cases import made_up_trunk
 from trunk_posture import lengths, lever_arms, random_bends
 
 from spinepipe.muscles.myo_sim import trunk_of_myo_sim
-
-peers = pytest.importorskip("tests.reference.peers.opensim_trunk")
+from tests.reference.peers import opensim_trunk as peers
 
 ROUND_OFF_M = 1e-12
 """Lengths of half a metre, summed from nine differences of coordinates."""
@@ -25,11 +23,7 @@ POSTURES = (np.zeros((7, 3)), random_bends(5))
 @pytest.fixture(scope="module", params=["made up", "myo-sim"])
 def both(request: pytest.FixtureRequest):
     """A trunk and the same in OpenSim."""
-    if request.param == "myo-sim":
-        need_myo_sim()
-        trunk = trunk_of_myo_sim()
-    else:
-        trunk = made_up_trunk()
+    trunk = trunk_of_myo_sim() if request.param == "myo-sim" else made_up_trunk()
     return trunk, peers.build(trunk)
 
 

@@ -16,9 +16,8 @@ from spinepipe.world import Chain as LoadedChain
 from spinepipe.world import StaleChain
 from tests.reference.bridge import spine_model, system
 from tests.reference.peers import chain as chains
+from tests.reference.peers import pinocchio_peer
 from tests.reference.peers.chain import Array, Chain
-
-pinocchio_peer = pytest.importorskip("tests.reference.peers.pinocchio_peer")
 
 ROUND_OFF = 1e-12
 """Of the largest entry; rotational inertia about a joint is a small difference of larger terms."""

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,47 @@ def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
     kept.write_text(content, "utf-8")
     forget()
     assert code.code_digest(MODULE) == fresh
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path:
+    """A made-up package in the place of this one: `spinepipe.own` imports `spinepipe.used.it`."""
+    monkeypatch.setattr(code, "_ROOT", tmp_path)
+    for known in (code._source, code._bytes_digest):
+        monkeypatch.setattr(code, known.__name__, cache(known.__wrapped__))
+    for folder in ("used", "other"):
+        (tmp_path / "spinepipe" / folder).mkdir(parents=True)
+        (tmp_path / "spinepipe" / folder / "it.py").write_text("x = 1\n", "utf-8")
+        (tmp_path / "spinepipe" / folder / "__init__.py").write_text("", "utf-8")
+    (tmp_path / "spinepipe/__init__.py").write_text("", "utf-8")
+    (tmp_path / "spinepipe/own.py").write_text("from spinepipe.used import it\n", "utf-8")
+    return tmp_path / "spinepipe"
+
+
+@pytest.mark.parametrize(
+    ("name", "counts"),
+    [
+        *((f"used/published{suffix}", True) for suffix in code._DATA_SUFFIXES),
+        ("published.csv", True),
+        ("other/published.csv", False),
+        ("used/notes.txt", False),
+    ],
+)
+def test_data_beside_imported_modules_counts(package: Path, name: str, counts: bool) -> None:
+    """Whether it is there and what it holds: published values decide results as code does."""
+
+    def digest() -> str:
+        forget()
+        code._bytes_digest.cache_clear()
+        return code.code_digest("spinepipe.own")
+
+    without = digest()
+    (package / name).write_text("1\n", "utf-8")
+    one = digest()
+    (package / name).write_text("2\n", "utf-8")
+    assert (one != without, digest() != one) == (counts, counts)
+    (package / name).rename((package / name).with_stem("renamed"))
+    assert (digest() != one) is counts
 
 
 @pytest.mark.parametrize(

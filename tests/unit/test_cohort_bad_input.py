@@ -154,6 +154,7 @@ LOAD_CASES = [
     Case("no step 0", line(LOADS, 2, None), LOADS, 2, "step", "step 1 first", 3),
     Case("gap in motion", both(line(MOTION, 5, None), line(MOTION, 4, None)), MOTION, 4, "step", "step 2 after step 0", 2),
     Case("time stands still", cell(LOADS, 4, "time_s", "1"), LOADS, 4, "time_s", "times that increase"),
+    Case("two times at a step", add(LOADS, "*,flexion,2,L3,0,0,0,0,0,0,,,,2.5"), LOADS, 5, "time_s", "one time per step"),
     Case("time missing", cell(LOADS, 3, "time_s", ""), LOADS, 3, "time_s", "in every row of a test"),
     Case("test without load", add(MOTION, "a,flexon,0,L3L4,1,1,1"), MOTION, 14, "test", "did you mean 'flexion'"),
     Case("step without load", add(MOTION, "a,flexion,3,L3L4,1,1,1"), MOTION, 14, "step", "step '3' of specimen 'a'"),

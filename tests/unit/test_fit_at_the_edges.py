@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
+from spinepipe.calibrate.fit import _start_points
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
@@ -13,6 +14,7 @@ from spinepipe.world import Chain
 
 STIFFNESS = np.array([1e5, 1e6, 1e5, 20.0, 20.0, 20.0])
 ANGLES = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 TOP = np.array([0.02, 0.1, 0.0])
 
 
@@ -45,6 +47,24 @@ def problem(case: LoadCase, extension_deg: list[float], zeroed: bool = False) ->
     free = free_parameters(model, 0, ["extension_nm_per_rad"], "per_specimen")
     reach = np.array([np.log(1000.0)])
     return Problem(model, (MeasuredCase(case, measured, zeroed),), free, ANGLES, -reach, reach)
+
+
+def test_further_starts_are_a_latin_hypercube_that_hangs_on_the_seed() -> None:
+    """One in each slice of what bounds leave of a factor of 30, for every unknown."""
+    model, many = joint(), 8
+    free = free_parameters(model, 0, ROTATIONS, "per_joint")
+    low, high = np.log([0.5, 1e-4, 0.01]), np.log([1e4, 2.0, 50.0])
+    case = MeasuredCase(compression(1.0), np.zeros((1, 1, 6)))
+    spread = Problem(model, (case,), free, ANGLES, low, high)
+    first, *further = _start_points(spread, many + 1, seed=5)
+    assert not first.any()
+    within = np.log([0.5, 1.0 / 30.0, 1.0 / 30.0]), np.log([30.0, 2.0, 30.0])
+    slices = np.floor(many * (np.array(further) - within[0]) / (within[1] - within[0]))
+    np.testing.assert_array_equal(np.sort(slices, axis=0), np.tile(np.arange(many)[:, None], 3))
+    again, other = (_start_points(spread, many + 1, seed=seed)[1:] for seed in (5, 6))
+    np.testing.assert_array_equal(again, further)
+    assert np.abs(np.array(other) - further).min() > 0.0
+    assert len(_start_points(spread, 1, seed=5)) == 1
 
 
 def test_the_brink_of_stability_is_no_optimum() -> None:

@@ -5,7 +5,6 @@ from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 import pytest
-from installed import need_myo_sim
 
 from spinepipe.muscles import myo_sim
 from spinepipe.muscles.myo_sim import NoSource, origin_of_myo_sim, source_of_myo_sim
@@ -29,7 +28,6 @@ FASCICLES_A_SIDE = {
 
 @pytest.fixture(scope="module")
 def source():
-    need_myo_sim()
     return source_of_myo_sim()
 
 
@@ -171,7 +169,6 @@ def test_what_the_slices_the_head_and_the_arms_hang_on(trunk) -> None:
 
 
 def test_the_mark_holds_the_digest_of_the_files() -> None:
-    need_myo_sim()
     origin = origin_of_myo_sim()
     assert (origin.name, origin.version) == ("myo-sim", "0.2.4")
     # the digest of the files that all figures above were read from

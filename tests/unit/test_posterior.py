@@ -6,11 +6,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from example_effects import NOWHERE, spine
+from scipy.interpolate import PchipInterpolator
 from scipy.stats import norm
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem
-from spinepipe.calibrate.posterior import TIPPED, Target, between, modes, noise_of, normal_of
-from spinepipe.calibrate.sampler import convergence, sample
+from spinepipe.calibrate.posterior import (
+    TIPPED,
+    Point,
+    Target,
+    between,
+    modes,
+    noise_of,
+    normal_of,
+)
+from spinepipe.calibrate.sampler import OUTERMOST, _Chart, convergence, sample
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
@@ -194,3 +203,21 @@ def test_where_nothing_stands_there_is_no_mode() -> None:
     outside = np.array([[0.0, 20.0]])  # 0.2 m: beyond what an offset may be
     assert target.together([(0, outside[0])]) == [None]
     assert modes(target, outside)[0].message == TIPPED
+
+
+@pytest.mark.parametrize("along", [-9.0, -3.9, 0.3, 3.9, 9.0])
+def test_the_slope_of_a_density_in_other_coordinates_is_that_of_its_values(along: float) -> None:
+    """Within the quantiles that are kept, and beyond them on both sides, where they go straight."""
+    places = np.linspace(-OUTERMOST, OUTERMOST, 33)
+    rising = PchipInterpolator(places, np.sinh(0.4 * places))
+    chart = _Chart(np.array([0.2, 0.0]), np.array([[0.6, 0.3], [0.0, 1.0]]), {1: rising})
+
+    def energy(y: Array) -> tuple[Array, float]:
+        z = chart.z(y)
+        nothing = np.zeros((2, 2))
+        point = Point(z, z, 0.5 * float(z @ z), z, nothing, None)  # type: ignore[arg-type]
+        return chart.density(y, point)
+
+    y, step = np.array([0.7, along]), 1e-5
+    slope = [energy(y + move)[1] - energy(y - move)[1] for move in step * np.eye(2)]
+    np.testing.assert_allclose(energy(y)[0], np.array(slope) / (2.0 * step), rtol=1e-6, atol=1e-6)

@@ -26,6 +26,7 @@ from spinepipe.status import Status
 from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer as peer
 from tests.reference.peers.chain import Load
 
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
@@ -226,7 +227,6 @@ FACTORS = np.array([1.5, 0.6, 1.0, 1.35, 1.0, 1.0])
 @COURSES
 def test_a_truth_made_by_opensim_comes_back(course: Course) -> None:
     """CPodes' end of the segment with other stiffness, within 1 %."""
-    peer = pytest.importorskip("tests.reference.peers.opensim_peer")
     chain = pushed_segment()
     stiff = chain.with_stiffness(chain.stiffness * FACTORS)
     ends = peer.settle(stiff, course.duration_s, accuracy=1e-6, ramp_time=course.ramp_s)

@@ -214,6 +214,20 @@ def test_chi_squared_of_a_hand_worked_case() -> None:
     assert found.message == "6 bins"
 
 
+def test_chi_squared_has_the_degrees_of_freedom_that_its_bins_leave() -> None:
+    """Down to a single one: four bins, and mean and SD from the values."""
+    seen = set()
+    for values in np.random.default_rng(0).uniform(size=(30, 40)):
+        found = chi_squared_normality(values)
+        bins = int(found.message.split()[0])
+        seen.add(bins)
+        assert found.status is (Ended.DONE if bins > 3 else Ended.TOO_FEW)
+        if bins > 3:
+            expected = stats.chi2.sf(found.statistic, bins - 1 - 2)
+            assert found.p == pytest.approx(expected, rel=1e-12)
+    assert {3, 4, 5} <= seen
+
+
 def test_chi_squared_without_degree_of_freedom_points_to_kolmogorov_smirnov() -> None:
     found = chi_squared_normality(np.linspace(0.0, 1.0, 15))
     assert (found.status, found.p) == (Ended.TOO_FEW, None)

@@ -3,7 +3,6 @@
 The profile for Slurm is used as it is, with an executor that submits to a shell script instead.
 """
 
-import importlib.util
 import re
 import shutil
 from pathlib import Path
@@ -18,7 +17,6 @@ from spinepipe.studies.registry import kind_names
 
 pytestmark = pytest.mark.slow
 
-PLUGIN = "snakemake-executor-plugin-cluster-generic"
 ROOT = Path(__file__).parents[2]
 PROFILE = ROOT / "profiles/slurm/config.yaml"
 MOVES = 16
@@ -68,12 +66,6 @@ def run_on_cluster(project: Project) -> str:
     return done.stdout
 
 
-needs_plugin = pytest.mark.skipif(
-    importlib.util.find_spec(PLUGIN.replace("-", "_")) is None, reason=f"{PLUGIN} is not installed"
-)
-
-
-@needs_plugin
 def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) -> None:
     study = ("factors", SAMPLES // 6, "")
     local = lever(tmp_path / "local", study)
@@ -88,7 +80,6 @@ def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) ->
     assert 2 <= groups <= 4  # the samples of two specimens, figures and report
 
 
-@needs_plugin
 def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: Path) -> None:
     local, cluster = new_project(tmp_path / "local"), new_project(tmp_path / "cluster")
     local.run()

@@ -339,7 +339,7 @@ _ADDED = (
     Job(
         "landmark_errors",
         ignores=ignoring(
-            *("poses", "landmark_sd_mm", "damping", "methods", *_SOLVING, *_GROUPING),
+            *("poses", "landmark_sd_mm", "methods", *_SOLVING, *_GROUPING),
             *("load_point", "posterior", *_BOOTSTRAPS, *_JUDGING),
             landmark_precision={"sd_mm", "translation_limit_mm", "rotation_limit_deg", "share"},
         ),
@@ -374,7 +374,7 @@ _ADDED = (
     Job(
         "posterior",
         ignores=ignoring(
-            *("damping", "methods", "landmark_precision", "load_point", *_SOLVING, *_GROUPING),
+            *("methods", "landmark_precision", "load_point", *_SOLVING, *_GROUPING),
             *(*_BOOTSTRAPS, *_JUDGING),
         ),
     ),

@@ -22,6 +22,7 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, spec
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import ROTATIONS
+from tests.generators.hidden import Hidden, Recipe, make
 
 SDS = np.array([np.nan] * 3 + [SD] * 3)
 
@@ -280,9 +281,6 @@ def test_an_exchange_that_stiffness_can_hide_is_not_reported() -> None:
 @pytest.mark.parametrize("exchanged", [False, True])
 def test_specimens_of_their_own_shape_are_known_again(tmp_path: Path, exchanged: bool) -> None:
     """Data of another simulator, whose specimens differ in axes, masses and load points."""
-    pytest.importorskip("opensim")
-    from tests.generators.hidden import Recipe, make
-
     mistakes = {"swapped_specimens": {"specimens": [0, 1]}} if exchanged else {}
     make(Recipe(seed=8, errors=mistakes), tmp_path)
     there = grounds_of_folder(tmp_path)
@@ -294,9 +292,6 @@ def test_specimens_of_their_own_shape_are_known_again(tmp_path: Path, exchanged:
 @pytest.mark.parametrize("exchanged", [False, True])
 def test_an_exchange_is_told_beside_a_real_effect(tmp_path: Path, exchanged: bool) -> None:
     """Joints that stiffen hide it from chi2 alone, and marker bias of each joint imitates it."""
-    pytest.importorskip("opensim")
-    from tests.generators.hidden import Hidden, Recipe, make
-
     mistakes = {"swapped_specimens": {"specimens": [0, 1]}} if exchanged else {}
     hidden = Hidden("nonlinear_stiffening", "extension", shape={"shape": "tangent"})
     make(Recipe(seed=20501, errors=mistakes, hidden=(hidden,)), tmp_path)

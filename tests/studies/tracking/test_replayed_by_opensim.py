@@ -15,8 +15,7 @@ from spinepipe.motion.points import marker_places
 from spinepipe.studies.tracking.moved import motions
 from spinepipe.studies.tracking.persons import person_of
 from spinepipe.tables import read_frame
-
-peer = pytest.importorskip("tests.reference.peers.opensim_motion")
+from tests.reference.peers import opensim_motion as peer
 
 STUDY = """\
 approaches: [ik_constrained_christophy_2012, ik_springs]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from installed import need_male, need_myo_sim
+from installed import need_male
 from scipy.stats import norm
 from trunk_person import SETTINGS, volunteers
 
@@ -33,11 +33,6 @@ ASKED = SETTINGS.model_copy(
         "volunteer": Volunteer(specimen="volunteer"),
     }
 )
-
-
-@pytest.fixture(autouse=True)
-def _needs_the_package() -> None:
-    need_myo_sim()
 
 
 @cache
