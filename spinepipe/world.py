@@ -9,10 +9,9 @@ import contextlib
 import ctypes
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 
@@ -61,22 +60,26 @@ class _Client:
     def __init__(self) -> None:
         self.id = pybullet.connect(pybullet.DIRECT)
         self.generation = 0
-        self.folder = tempfile.TemporaryDirectory(prefix="spinepipe-urdf-")
 
     def load(self, model: SpineModel) -> int:
-        """Reset and load; the file name is new each time, PyBullet caches by name."""
+        """Reset and load; the file name is new each time, PyBullet caches by name.
+
+        No folder is kept between loads: nobody would remove it when the process is ended outright.
+        """
         pybullet.resetSimulation(physicsClientId=self.id)
         self.generation += 1
-        path = Path(self.folder.name) / f"{os.getpid()}-{self.generation}.urdf"
-        path.write_text(urdf(model), encoding="ascii")
-        try:
-            body = pybullet.loadURDF(
-                str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=self.id
-            )
-        except pybullet.error as error:
-            raise RefusedModel(f"{model.specimen}: PyBullet refused the model ({error})") from error
-        finally:
-            path.unlink()
+        name = f"spinepipe-{self.generation}-"
+        with NamedTemporaryFile("w", prefix=name, suffix=".urdf", encoding="ascii") as file:
+            file.write(urdf(model))
+            file.flush()
+            try:
+                body = pybullet.loadURDF(
+                    file.name, useFixedBase=True, flags=_FLAGS, physicsClientId=self.id
+                )
+            except pybullet.error as error:
+                raise RefusedModel(
+                    f"{model.specimen}: PyBullet refused the model ({error})"
+                ) from error
         return int(body)
 
 
