@@ -62,3 +62,4 @@ onsuccess:
 
 onerror:
     sweep_logs()
+    tell_failed()

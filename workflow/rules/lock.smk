@@ -31,12 +31,10 @@ def lock_of_the_living(self):
 
 def lock_for_the_living():
     """Have Snakemake lock so."""
-    found = list(inspect.signature(lock_of_snakemake).parameters)
+    found = list(inspect.signature(PersistenceBase.lock).parameters)
     assert found == ["self"], "see decision 0038"
-    lock_of_the_living.instead_of = lock_of_snakemake
     PersistenceBase.lock = lock_of_the_living
 
 
-# A program that calls Snakemake again and again reads this as often: nobody is to wait for itself.
-lock_of_snakemake = getattr(PersistenceBase.lock, "instead_of", PersistenceBase.lock)
+lock_of_snakemake = PersistenceBase.lock
 lock_for_the_living()
