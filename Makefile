@@ -41,6 +41,7 @@ bench: dev-env  ## measure speed side by side with OpenSim
 validate: dev-env  ## measure what is too slow for a test; goes on where it was cut off
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.validation
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/cases $(BIN)/python -m tests.validation.displaced_joints
+	PYTHONPATH=.:tests/cases $(BIN)/python -m tests.validation.soak
 
 mutants: dev-env  ## put small faults into the code and count those that tests see; writes docs/mutants.md
 	$(BIN)/python -m tests.mutants --workers $(CORES)

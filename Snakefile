@@ -10,6 +10,7 @@ sys.path.insert(0, workflow.basedir)
 include: "workflow/rules/scheduling.smk"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/disk.smk"
+include: "workflow/rules/lock.smk"
 include: "workflow/rules/marks.smk"
 include: "workflow/rules/execution.smk"
 
@@ -61,3 +62,4 @@ onsuccess:
 
 onerror:
     sweep_logs()
+    tell_failed()

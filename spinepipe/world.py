@@ -9,9 +9,9 @@ import contextlib
 import ctypes
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from functools import cache
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 
@@ -64,19 +64,22 @@ class _Client:
     def load(self, model: SpineModel) -> int:
         """Reset and load; the file name is new each time, PyBullet caches by name.
 
-        No folder is kept between models: workers end without cleaning up behind them.
+        No folder is kept between loads: nobody would remove it when the process is ended outright.
         """
         pybullet.resetSimulation(physicsClientId=self.id)
         self.generation += 1
-        file, path = tempfile.mkstemp(".urdf", f"spinepipe-{os.getpid()}-{self.generation}-")
-        try:
-            with open(file, "w", encoding="ascii") as opened:
-                opened.write(urdf(model))
-            body = pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS, physicsClientId=self.id)
-        except pybullet.error as error:
-            raise RefusedModel(f"{model.specimen}: PyBullet refused the model ({error})") from error
-        finally:
-            os.unlink(path)
+        name = f"spinepipe-{os.getpid()}-{self.generation}-"
+        with NamedTemporaryFile("w", prefix=name, suffix=".urdf", encoding="ascii") as file:
+            file.write(urdf(model))
+            file.flush()
+            try:
+                body = pybullet.loadURDF(
+                    file.name, useFixedBase=True, flags=_FLAGS, physicsClientId=self.id
+                )
+            except pybullet.error as error:
+                raise RefusedModel(
+                    f"{model.specimen}: PyBullet refused the model ({error})"
+                ) from error
         return int(body)
 
 

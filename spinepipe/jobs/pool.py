@@ -99,10 +99,7 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
     JobFailed
         With the name of the job, the cause in plain words and the log file.
     """
-    try:
-        worker = _idle.get_nowait()
-    except queue.Empty:
-        worker = _start()
+    worker = _ready()
     try:
         worker.connection.send((function, arguments))
         wait([worker.connection, worker.process.sentinel])
@@ -127,6 +124,18 @@ def warm_up(modules: Sequence[str] = ()) -> None:
         if modules:
             _CONTEXT.set_forkserver_preload(["spinepipe.jobs.collect", *modules])
         forkserver.ensure_running()
+
+
+def _ready() -> _Worker:
+    """A worker that waits for a job, else a new one; who died while it waited harms no job."""
+    while True:
+        try:
+            worker = _idle.get_nowait()
+        except queue.Empty:
+            return _start()
+        if not worker.connection.poll():  # it says nothing unasked: there is an end to be read
+            return worker
+        worker.connection.close()
 
 
 def _start() -> _Worker:

@@ -4,9 +4,7 @@
 """
 
 import sys
-from datetime import date
 from functools import partial
-from pathlib import Path
 
 import pandas as pd
 
@@ -26,8 +24,7 @@ from tests.validation import (
 )
 from tests.validation.discrepancy import command as discrepancy
 from tests.validation.discrepancy import sparse
-
-RESULTS = Path(__file__).parent / "results"
+from tests.validation.written import write as _write
 
 
 def main() -> None:
@@ -220,27 +217,6 @@ def _findings() -> None:
 
 def _count(word: str, held: pd.Series) -> int:
     return int((held == word).sum())
-
-
-def _write(name: str, head: str, rows: pd.DataFrame) -> None:
-    """The table as CSV, and as Markdown with the command and the date."""
-    RESULTS.mkdir(exist_ok=True)
-    shown = rows.map(lambda cell: f"{cell:.4g}" if isinstance(cell, float) else cell)
-    shown.to_csv(RESULTS / f"{name}.csv", index=False)
-    lines = [
-        f"# {name.replace('_', ' ').capitalize()}",
-        "",
-        head,
-        "",
-        f"`python -m tests.validation {name}`, {date.today().isoformat()}",
-        "",
-        "| " + " | ".join(shown.columns) + " |",
-        "|" + "---|" * len(shown.columns),
-        *("| " + " | ".join(map(str, row)) + " |" for row in shown.itertuples(index=False)),
-        "",
-    ]
-    (RESULTS / f"{name}.md").write_text("\n".join(lines), encoding="utf-8")
-    print("\n".join(lines), flush=True)
 
 
 if __name__ == "__main__":

@@ -44,6 +44,7 @@ def test_failing_jobs_are_named_and_the_others_are_kept(project: Project) -> Non
     done = project.snakemake("-j2", "--keep-going", "all")
     assert done.returncode != 0
     assert "Traceback" not in done.stdout
+    assert f"{len(ACCIDENTS)} jobs failed:" in done.stdout.partition("Exiting because")[2]
     for pose, (_, words) in ACCIDENTS.items():
         log = f"results/small/logs/calibrate/specimen=s01/pose={pose}.log"
         assert f"job calibrate study=small specimen=s01 pose={pose}: " in done.stdout

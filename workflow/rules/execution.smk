@@ -9,7 +9,7 @@ from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
 from spinepipe.cohort.doubts import doubts, refusals
-from spinepipe.jobs.pool import Progress, submit_and_wait, warm_up
+from spinepipe.jobs.pool import JobFailed, Progress, submit_and_wait, warm_up
 from spinepipe.studies.registry import place_of
 
 
@@ -171,5 +171,32 @@ def plain(value):
 
 def execute(rule, function, wildcards, log, arguments):
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
-    submit_and_wait(name, function, str(log), **arguments)
+    try:
+        submit_and_wait(name, function, str(log), **arguments)
+    except JobFailed:
+        FAILED.append(name)
+        raise
     progress.finish(rule)
+
+
+MOST_FAILED_NAMED = 5
+FAILED = []
+
+
+def tell_failed():
+    """Name the jobs that failed once more at the end, of many the first ones: their words are far up."""
+    if len(FAILED) < 2:
+        return
+    shown = FAILED[:MOST_FAILED_NAMED]
+    more = len(FAILED) - len(shown)
+    lines = [
+        f"{len(FAILED)} jobs failed:",
+        *(f"  {name}" for name in shown),
+        *([f"  and {more} more"] if more else []),
+        f"Each has a log below {listed_logs()}. Run the same command again: what is finished is kept.",
+    ]
+    print("\n".join(lines), file=sys.stderr)
+
+
+def listed_logs():
+    return ", ".join(f"results/{name}/logs" for name in studies_at_work())

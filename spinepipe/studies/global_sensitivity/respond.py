@@ -45,11 +45,12 @@ def run(
     made_by = provenance("respond", settings, cohort, [specimen], size + marks_of_base(base))
     by_engine = np.concatenate([many.by_engine for many in found])
     handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
-    print(
-        f"{study}: {specimen}, batch {batch}: {by_engine.sum()} of {len(by_engine)} runs left to "
-        "the engine of record",
-        file=sys.stderr,
-    )
+    if by_engine.any():
+        print(
+            f"{study}: {specimen}, batch {batch}: {by_engine.sum()} of {len(by_engine)} runs left "
+            "to the engine of record",
+            file=sys.stderr,
+        )
     write(to_arrow(TABLE, columns), output, made_by | handed)
 
 

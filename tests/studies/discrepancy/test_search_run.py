@@ -9,54 +9,21 @@ import re
 import shutil
 from pathlib import Path
 
-import chain_cases as cases
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from small_project import Project, Shared, copy_project, written
+from stiffening_chains import STUDY, chains
 
 from spinepipe.studies.registry import kind_of
 
 pytestmark = pytest.mark.slow
 
-STUDY = "probe"
 FOLDER = f"results/{STUDY}/discrepancy"
-SETTINGS = """\
-study: probe
-kind: discrepancy
-cohort: chains
-base: {stiffness: per_specimen}
-effects: [nonlinear_stiffening, hysteresis]
-bootstrap: 100
-"""
-STIFFNESS = {"a": 50.0, "b": 40.0}
-SIGN = {"flexion": -1.0, "extension": 1.0}
-RISE = 4000.0
-"""N m/rad3; the stiffness is in N m/rad."""
 
 TABLES = (
     *("gap", "candidates", "where", "confusions", "held_out", "imperfections"),
     *("field_numbers", "tabulated", "next_tests"),
 )
-
-
-def turned(moment: float, k: float) -> float:
-    """Degrees at which k q + RISE q^3 is the moment; the cubic has one real root."""
-    roots = np.roots([RISE, 0.0, k, -moment])
-    return float(np.rad2deg(roots[np.argmin(np.abs(roots.imag))].real))
-
-
-def chains(root: Path) -> None:
-    """A project with that cohort, read in two cycles with noise of 0.05 deg, and its study."""
-    linear = {name: np.array([[k, 60.0, 200.0]] * 3) for name, k in STIFFNESS.items()}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(cases.MOMENT_OF, "extension", ("mz_nm", 1.0, "extension"))
-        made = cases.Chains(linear, tuple(SIGN), steps=6, step_nm=1.5, cycles=2, noise_deg=0.05)
-    for row in made.motion.itertuples():
-        moment, k = SIGN[row.test] * made.step_nm * row.step, STIFFNESS[row.specimen]
-        made.motion.loc[row.Index, "extension_deg"] += turned(moment, k) - np.rad2deg(moment / k)
-    made.write(root)
-    (root / f"config/studies/{STUDY}.yaml").write_text(SETTINGS)
 
 
 def build(folder: Path) -> Project:

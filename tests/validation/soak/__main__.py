@@ -1,0 +1,109 @@
+"""`python -m tests.validation.soak [PART ...]`: kills, targets, memory; all of them unless told.
+
+What was measured by this code is kept, kind by kind and part by part: started again, the program
+goes on with what is missing. The tables are written after each piece.
+"""
+
+import hashlib
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from small_studies import SMALL
+
+from tests.validation.soak import kills, memory, targets
+from tests.validation.written import write
+
+ROOT = Path(__file__).resolve().parents[3]
+PLACE = ROOT / "results/validation/soak"
+HANGS_ON = (
+    *("Snakefile", "workflow/rules/*.smk", "profiles/default/*", "spinepipe/jobs/*.py"),
+    *("spinepipe/files.py", "spinepipe/marks.py", "spinepipe/world.py"),
+    *("tests/validation/soak/*.py", "tests/cases/small_studies.py"),
+)
+"""What runs jobs and writes files, and this program: results are kept as long as it stays."""
+
+Rows = list[dict[str, Any]]
+
+
+def main() -> None:
+    """Run the parts that are asked for, or all."""
+    parts: dict[str, Callable[[], None]] = {
+        "kills": _kills,
+        "targets": _targets,
+        "memory": _memory,
+    }
+    for name in sys.argv[1:] or parts:
+        if name not in parts:
+            sys.exit(f"no part {name!r}: {', '.join(parts)}")
+        parts[name]()
+
+
+def kept(name: str, measure: Callable[[Path], Iterable[dict[str, Any]]]) -> Rows:
+    """Rows of a piece: from its file, or measured in a temporary folder."""
+    found = hashlib.sha256()
+    for path in sorted(path for pattern in HANGS_ON for path in ROOT.glob(pattern)):
+        found.update(path.read_bytes())
+    file = PLACE / found.hexdigest()[:12] / f"{name}.json"
+    if not file.exists():
+        with tempfile.TemporaryDirectory(prefix="spinepipe-soak-") as folder:
+            rows = list(measure(Path(folder)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(rows, indent=1))
+    rows = json.loads(file.read_text())
+    return rows
+
+
+def _kills() -> None:
+    rows: Rows = []
+    for kind in SMALL:
+        rows += kept(f"kills-{kind}", lambda folder, kind=kind: [kills.row(kind, folder)])  # type: ignore[misc]
+        _write(
+            "kills",
+            f"A small study of each kind, killed {kills.KILLS} times and started again by the same "
+            "command. A kill comes after a drawn number of further result files and a part of a "
+            "second; three of five kill all processes at once, one Snakemake alone, one a worker. "
+            "When a study comes to its end before all kills are spent, it begins anew "
+            "(rounds). Files that differ: from those of an undisturbed run, byte by byte. Finished "
+            "files made twice: those that were there at a kill and that Snakemake's record did not "
+            "have as being made. In the system's temporary folder killed processes leave empty "
+            "folders of Python and Snakemake.",
+            rows,
+        )
+
+
+def _targets() -> None:
+    _write(
+        "targets",
+        f"A study of {2 * targets.SAMPLES:,} jobs of one run each. One job in a hundred dies: by "
+        "an exception, SIGKILL, an end of its process, a fault of memory, a quarter each; each "
+        "must be named with its cause on the screen and in its log, all others must be done, and "
+        "the next run must make the dead ones and nothing else. Runs that tip over are rows with "
+        "status and message, equal to those of the same study in batches, and counted in "
+        "`failed_runs`. "
+        "Nothing to do: every file is looked at, its content digest verified or not.",
+        kept("targets", targets.rows),
+    )
+
+
+def _memory() -> None:
+    _write(
+        "memory",
+        f"{memory.STUDIES} studies, one after the other, in one pool of two workers, each with a "
+        "seed and a cohort of its own. What a worker holds after the study of that number, freed "
+        f"memory given back; limit of growth from study {memory.WARM} to the last: "
+        f"{memory.MOST_GROWTH_MIB:g} MiB, nothing for open files, threads and PyBullet's clients.",
+        kept("memory", memory.rows),
+    )
+
+
+def _write(part: str, head: str, rows: Rows) -> None:
+    write(f"soak_{part}", head, pd.DataFrame(rows), f"python -m tests.validation.soak {part}")
+
+
+if __name__ == "__main__":
+    main()

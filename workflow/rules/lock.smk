@@ -1,0 +1,40 @@
+# The lock of a run that was killed is taken off by the next run (docs/decisions/0038).
+import inspect
+import sys
+from contextlib import ExitStack, contextmanager
+
+from snakemake.persistence import PersistenceBase
+
+from spinepipe.jobs.run_lock import noted, one_at_a_time, take_off
+
+
+@contextmanager
+def lock_of_the_living(self):
+    """Snakemake's lock; that of runs which are no more is taken off before.
+
+    A run that submits jobs leaves no note: they may run on when it was killed.
+    """
+    locks = self.path / "locks"
+    with ExitStack() as to_the_end:
+        with one_at_a_time(self.path):
+            for process in take_off(locks):
+                print(
+                    f"warn  the run of process {process} was killed: its lock is taken off, and this run "
+                    "goes on where it stood",
+                    file=sys.stderr,
+                )
+            if workflow.local_exec:
+                to_the_end.enter_context(noted(locks))
+            to_the_end.enter_context(lock_of_snakemake(self))
+        yield
+
+
+def lock_for_the_living():
+    """Have Snakemake lock so."""
+    found = list(inspect.signature(PersistenceBase.lock).parameters)
+    assert found == ["self"], "see decision 0038"
+    PersistenceBase.lock = lock_of_the_living
+
+
+lock_of_snakemake = PersistenceBase.lock
+lock_for_the_living()
