@@ -109,7 +109,7 @@ def _checked(root: Path, name: str) -> tuple[Study, Cohort]:
     try:
         return studies.check(root, name)
     except InputError as error:
-        cohort = studies.cohort_of(root, name)
+        cohort = studies.misfitting_cohort(root, name)
         if cohort is None:
             raise
         raise InputError([*refusals(cohort), *error.problems]) from error

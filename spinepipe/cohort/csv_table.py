@@ -267,6 +267,9 @@ def _squared(
     width = len(header)
     problems, ragged, cells = [], set(), []
     for line, row in records:
+        if row == header:
+            place = (file, line, None)
+            problems.append(Problem(*place, "the header again", "rows of cells", "delete the line"))
         if len(row) != width:
             problems.append(_ragged(file, line, len(row), width))
             ragged.add(line)

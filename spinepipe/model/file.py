@@ -74,8 +74,8 @@ class ModelFile(BaseModel):
 
     model_config = _FORM
 
-    model: str = Field(description="name of the model")
-    cohort: str = Field(description="cohort the model was made for")
+    model: str = Field(min_length=1, description="name of the model")
+    cohort: str = Field(min_length=1, description="cohort the model was made for")
     effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
 
 

@@ -66,6 +66,10 @@ class BaseCheck:
         except InputError as error:
             yield from (replace(problem, file=name) for problem in error.problems)
             return
+        if model.cohort != cohort.name:
+            found, allowed = f"'{model.cohort}'", f"the study's cohort, '{cohort.name}'"
+            remedy = "take another file; or, where the model is meant for this cohort too, write so"
+            yield Problem(name, None, "cohort", found, allowed, remedy)
         if self.own_bushings:
             yield from _order(model, name)
         for number, entry in enumerate(model.effects):

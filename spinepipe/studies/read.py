@@ -166,10 +166,10 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         return None, list(error.problems)
 
 
-def cohort_of(root: Path, study_name: str) -> Cohort | None:
-    """The cohort that a study file names, where it is sound, though the study may not be."""
-    document, _, _ = load(root / STUDIES / f"{study_name}.yaml", root)
-    return _cohort(document, root)[0]
+def misfitting_cohort(root: Path, study_name: str) -> Cohort | None:
+    """The cohort of a study where both are sound by themselves, though they do not fit."""
+    document, study, problems = load(root / STUDIES / f"{study_name}.yaml", root)
+    return None if problems or study is None else _cohort(document, root)[0]
 
 
 def _further(document: Document) -> tuple[TableForm, ...]:

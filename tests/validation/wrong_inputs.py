@@ -4,8 +4,8 @@ Each is looked at in a process of its own, which the system ends after ten secon
 or with more memory than `MOST_BYTES`.
 """
 
-import os
 import json
+import os
 import resource
 import signal
 import tempfile

@@ -50,13 +50,13 @@ def _hands(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
 
 def _pushes(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
     for columns, least, unit in ((PUSH_N, LEAST_N, "N"), (PUSH_NM, LEAST_NM, "N m")):
-        pushes = _filled(rows[list(columns)])
-        largest = float(pushes.abs().max(axis=None)) if len(pushes) else least
-        if largest < least:
-            found = f"pushes of at most {largest:.3g} {unit} in all tasks"
-            place = (file, int(str(pushes.index[0])), str(pushes.abs().max().idxmax()))
-            remedy = f"suspected: k{unit} and not {unit}; convert the columns"
-            yield Problem(*place, found, f"{least:g} {unit} and more in one task", remedy)
+        for column in columns:
+            pushes = _filled(rows[[column]])
+            if len(pushes) and (largest := float(pushes[column].abs().max())) < least:
+                found = f"pushes of at most {largest:.3g} {unit} in all tasks"
+                place = (file, int(str(pushes.index[0])), column)
+                remedy = f"suspected: k{unit} and not {unit}; convert the column"
+                yield Problem(*place, found, f"{least:g} {unit} and more in one task", remedy)
 
 
 def _filled(rows: pd.DataFrame) -> pd.DataFrame:

@@ -16,9 +16,6 @@ from tests.generators.spoilt.words import (
 
 REFUSED, TOLD, FINE, OPEN = Expected.REFUSED, Expected.TOLD, Expected.FINE, Expected.OPEN
 
-OWN_TABLES = {"subjects": ("tracking", "trunk_loads")}
-"""Tables of which kinds of studies have one each."""
-
 FREE = {"specimens": ("sex",), "patients": ("sex", "lenke_class"), "passive": ("source",)}
 """Texts that are neither names nor words of a list."""
 
@@ -37,8 +34,7 @@ ANY_NAME = {
 
 def entries(project: Project, stem: str) -> dict[str, Entry]:
     """Documented columns of a table, by name."""
-    own = stem if project.kind not in OWN_TABLES.get(stem, ()) else stem
-    return {entry.name: entry for entry in columns(own, project.kind)}
+    return {entry.name: entry for entry in columns(stem, project.kind)}
 
 
 def cell_cases(project: Project, stem: str, rng: random.Random) -> Iterator[Case]:

@@ -2,8 +2,9 @@
 
 import random
 from collections.abc import Iterator
+from functools import partial
 
-from tests.generators.spoilt.case import FOLDER, GONE, Case, Content, Expected, Link
+from tests.generators.spoilt.case import FOLDER, GONE, Case, Changes, Content, Expected, Link
 from tests.generators.spoilt.projects import Project
 
 REFUSED, TOLD, FINE, OPEN = Expected.REFUSED, Expected.TOLD, Expected.FINE, Expected.OPEN
@@ -20,8 +21,25 @@ def _bomb(levels: int) -> str:
 def yaml_cases(project: Project, file: str) -> Iterator[Case]:
     """All cases of a YAML file as a whole."""
     text = project.files[file].decode()
+    for what, (expected, content) in _contents(text, file).items():
+        is_there = isinstance(content, bytes)
+
+        def changes(what: str = what) -> Changes:
+            return {file: _contents(text, file)[what][1]}
+
+        beside = () if is_there else ("*",)
+        yield Case(project, "file", what, file, "", expected, changes, beside)
+
+
+BRACKETS, BRACES, COMMENT = "[" * 900_000, "{a: " * 200_000, "#" * 2_000_000
+FEW, MANY = ("".join(f"q{k}: 1\n" for k in range(number)) for number in (500, 30_000))
+BOMB = _bomb(30)
+
+
+def _contents(text: str, file: str) -> dict[str, tuple[Expected, Content]]:
+    """A YAML file as others write it, and other things in its place."""
     first, _, rest = text.partition("\n")
-    spoilt: dict[str, tuple[Expected, Content]] = {
+    return {
         "empty": (REFUSED, b""),
         "blanks alone": (REFUSED, b" \n \n"),
         "a comment alone": (REFUSED, b"# later\n"),
@@ -29,7 +47,7 @@ def yaml_cases(project: Project, file: str) -> Iterator[Case]:
         "a number": (REFUSED, b"5\n"),
         "JSON": (REFUSED, b'{"a": 1}'),
         "HTML": (REFUSED, b"<html><body>404</body></html>"),
-        "alias bomb": (REFUSED, (text + _bomb(30)).encode()),
+        "alias bomb": (REFUSED, (text + BOMB).encode()),
         "two documents": (REFUSED, f"{text}---\n{text}".encode()),
         "ends of documents": (FINE, f"---\n{text}...\n".encode()),
         "tabs": (REFUSED, (text + "q7:\n\ta: 1\n").encode()),
@@ -37,19 +55,19 @@ def yaml_cases(project: Project, file: str) -> Iterator[Case]:
         "unknown key": (REFUSED, (text + "q7: 1\n").encode()),
         "500 unknown keys": (
             REFUSED,
-            (text + "".join(f"q{k}: 1\n" for k in range(500))).encode(),
+            (text + FEW).encode(),
         ),
         "30 000 unknown keys": (
             REFUSED,
-            (text + "".join(f"q{k}: 1\n" for k in range(30_000))).encode(),
+            (text + MANY).encode(),
         ),
         "a key of 100 000 characters": (REFUSED, f"{text}{'k' * 100_000}: 1\n".encode()),
         "a key in question": (REFUSED, (text + "? [a, b]\n: 1\n").encode()),
         "directive": (OPEN, f"%TAG ! tag:yaml.org,2002:python/\n---\n{text}".encode()),
         "50 000 dashes": (REFUSED, (text + "q7:\n  " + "- " * 50_000 + "1\n").encode()),
-        "900 kB of brackets": (REFUSED, (text + "q7: " + "[" * 900_000).encode()),
-        "900 kB of braces": (REFUSED, (text + "q7: " + "{a: " * 200_000).encode()),
-        "2 MB comment": (REFUSED, (text + "#" * 2_000_000).encode()),
+        "900 kB of brackets": (REFUSED, (text + "q7: " + BRACKETS).encode()),
+        "900 kB of braces": (REFUSED, (text + "q7: " + BRACES).encode()),
+        "2 MB comment": (REFUSED, (text + COMMENT).encode()),
         "CR LF": (FINE, text.replace("\n", "\r\n").encode()),
         "byte-order mark": (FINE, b"\xef\xbb\xbf" + text.encode()),
         "comments": (FINE, f"# about\n\n{text}\n# end\n".encode()),
@@ -65,20 +83,6 @@ def yaml_cases(project: Project, file: str) -> Iterator[Case]:
         "a pipe": (REFUSED, "pipe"),
         "missing": (REFUSED, GONE),
     }
-    for what, (expected, content) in spoilt.items():
-        beside = ("*",) if content in (GONE, FOLDER, "pipe") or isinstance(content, Link) else ()
-        if file == project.study and isinstance(content, Link | str):
-            expected = REFUSED
-        yield Case(
-            project,
-            "file",
-            what,
-            file,
-            "",
-            expected,
-            lambda file=file, content=content: {file: content},  # type: ignore[misc]
-            beside,
-        )
 
 
 def stray_cases(project: Project) -> Iterator[Case]:
@@ -130,5 +134,5 @@ def stray_cases(project: Project) -> Iterator[Case]:
             path,
             "",
             expected,
-            lambda path=path, content=content: {path: content},  # type: ignore[misc]
+            partial(dict, {path: content}),
         )

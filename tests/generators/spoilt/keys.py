@@ -1,6 +1,7 @@
 """Values and keys of YAML files spoilt: cohort.yaml, config.yaml, studies of every kind, models."""
 
 import copy
+import json
 import random
 import re
 from collections.abc import Iterator
@@ -116,6 +117,9 @@ def _path(data: Any, name: str) -> Path | None:
     return tuple(path)
 
 
+MANY_NAMES = f"[{', '.join(f'q{k}' for k in range(10_000))}]"
+
+
 class _Maker:
     """Cases of one key."""
 
@@ -202,8 +206,8 @@ class _Maker:
         if is_prose:
             return
         for what in ("unknown", "path", "dollars", "tag", "100 000 characters", "look-alike"):
-            raw = yaml.safe_dump(bad_names(str(self.old or "x1"))[what], width=10**9).strip()
-            yield self.case(what, raw.removesuffix("...").strip(), self._of_name(what))
+            raw = json.dumps(bad_names(str(self.old or "x1"))[what], ensure_ascii=False)
+            yield self.case(what, raw, self._of_name(what))
         yield self.case("empty", "''", REFUSED)
         if isinstance(self.old, str) and not self.entry.choices:
             yield self.case("blanks around", f"'  {self.old} '", OPEN)
@@ -224,9 +228,7 @@ class _Maker:
             yield self.case("unknown", "[q7x]", REFUSED)
             yield self.case("dollars", "['a $\\frac$']", REFUSED)
             yield self.case("500 unknown", f"[{', '.join(f'q{k}' for k in range(500))}]", REFUSED)
-            yield self.case(
-                "10 000 unknown", f"[{', '.join(f'q{k}' for k in range(10_000))}]", REFUSED
-            )
+            yield self.case("10 000 unknown", MANY_NAMES, REFUSED)
         if item == "number":
             yield self.case("words", "[five]", REFUSED)
             yield self.case("nan", "[.nan]", REFUSED)

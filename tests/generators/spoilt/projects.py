@@ -172,7 +172,8 @@ def _small_tables(landmarks: bool) -> dict[str, tuple[str, tuple[str, ...]]]:
         "motion": (
             "specimen,test,cycle,step,joint,extension_deg,anterior_mm,superior_mm",
             tuple(
-                f"{s},flexion,,{step},{joint},{-step * size},{0.1 * step * size:.2f},{-0.08 * step * size:.3f}"
+                f"{s},flexion,,{step},{joint},{-step * size},{0.1 * step * size:.2f},"
+                f"{-0.08 * step * size:.3f}"
                 for s in "ab"
                 for step in range(3)
                 for joint, size in (("L3L4", 1.0), ("L2L3", 1.1))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from tests.generators.spoilt.case import Case, Expected
 from tests.generators.spoilt.projects import Project, as_csv
@@ -192,6 +193,6 @@ def _recordings(project: Project) -> Iterator[Case]:
                 file,
                 "",
                 TOLD,
-                lambda file=file, content=content: {file: content},  # type: ignore[misc]
+                partial(dict, {file: content}),
                 TRACKED,
             )
