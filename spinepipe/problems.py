@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from heapq import nsmallest
+from itertools import accumulate
 
 __all__ = ["InputError", "Problem", "Spelling", "closest", "did_you_mean", "one_of"]
 
@@ -114,6 +115,9 @@ MOST_ALIKE = 10
 
 MOST_OF_A_FILE = 100
 
+MOST_CHARACTERS = 50_000
+"""Of all problems of one input together."""
+
 
 def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
     """Problems with a bound on their number: what is alike is counted, with its lines.
@@ -123,7 +127,19 @@ def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
     found = list(problems)
     found = _told_in_one(found, _but_for_the_row, MOST_THE_SAME, 1)
     found = _told_in_one(found, _likeness, MOST_ALIKE, MOST_ALIKE)
-    return tuple(_told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE))
+    found = _told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE)
+    return tuple(_short_enough(found))
+
+
+def _short_enough(problems: list[Problem]) -> list[Problem]:
+    """As many as fit into `MOST_CHARACTERS`, the last with the number of the others."""
+    ends = accumulate(len(str(problem)) for problem in problems)
+    fit = max(sum(end <= MOST_CHARACTERS for end in ends), 1)
+    if fit >= len(problems):
+        return problems
+    rest = sum(1 + one.others for one in problems[fit:])
+    last = problems[fit - 1]
+    return [*problems[: fit - 1], replace(last, others=last.others + rest, rows=())]
 
 
 def _but_for_the_row(problem: Problem) -> Hashable:

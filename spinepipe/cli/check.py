@@ -91,13 +91,28 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
 
 def _study_task(root: Path, name: str) -> Task:
     def look() -> Seen:
-        study, cohort = studies.check(root, name)
+        study, cohort = _checked(root, name)
         words, warnings = _told_by_kind(study, cohort, root)
         told = f"{study.kind} on cohort {cohort.name}"
         warnings = warnings or unmeasured(root, study, cohort)
         return Seen("; ".join(filter(None, (told, words))), warnings, cohort)
 
     return f"study {name}", look
+
+
+def _checked(root: Path, name: str) -> tuple[Study, Cohort]:
+    """A sound study and its cohort.
+
+    What cannot be right in a cohort is told first where the two do not fit: lengths in cm, or loads
+    that are all zero, are behind many misfits.
+    """
+    try:
+        return studies.check(root, name)
+    except InputError as error:
+        cohort = studies.misfitting_cohort(root, name)
+        if cohort is None:
+            raise
+        raise InputError([*refusals(cohort), *error.problems]) from error
 
 
 def _cohort_task(root: Path, name: str) -> Task:

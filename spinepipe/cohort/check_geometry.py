@@ -55,7 +55,13 @@ def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Pro
     for specimen in draft.specimens:
         pairs = zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True)
         for joint, (lower, upper) in zip(draft.joint_names, pairs, strict=True):
-            if (specimen, joint) not in given:
+            if (specimen, joint) in given:
+                continue
+            if "landmarks" in draft.absent:
+                found = f"no row of joint {joint} of specimen '{specimen}'"
+                allowed = "a row for each joint of each specimen, or landmarks.csv"
+                yield Problem(draft.file("joints"), None, "joint", found, allowed, "add the row")
+            else:
                 sides = (points.get((specimen, lower), {}), points.get((specimen, upper), {}))
                 line = lines.get((specimen, upper)) or lines.get((specimen, lower))
                 place = (draft.file("landmarks"), line, None)

@@ -2,19 +2,24 @@
 
 import csv
 import io
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from math import isfinite, nan
 from pathlib import Path
 
 import pandas as pd
 
 from spinepipe.cohort.columns import Column, TableForm
-from spinepipe.documents.text import LONGEST_CELL, MOST_CSV_BYTES, longest_word, read_text
+from spinepipe.documents.names import ALLOWED, LONGEST_NAME, name_fault
+from spinepipe.documents.text import (
+    LONGEST_CELL,
+    MOST_CSV_BYTES,
+    NUMBER,
+    longest_word,
+    read_text,
+)
 from spinepipe.problems import Problem, Spelling
-
-NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 MOST_ROWS = 150_000
 
@@ -81,15 +86,39 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
 
 def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
     known = Spelling(form.names, "delete the column or correct its name")
+    absent = [name for name in form.names if name not in rows.header]
     for name in rows.header:
-        if name not in form.names and not form.carries:
+        if name in form.names:
+            continue
+        if not form.carries:
             remedy = known.remedy(name)
             yield Problem(rows.file, 1, name, "an unknown column", known.allowed, remedy)
+        elif (meant := _meant(name, absent)) is not None:
+            allowed = f"the name {meant}, or one that is not so similar"
+            remedy = f"did you mean '{meant}'?"
+            yield Problem(rows.file, 1, name, "a column that is not read", allowed, remedy)
+        elif name and (fault := name_fault(name)) is not None:
+            yield Problem(rows.file, 1, None, fault, f"columns of {ALLOWED}", "rename the column")
     for column in form.columns:
         if column.required and column.name not in rows.header:
             yield Problem(
                 rows.file, 1, column.name, "no such column", column.meaning, "add the column"
             )
+
+
+LIKE = 0.85
+"""Least likeness of names of columns of which one is taken for the other misspelt."""
+
+
+def _meant(name: str, absent: Sequence[str]) -> str | None:
+    """The documented column that one of somebody's own most likely is."""
+    if len(name) > LONGEST_NAME:
+        return None
+    for other in absent:
+        same_letters = sorted(name.casefold()) == sorted(other)
+        if same_letters or SequenceMatcher(None, name.casefold(), other).ratio() >= LIKE:
+            return other
+    return None
 
 
 def _converted(
@@ -238,6 +267,9 @@ def _squared(
     width = len(header)
     problems, ragged, cells = [], set(), []
     for line, row in records:
+        if row == header:
+            place = (file, line, None)
+            problems.append(Problem(*place, "the header again", "rows of cells", "delete the line"))
         if len(row) != width:
             problems.append(_ragged(file, line, len(row), width))
             ragged.add(line)

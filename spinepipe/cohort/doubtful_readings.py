@@ -58,6 +58,7 @@ def doubtful_readings(cohort: Cohort) -> Iterator[Doubt]:
     yield from _unloaded(cohort)
     yield from _unmoved(cohort)
     yield from _constant(cohort)
+    yield from _never(cohort)
     yield from _absurd(cohort)
     yield from _step_0(cohort)
 
@@ -228,6 +229,21 @@ def _constant(cohort: Cohort) -> Iterator[Doubt]:
                 remedy = "look for a column filled down, or take it out"
                 problem = Problem(*place, found, "readings that follow the loads", remedy)
                 yield Doubt(problem, "motion")
+
+
+def _never(cohort: Cohort) -> Iterator[Doubt]:
+    """Columns of motion that are zero in every row, beside others that are not."""
+    motion = cohort.motion
+    assert motion is not None
+    moved = [c for c in COORDINATE_COLUMNS if motion[c].fillna(0.0).ne(0.0).any()]
+    for column in COORDINATE_COLUMNS if moved else ():
+        read = motion[column].dropna()
+        if len(read) and column not in moved and (motion.loc[read.index, "step"] > 0).any():
+            line = first_line(cohort, "motion", int(read.index[0]))
+            place = (file_of(cohort, "motion"), line, column)
+            found = f"0 in all {len(read)} readings"
+            remedy = "leave the cells empty where it was not measured"
+            yield Doubt(Problem(*place, found, "readings with their error", remedy), "motion")
 
 
 def _absurd(cohort: Cohort) -> Iterator[Doubt]:

@@ -13,6 +13,9 @@ MOST_CSV_BYTES = 100_000_000
 LONGEST_CELL = 200
 """Characters of a cell of a CSV file, a key of a YAML file, and a word of its texts."""
 
+NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
+"""A decimal number, and nothing else: no nan, no 1_000, no digits of other scripts."""
+
 INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]"
 )

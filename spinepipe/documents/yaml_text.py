@@ -69,12 +69,26 @@ _PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_PARSER):  # type: ignore[misc]
-    """YAML's safe loader which also takes 1e5 for a number, as everybody means it."""
+    """YAML's safe loader, in which numbers are what everybody writes: decimal, 1e5 too.
+
+    017 (15), 1:30 (90), 0x1F, 0b11 and 1_000 are texts, so that a number that is not what it looks
+    like is refused where one is asked for.
+    """
 
 
+_INTEGER, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in found if tag not in (_INTEGER, _FLOAT)]
+    for first, found in _PARSER.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver(_INTEGER, re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789"))
 _Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    _FLOAT,
+    re.compile(
+        r"^[-+]?((0|[1-9][0-9]*)\.[0-9]*|\.[0-9]+|(0|[1-9][0-9]*)(?=[eE]))([eE][-+]?[0-9]+)?$"
+        r"|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"
+    ),
     list("-+.0123456789"),
 )
 
@@ -201,6 +215,9 @@ def _no_keys(file: str) -> Problem:
 def _no_yaml(file: str, error: Exception) -> Problem:
     mark = getattr(error, "problem_mark", None)
     reason = getattr(error, "problem", None) or str(error)
+    about = getattr(error, "context", None) or ""
+    if about.startswith(("while parsing a flow", "while scanning a quoted")):
+        mark = getattr(error, "context_mark", None) or mark  # what is not closed: where it opens
     line = mark.line + 1 if mark is not None else None
     remedy = "check indentation, colons, brackets and quotes there"
     return Problem(file, line, None, f"no YAML ({reason})", "YAML", remedy)

@@ -12,6 +12,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from spinepipe.documents.settings import validate
+from spinepipe.documents.text import NUMBER
 from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
@@ -43,7 +44,7 @@ class Values(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _numbers(cls, data: Any) -> Any:
-        """YAML reads 1e5 as text: what looks like a number is one."""
+        """Numbers in quotes count as numbers, decimal ones."""
         if not isinstance(data, dict):
             return data
         return {
@@ -73,16 +74,14 @@ class ModelFile(BaseModel):
 
     model_config = _FORM
 
-    model: str = Field(description="name of the model")
-    cohort: str = Field(description="cohort the model was made for")
+    model: str = Field(min_length=1, description="name of the model")
+    cohort: str = Field(min_length=1, description="cohort the model was made for")
     effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
 
 
 def _as_number(value: Any) -> Any:
-    try:
-        return float(value) if isinstance(value, str) else value
-    except ValueError:
-        return value
+    is_number = isinstance(value, str) and NUMBER.fullmatch(value)
+    return float(value) if is_number else value
 
 
 def write_model(model: ModelFile, path: str | Path, digest: str = "") -> None:

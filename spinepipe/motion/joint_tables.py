@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling, one_of
 from spinepipe.units import BORDER_PER_SI, COORDINATES, ROTATIONS
 
 STATUSES = ("confirmed", "derived", "from_memory", "choice")
@@ -88,12 +88,13 @@ def _faults(
     numbers: Sequence[str],
     names: Mapping[str, Sequence[str]],
 ) -> Iterator[Problem]:
+    words = {column: Spelling(known, "name one of these") for column, known in names.items()}
     for line, row in zip(map(int, rows.index), rows.to_dict("records"), strict=True):
         for column in keys:
-            known = names.get(column)
-            if known is not None and row[column] not in known:
-                remedy = did_you_mean(str(row[column]), known, "name one of these")
-                yield Problem(file, line, column, repr(row[column]), one_of(known), remedy)
+            spelling = words.get(column)
+            if spelling is not None and row[column] not in spelling.known:
+                remedy = spelling.remedy(str(row[column]))
+                yield Problem(file, line, column, repr(row[column]), spelling.allowed, remedy)
         for column in numbers:
             if not isfinite(row[column]):
                 found = str(row[column])

@@ -5,13 +5,15 @@ the marker was not seen.
 """
 
 import csv
+import io
 import re
 from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
 
-from spinepipe.motion.recorded import M_PER, Recorded, recorded
+from spinepipe.documents.text import NUMBER
+from spinepipe.motion.recorded import M_PER, Recorded, quickly, recorded, text_of
 from spinepipe.problems import InputError, Problem
 
 TIME = "time_s"
@@ -30,8 +32,12 @@ def read_csv(path: Path, file: str) -> Recorded:
     InputError
         With the line and column of what cannot be read.
     """
-    with path.open(newline="", encoding="utf-8-sig", errors="replace") as text:
-        rows = [(k, row) for k, row in enumerate(csv.reader(text), start=1) if any(row)]
+    lines = csv.reader(io.StringIO(text_of(path, file), newline=""))
+    try:
+        rows = [(k, row) for k, row in enumerate(lines, start=1) if any(row)]
+    except csv.Error as error:
+        allowed, remedy = "cells between commas", "look for a quote mark"
+        raise _fault(file, lines.line_num, None, str(error), allowed, remedy) from error
     if len(rows) < 2:
         raise _fault(file, 1, None, "no frames", "a header and frames", "export it again")
     header, frames = [name.strip() for name in rows[0][1]], rows[1:]
@@ -76,13 +82,13 @@ def _numbers(file: str, line: int, header: list[str], cells: list[str]) -> list[
     if len(cells) != len(header):
         found, allowed = f"{len(cells)} cells", f"{len(header)}, as in the header"
         raise _fault(file, line, None, found, allowed, "correct the line")
+    if (quick := quickly(cells)) is not None:
+        return quick
     numbers = []
     for name, cell in zip(header, cells, strict=True):
-        try:
-            value = float(cell) if cell.strip() else nan
-        except ValueError:
-            value = np.inf
-        if not isfinite(value) and cell.strip().lower() not in ("", "nan"):
+        written = cell.strip()
+        value = float(written) if NUMBER.fullmatch(written) else nan
+        if not isfinite(value) and written.lower() not in ("", "nan"):
             allowed = "a number with a decimal point, or an empty cell"
             raise _fault(file, line, name, repr(cell), allowed, "correct it")
         numbers.append(value)

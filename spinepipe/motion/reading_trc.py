@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from spinepipe.documents.text import NUMBER
 from spinepipe.effects.contract import Array
-from spinepipe.motion.recorded import Recorded, recorded, unit_of
+from spinepipe.motion.recorded import Recorded, quickly, recorded, text_of, unit_of
 from spinepipe.problems import InputError, Problem
 
 VALUES_LINE, NAMES_LINE, AXES_LINE = 3, 4, 5
@@ -55,7 +56,7 @@ def read_trc(path: Path, file: str) -> Recorded:
     InputError
         Where it cannot be read, with the line and the marker.
     """
-    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    lines = text_of(path, file).splitlines()
     if len(lines) <= AXES_LINE or not lines[0].startswith("PathFileType"):
         found, allowed = "no header of a .trc", "PathFileType and four more lines, then frames"
         raise InputError([Problem(file, 1, None, found, allowed, "export the motion again")])
@@ -104,6 +105,8 @@ def _numbers(sheet: _Sheet, line: int, names: Sequence[str]) -> list[float]:
         found = f"{len(cells)} cells in frame {cells[0]}"
         remedy = "write tabs between cells, so that empty ones count"
         raise sheet.fault(line, None, found, f"{width}: frame, time, 3 for each marker", remedy)
+    if (numbers := quickly(cells)) is not None:
+        return numbers
     columns = ["Frame#", "Time", *chain.from_iterable((name,) * 3 for name in names)]
     return [_number(sheet, line, column, cell) for column, cell in zip(columns, cells, strict=True)]
 
@@ -118,10 +121,7 @@ def _number(sheet: _Sheet, line: int, column: str, cell: str) -> float:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        return isfinite(float(text))
-    except ValueError:
-        return False
+    return NUMBER.fullmatch(text) is not None and isfinite(float(text))
 
 
 def _whole(sheet: _Sheet, told: dict[str, str], frames: int) -> None:

@@ -13,7 +13,7 @@ named level. Each quantity needs a row for all muscles and levels.
 """
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
@@ -23,7 +23,7 @@ from typing import Literal, get_args
 
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import SLICES
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling, one_of
 
 Quantity = Literal["ap_distance", "ml_distance", "pcsa", "rib_cage_area"]
 Form = Literal["linear", "exponential", "power"]
@@ -159,8 +159,9 @@ def _parsed(text: str, file: str) -> Regressions:
         )
     rows: list[Regression] = []
     problems: list[Problem] = []
+    words = {column: Spelling(known, "name one of these") for column, known in _WORDS.items()}
     for line, cells in enumerate(lines, start=2):
-        faults = list(_cell_problems(file, line, cells))
+        faults = list(_cell_problems(file, line, cells, words))
         problems += faults
         if not faults:
             rows.append(_row(cells))
@@ -182,12 +183,21 @@ def _row(cells: Mapping[str, str]) -> Regression:
     )
 
 
-def _cell_problems(file: str, line: int, cells: Mapping[str, str]) -> Iterator[Problem]:
-    known = {"level": (ALL, *REGRESSION_LEVELS), "quantity": QUANTITIES, "form": FORMS}
-    for column, names in known.items():
-        if cells[column] not in names:
-            remedy = did_you_mean(cells[column], names, "name one of these")
-            yield Problem(file, line, column, repr(cells[column]), one_of(names), remedy)
+_WORDS: Mapping[str, Sequence[str]] = {
+    "level": (ALL, *REGRESSION_LEVELS),
+    "quantity": QUANTITIES,
+    "form": FORMS,
+}
+"""What the columns of words may say."""
+
+
+def _cell_problems(
+    file: str, line: int, cells: Mapping[str, str], words: Mapping[str, Spelling]
+) -> Iterator[Problem]:
+    for column, of in words.items():
+        if cells[column] not in of.known:
+            remedy = of.remedy(cells[column])
+            yield Problem(file, line, column, repr(cells[column]), of.allowed, remedy)
     for column in COEFFICIENTS:
         if not _is_number(cells[column]):
             yield Problem(

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import Kind, create
 from spinepipe.model.file import EffectEntry, ModelFile, effects_for, read_model
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling
 from spinepipe.studies.base_model import BUSHING, made_by
 from spinepipe.studies.places import at
 
@@ -66,6 +66,10 @@ class BaseCheck:
         except InputError as error:
             yield from (replace(problem, file=name) for problem in error.problems)
             return
+        if model.cohort != cohort.name:
+            found, allowed = f"'{model.cohort}'", f"the study's cohort, '{cohort.name}'"
+            remedy = "take another file; or, where the model is meant for this cohort too, write so"
+            yield Problem(name, None, "cohort", found, allowed, remedy)
         if self.own_bushings:
             yield from _order(model, name)
         for number, entry in enumerate(model.effects):
@@ -94,11 +98,12 @@ def _strangers(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Ite
     named = [("scope.specimens", "specimen", one, specimens) for one in entry.scope.specimens]
     named += [("scope.tests", "test", one, cohort.tests) for one in entry.scope.tests]
     named += [("values.specimen", "specimen", row.specimen, specimens) for row in entry.values]
+    words = {tuple(known): Spelling(known, "delete it or correct its name") for *_, known in named}
     for where, what, one, known in named:
         if one != "*" and one not in known:
-            remedy = did_you_mean(one, known, "delete it or correct its name")
-            found, allowed = f"unknown {what} '{one}'", f"* or {one_of(known)}"
-            yield Problem(name, None, f"{place}.{where}", found, allowed, remedy)
+            spelling = words[tuple(known)]
+            found, allowed = f"unknown {what} '{one}'", f"* or {spelling.allowed}"
+            yield Problem(name, None, f"{place}.{where}", found, allowed, spelling.remedy(one))
 
 
 def _without_values(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Iterator[Problem]:

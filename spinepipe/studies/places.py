@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import motion_read
 from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 
@@ -20,11 +20,12 @@ def unknown_tests(
     document: Document, tests: Sequence[str] | None, known: Sequence[str]
 ) -> Iterator[Problem]:
     """Tests that a study names and its cohort does not have."""
+    spelling = Spelling(known, "delete it or add its loads")
     for index, name in enumerate(tests or ()):
         if name not in known:
-            remedy = did_you_mean(name, known, "delete it or add its loads")
             place = at(document, f"tests.{index}")
-            yield Problem(*place, f"unknown test '{name}'", one_of(known), remedy)
+            found, remedy = f"unknown test '{name}'", spelling.remedy(name)
+            yield Problem(*place, found, spelling.allowed, remedy)
 
 
 def unknown_names(
@@ -36,22 +37,24 @@ def unknown_names(
     ----------
     what : kind of the names, in words.
     """
+    spelling = Spelling(known, "delete it or correct its name")
     for index, name in enumerate(names or ()):
         if name not in known:
-            remedy = did_you_mean(name, known, "delete it or correct its name")
             place = at(document, f"{key}.{index}")
-            yield Problem(*place, f"unknown {what} '{name}'", one_of(known), remedy)
+            found, remedy = f"unknown {what} '{name}'", spelling.remedy(name)
+            yield Problem(*place, found, spelling.allowed, remedy)
 
 
 def unknown_levels(
     document: Document, levels: Iterable[str], joints: Sequence[str]
 ) -> Iterator[Problem]:
     """Joints that ``level_stiffness`` has values for and the cohort does not have."""
+    spelling = Spelling(joints, "delete it or correct its name")
     for name in levels:
         if name not in joints:
-            remedy = did_you_mean(name, joints, "delete it or correct its name")
             place = at(document, f"level_stiffness.{name}")
-            yield Problem(*place, f"unknown joint '{name}'", one_of(joints), remedy)
+            found, remedy = f"unknown joint '{name}'", spelling.remedy(name)
+            yield Problem(*place, found, spelling.allowed, remedy)
 
 
 _PLACE = ["specimen", "test", "step", "joint"]

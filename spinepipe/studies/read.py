@@ -14,10 +14,10 @@ from spinepipe.cohort.columns import TableForm
 from spinepipe.documents.settings import validate
 from spinepipe.documents.strays import files_in, folders_in, strays_in
 from spinepipe.documents.yaml_text import Document, read_yaml
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling, closest, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
-from spinepipe.studies.registry import kind_names, kind_of
+from spinepipe.studies.registry import every_form, kind_names, kind_of
 from spinepipe.studies.study import COHORTS, STUDIES, Study, cohort_folder
 
 ENDING = ".yaml"
@@ -66,6 +66,12 @@ def _validated(document: Document) -> tuple[Study | None, list[Problem]]:
     declared, kind = _kind(document), document.data.get("kind")
     if declared is not None:
         return validate(declared.settings, document)
+    near = closest("kind", map(str.casefold, document.data))
+    if "kind" not in document.data and near is not None:
+        near = next(key for key in document.data if key.casefold() == near)
+        place = (document.file, document.line_of(near), near)
+        remedy = "did you mean 'kind'? it decides which other keys are allowed"
+        return None, [Problem(*place, "an unknown key", "kind", remedy)]
     place = (document.file, document.line_of("kind"), "kind")
     found = "nothing: the key is missing" if kind is None else repr(kind)
     otherwise = "the kind decides which other keys are allowed"
@@ -158,10 +164,16 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         return None, list(error.problems)
 
 
+def misfitting_cohort(root: Path, study_name: str) -> Cohort | None:
+    """The cohort of a study where both are sound by themselves, though they do not fit."""
+    document, study, problems = load(root / STUDIES / f"{study_name}.yaml", root)
+    return None if problems or study is None else _cohort(document, root)[0]
+
+
 def _further(document: Document) -> tuple[TableForm, ...]:
-    """The files that the kind of a study reads besides."""
+    """The files that the kind of a study reads besides; where it names none, those of any kind."""
     kind = _kind(document)
-    return () if kind is None else kind.forms
+    return every_form() if kind is None else kind.forms
 
 
 def _kind(document: Document) -> Kind | None:
@@ -243,13 +255,14 @@ def _unknown_names(selection: Selection, document: Document, root: Path) -> list
     known = [path.stem for path in files_in(root / STUDIES, ENDING)]
     problems = []
     seen: set[str] = set()
+    spelling = Spelling(known, f"add a file of that name to {STUDIES.as_posix()}")
     for key in ("studies", "full"):
         for index, name in enumerate(getattr(selection, key)):
             place = (document.file, document.line_of(f"{key}.{index}"), f"{key}.{index}")
             if name in seen:
                 problems.append(Problem(*place, f"'{name}' again", "each once", "delete one"))
             elif name not in known:
-                remedy = did_you_mean(name, known, f"add {(STUDIES / name).as_posix()}.yaml")
-                problems.append(Problem(*place, f"unknown study '{name}'", one_of(known), remedy))
+                found, remedy = f"unknown study '{name}'", spelling.remedy(name)
+                problems.append(Problem(*place, found, spelling.allowed, remedy))
             seen.add(name)
     return problems

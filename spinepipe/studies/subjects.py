@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import Column, TableForm
 from spinepipe.muscles.subject import CM_PER_M, Subject
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 
 SEXES = ("male", "female")
 
@@ -52,11 +52,12 @@ def subject_problems(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:
             found = f"no row of '{name}'"
             remedy = "add sex, age, height and mass, or delete it from specimens.csv"
             yield Problem(file, None, "specimen", found, "every specimen of specimens.csv", remedy)
+    sexes = Spelling(SEXES, "write male or female")
     for line, row in rows.iterrows():
         place = (file, int(str(line)))
         if row["sex"] not in SEXES:
-            remedy = did_you_mean(str(row["sex"]).lower(), SEXES, "write male or female")
-            yield Problem(*place, "sex", f"'{row['sex']}'", one_of(SEXES), remedy)
+            remedy = sexes.remedy(str(row["sex"]).lower())
+            yield Problem(*place, "sex", f"'{row['sex']}'", sexes.allowed, remedy)
         yield from _size(place, str(row["specimen"]), row["height_cm"], row["mass_kg"])
 
 

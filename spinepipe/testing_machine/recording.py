@@ -6,7 +6,6 @@ first of them, with how many more there are: a machine writes thousands of lines
 
 import csv
 import io
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import medfilt
 
+from spinepipe.documents.text import NUMBER
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
@@ -30,7 +30,6 @@ __all__ = ["Recording", "read_recording"]
 Array = NDArray[np.float64]
 
 MARKS = {"comma": ",", "semicolon": ";", "tab": "\t"}
-NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 WINDOW = 5
 JUMP = 0.1
 """Share of the range of a column by which a row must jump away to be left out."""

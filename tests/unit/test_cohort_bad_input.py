@@ -52,7 +52,7 @@ COHORT_YAML_CASES = [
     Case("no cohort.yaml", without(YAML), YAML, None, None, "no such file"),
     Case("empty", text(YAML, ""), YAML, None, None, "an empty file"),
     Case("no keys", text(YAML, "- a\n"), YAML, None, None, "no keys"),
-    Case("broken YAML", swap(YAML, "[L4, L3, L2]", "[L4, L3"), YAML, 5, None, "no YAML"),
+    Case("broken YAML", swap(YAML, "[L4, L3, L2]", "[L4, L3"), YAML, 4, None, "no YAML"),
     Case("repeated key", add(YAML, "gravity: false"), YAML, 10, "gravity", "twice"),
     Case("nested twice", add(YAML, "  rotation_deg: 1"), YAML, 10, "measurement_sd.rotation_deg", "twice"),
     Case("unknown key", add(YAML, "gravty: 1"), YAML, 10, "gravty", "did you mean 'gravity'"),

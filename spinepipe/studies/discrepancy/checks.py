@@ -6,7 +6,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import MEASURED
 from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import registered
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling, one_of
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.places import at, measured_columns, readings, repeated, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
@@ -41,15 +41,16 @@ def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) ->
 def _effects(document: Document, study: Discrepancy) -> Iterator[Problem]:
     """Names of effects that are in the registry and can be tried."""
     known = effects_to_try()
+    spelling = Spelling(known, "delete it")
     for index, name in enumerate(study.effects or ()):
         if name in known:
             continue
         place = at(document, f"effects.{index}")
-        found, remedy = f"unknown effect '{name}'", did_you_mean(name, known, "delete it")
+        found, remedy = f"unknown effect '{name}'", spelling.remedy(name)
         if name in registered():
             found = f"'{name}', which does not say how it may be tried"
             remedy = "delete it"
-        yield Problem(*place, found, one_of(known), remedy)
+        yield Problem(*place, found, spelling.allowed, remedy)
 
 
 def _measured(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:

@@ -2,15 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
+from spinepipe.anatomy.levels import SIZE_SPREAD, spacing_mm
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.doubtful_places import UNITS, unit_like
 from spinepipe.documents.yaml_text import Document
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
 from spinepipe.studies.places import at
+from spinepipe.studies.scoliosis.curve_angles import curves, main_curve
 from spinepipe.studies.scoliosis.films import (
     CENTRE,
     CORNERS,
@@ -18,6 +22,7 @@ from spinepipe.studies.scoliosis.films import (
     HELD_OUT,
     LEFT,
     NEEDED,
+    PATIENTS,
     RIGHT,
     Film,
     as_read,
@@ -86,6 +91,45 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Probl
             shapes[position] = Film(*as_read(film, cohort.vertebrae).mean(axis=0))
             yield from _tilts(place, film, cohort.vertebrae, shapes[position])
     yield from _bends(file, patient, shapes)
+    if ERECT in shapes:
+        yield from _size(cohort, _Place(file, patient, ERECT), shapes[ERECT])
+        yield from _cobb(cohort, patient, shapes[ERECT])
+
+
+def _size(cohort: Cohort, place: _Place, film: Film) -> Iterator[Problem]:
+    """Is the spine of a length that spines have, unless the cohort says that it is meant?"""
+    names = cohort.vertebrae
+    usual = [(spacing_mm(low), spacing_mm(high)) for low, high in pairwise(names)]
+    apart = np.hypot(np.diff(film.right), np.diff(film.up)) * MM_PER_M
+    told = [(mm, (a + b) / 2.0) for mm, (a, b) in zip(apart, usual, strict=True) if a and b]
+    if not told or "lengths" in cohort.i_mean_it:
+        return
+    ratio = sum(mm for mm, _ in told) / sum(mm for _, mm in told)
+    if not 1.0 / SIZE_SPREAD <= ratio <= SIZE_SPREAD:
+        found = f"vertebrae {ratio:.2g} times as far apart as those of their levels"
+        unit = None if ratio == 0.0 else unit_like(ratio)
+        words = "another unit" if unit is None else UNITS[unit]
+        remedy = (
+            f"suspected: {words}; write mm (if you mean it: i_mean_it: [lengths] in cohort.yaml)"
+        )
+        allowed = f"{1.0 / SIZE_SPREAD:.2g} to {SIZE_SPREAD:g} times"
+        yield place.problem(None, CENTRE[0], found, allowed, remedy)
+
+
+def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[Problem]:
+    """Does the Cobb angle that is stated go with the film?"""
+    rows = cohort.further.get(PATIENTS.stem)
+    if rows is None or not curves(erect):
+        return
+    own = rows.loc[rows["specimen"] == patient, "cobb_deg"].dropna()
+    read = DEG_PER_RAD * main_curve(erect).cobb(erect)
+    for line, stated in own.items():
+        if abs(stated - read) > FARTHEST_APART_DEG:
+            found = f"{stated:g} deg of {patient}, whose film erect has {read:.0f} deg"
+            allowed = f"within {FARTHEST_APART_DEG:g} deg of the film"
+            place = (f"{cohort.name}/{PATIENTS.file}", int(str(line)), "cobb_deg")
+            remedy = "correct it (radians? another patient?), or the tilts of the film"
+            yield Problem(*place, found, allowed, remedy)
 
 
 def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem]:

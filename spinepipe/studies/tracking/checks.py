@@ -12,7 +12,7 @@ from spinepipe.motion.bounds import bounds
 from spinepipe.motion.joint_tables import STATUSES
 from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.checks_of_trials import (
@@ -130,11 +130,12 @@ def _own_tables(cohort: Cohort) -> Iterator[Problem]:
     for form in (PASSIVE, RATIOS, BOUNDS):
         table = cohort.further.get(form.stem)
         told = () if table is None else table["status"].dropna().items()
+        statuses = Spelling(STATUSES, "or leave it empty")
         for line, word in told:
             if word not in STATUSES:
                 place = (f"{cohort.name}/{form.file}", int(str(line)), "status")
-                remedy = did_you_mean(str(word), STATUSES, "or leave it empty")
-                yield Problem(*place, f"'{word}'", one_of(STATUSES), remedy)
+                remedy = statuses.remedy(str(word))
+                yield Problem(*place, f"'{word}'", statuses.allowed, remedy)
 
 
 def _truth(cohort: Cohort) -> Iterator[Problem]:
@@ -147,10 +148,10 @@ def _truth(cohort: Cohort) -> Iterator[Problem]:
         own = of_specimen(rows, specimen)
         known = [row["trial"] for row in trial_rows(cohort, specimen)]
         strange = own[~own["trial"].isin(known)].drop_duplicates("trial")
+        trials = Spelling(known, "correct the name")
         for line, name in strange["trial"].items():
-            remedy = did_you_mean(str(name), known, "correct the name")
-            found = f"no trial '{name}' of '{specimen}'"
-            yield Problem(file, int(str(line)), "trial", found, one_of(known), remedy)
+            found, remedy = f"no trial '{name}' of '{specimen}'", trials.remedy(str(name))
+            yield Problem(file, int(str(line)), "trial", found, trials.allowed, remedy)
     told = rows[[f"{axis}_deg" for axis in ROTATIONS]].notna().sum(axis=1)
     for line in rows.index[(told > 0) & (told < len(ROTATIONS))]:
         found = f"{told[line]} of 3 rotations"

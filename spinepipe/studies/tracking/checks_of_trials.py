@@ -14,7 +14,7 @@ from spinepipe.motion.points import marker_places
 from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recorded import Recorded
 from spinepipe.motion.skeleton import BODIES, MarkerSet
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, Problem, Spelling, one_of
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
 from spinepipe.studies.tracking.forms import FLAGS, KINDS, MARKER_SET, STANCE, TRIALS
@@ -31,6 +31,9 @@ from spinepipe.studies.tracking.persons import (
 )
 from spinepipe.units import COORDINATES
 
+WORDS: Mapping[str, Sequence[str]] = {"kind": KINDS, "arms": ARMS, "static": FLAGS}
+"""What the columns of words may say."""
+
 LISTED = 4
 """So many names are written out."""
 
@@ -38,24 +41,23 @@ LISTED = 4
 def row_problems(cohort: Cohort) -> Iterator[Problem]:
     """Words, times and names in `trials.csv`, and trials that somebody lacks."""
     file = f"{cohort.name}/{TRIALS.file}"
+    words = {name: Spelling(known, "write one of these") for name, known in WORDS.items()}
     for specimen in cohort.specimen_names:
         rows = trial_rows(cohort, specimen)
         for row in rows:
-            yield from _words(file, row)
+            yield from _words(file, row, words)
             yield from _led_out(file, row, cohort.folder)
             yield from _crop(file, row)
         yield from _needed(file, cohort, specimen, rows)
 
 
-def _words(file: str, row: Row) -> Iterator[Problem]:
-    words: Mapping[str, Sequence[str]] = {"kind": KINDS, "arms": ARMS}
-    if isinstance(row["static"], str):
-        words = {**words, "static": FLAGS}
-    for column, known in words.items():
-        if row[column] not in known:
-            remedy = did_you_mean(str(row[column]), known, "write one of these")
+def _words(file: str, row: Row, words: Mapping[str, Spelling]) -> Iterator[Problem]:
+    for column, spelling in words.items():
+        is_left_out = column == "static" and not isinstance(row[column], str)
+        if row[column] not in spelling.known and not is_left_out:
             found = f"'{row[column]}' of trial {row['trial']}"
-            yield Problem(file, row["line"], column, found, one_of(known), remedy)
+            remedy = spelling.remedy(str(row[column]))
+            yield Problem(file, row["line"], column, found, spelling.allowed, remedy)
     if Path(row["file"]).suffix.lower() not in READERS:
         found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
         yield Problem(file, row["line"], "file", found, allowed, "export it as one of these")
@@ -161,11 +163,11 @@ def _look(
 def _names(cohort: Cohort, row: Row, markers: MarkerSet, read: Recorded) -> Iterator[Problem]:
     """Markers of the set that the file lacks; further ones in the file are a remark."""
     spare = [name for name in read.names if name not in markers.names]
+    spelling = Spelling(spare, "rename it in the file, or delete it from the set")
     for name in markers.names:
         if name not in read.names:
             allowed = f"all markers of {MARKER_SET.file}; further ones are " + (
                 ", ".join(spare[:LISTED]) + (" ..." if len(spare) > LISTED else "") or "none"
             )
-            remedy = did_you_mean(name, spare, "rename it in the file, or delete it from the set")
             file = f"{cohort.name}/{row['file']}"
-            yield Problem(file, None, name, "no such marker", allowed, remedy)
+            yield Problem(file, None, name, "no such marker", allowed, spelling.remedy(name))

@@ -8,7 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.folder import PELVIS, SHEATH, in_ground
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 from spinepipe.units import MM_PER_M
 
 CARRIERS = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
@@ -53,11 +53,11 @@ def _frames(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
     if rows.empty:
         found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
         yield Problem(file, None, "specimen", found, allowed, "add its rows, or delete the file")
+    carriers = Spelling(CARRIERS, "ribs, arms and head move with a vertebra")
     for line, body in rows["carried_by"].items():
         if body not in CARRIERS:
-            remedy = did_you_mean(str(body), CARRIERS, "ribs, arms and head move with a vertebra")
-            place = (file, int(str(line)), "carried_by")
-            yield Problem(*place, f"unknown vertebra '{body}'", one_of(CARRIERS), remedy)
+            place, found = (file, int(str(line)), "carried_by"), f"unknown vertebra '{body}'"
+            yield Problem(*place, found, carriers.allowed, carriers.remedy(str(body)))
 
 
 def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[Problem]:
@@ -65,11 +65,10 @@ def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Itera
     otherwise = "ribs, arms and head belong to T11, or add body_frames.csv with their frames"
     if frames is not None:
         otherwise = "add its frame to body_frames.csv"
-    for line, body in rows["body"].items():
-        if body not in known:
-            remedy = did_you_mean(str(body), known, otherwise)
-            place = (file, int(str(line)), "body")
-            yield Problem(*place, f"unknown body '{body}'", one_of(known), remedy)
+    bodies = Spelling(known, otherwise)
+    for line, body in rows["body"][~rows["body"].isin(known)].items():
+        place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
+        yield Problem(*place, found, bodies.allowed, bodies.remedy(str(body)))
     counted = rows["muscle"].map(rows["muscle"].value_counts())
     for line, name in rows["muscle"][counted == 1].items():
         found, allowed = f"{name} has one point", "two points or more, from end to end"
@@ -78,11 +77,12 @@ def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Itera
 
 def _parameters(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
     there = [name for name in STRENGTHS if name in rows]
+    sides = Spelling(SIDES, "write right or left")
     for line, row in rows.iterrows():
         place, name = (file, int(str(line))), row["muscle"]
         if row["side"] not in SIDES:
-            remedy = did_you_mean(str(row["side"]), SIDES, "write right or left")
-            yield Problem(*place, "side", f"'{row['side']}'", one_of(SIDES), remedy)
+            remedy = sides.remedy(str(row["side"]))
+            yield Problem(*place, "side", f"'{row['side']}'", sides.allowed, remedy)
         given = {column: float(row[column]) for column in there if not pd.isna(row[column])}
         for column, value in given.items():
             if value <= 0.0:
@@ -100,11 +100,11 @@ def _both(cohort: str, points: pd.DataFrame, muscles: pd.DataFrame) -> Iterator[
     for stem, other in (("muscles", "muscle_parameters"), ("muscle_parameters", "muscles")):
         known = files[other].drop_duplicates().tolist()
         alone = files[stem].drop_duplicates()
+        spelling = Spelling(known, f"add it to {other}.csv or delete it")
         for line, name in alone[~alone.isin(known)].items():
             place = (f"{cohort}/{stem}.csv", int(str(line)), "muscle")
-            remedy = did_you_mean(str(name), known, f"add it to {other}.csv or delete it")
-            allowed = f"a muscle of {other}.csv"
-            yield Problem(*place, f"{name} is not in {other}.csv", allowed, remedy)
+            found, allowed = f"'{name}' is not in {other}.csv", f"a muscle of {other}.csv"
+            yield Problem(*place, found, allowed, spelling.remedy(str(name)))
 
 
 def _sides(
@@ -150,8 +150,7 @@ def _wrong(right_m: float, called: str | None, side: str) -> bool:
 
 
 def _levels(file: str, column: "pd.Series[str]") -> Iterator[Problem]:
-    known = (*LEVELS, *SLICES)
-    for line, name in column[~column.isin(known)].items():
-        remedy = did_you_mean(str(name), known, "a joint is named upper vertebra first")
-        place = (file, int(str(line)), "level")
-        yield Problem(*place, f"unknown level '{name}'", one_of(known), remedy)
+    levels = Spelling((*LEVELS, *SLICES), "a joint is named upper vertebra first")
+    for line, name in column[~column.isin(levels.known)].items():
+        place, found = (file, int(str(line)), "level"), f"unknown level '{name}'"
+        yield Problem(*place, found, levels.allowed, levels.remedy(str(name)))

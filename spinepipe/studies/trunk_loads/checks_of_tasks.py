@@ -1,7 +1,7 @@
 """What may be wrong with a row of `tasks.csv`: names, posture, hands, what pushes, muscles."""
 
 import re
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import pandas as pd
 
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import Problem, Spelling
 from spinepipe.studies.trunk_loads.forms import (
     FORCE,
     HANDS,
@@ -23,6 +23,8 @@ from spinepipe.studies.trunk_loads.forms import (
 from spinepipe.studies.trunk_loads.postures import THORAX_DEG, Row, rhythm, turned_deg
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import MM_PER_M, ROTATIONS
+
+PUSHED = "applied_at"
 
 PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 """Tasks become names of files."""
@@ -80,26 +82,29 @@ def task_problems(
     means : as the study reads the rotation of the trunk.
     """
     first: dict[tuple[Hashable, ...], str] = {}
+    words = {name: Spelling(of, "correct it or leave it empty") for name, of in WORDS.items()}
+    words[PUSHED] = Spelling(PUSHED_AT, "name a vertebra of the thorax")
     for line, cells in zip(rows.index.tolist(), rows.to_dict("records"), strict=True):
         row = _Row(file, int(line), cells)
         postures = list(_posture(row, means))
-        yield from _names(row)
+        yield from _names(row, words)
         yield from postures
         yield from _load(row)
         yield from _place_of_hands(row, means, None if postures else tallest_m)
-        yield from _push(row)
+        yield from _push(row, words[PUSHED])
         yield from _muscles(row)
         yield from _again(row, first)
 
 
-def _names(row: _Row) -> Iterator[Problem]:
+def _names(row: _Row, words: Mapping[str, Spelling]) -> Iterator[Problem]:
     if not PLAIN.fullmatch(str(row.cells["task"])):
         allowed = "letters, digits, _ . - and a letter or digit first"
         yield row.problem("task", "a name for no file", allowed, "rename the task")
-    for column, words in WORDS.items():
-        if row.word(column) not in words:
-            remedy = did_you_mean(row.word(column), words, "correct it or leave it empty")
-            yield row.problem(column, f"'{row.word(column)}'", one_of(words), remedy)
+    for column, known in WORDS.items():
+        word = row.word(column)
+        if word not in known:
+            spelling = words[column]
+            yield row.problem(column, f"'{word}'", spelling.allowed, spelling.remedy(word))
 
 
 def _posture(row: _Row, means: TrunkAngle) -> Iterator[Problem]:
@@ -188,15 +193,15 @@ def _place_of_hands(row: _Row, means: TrunkAngle, tallest_m: float | None) -> It
             yield row.problem(farthest, found, f"{REACH_M:g} m at most, an arm's reach", remedy)
 
 
-def _push(row: _Row) -> Iterator[Problem]:
+def _push(row: _Row, vertebrae: Spelling) -> Iterator[Problem]:
     pushes = [name for name in (*PUSH_N, *PUSH_NM) if row.number(name) != 0.0]
-    where = str(row.cells["applied_at"]) if row.given("applied_at") else None
+    where = str(row.cells[PUSHED]) if row.given(PUSHED) else None
     if where is not None and where not in PUSHED_AT:
-        remedy = did_you_mean(where, PUSHED_AT, "name a vertebra of the thorax")
-        yield row.problem("applied_at", f"unknown vertebra '{where}'", one_of(PUSHED_AT), remedy)
+        found = f"unknown vertebra '{where}'"
+        yield row.problem(PUSHED, found, vertebrae.allowed, vertebrae.remedy(where))
     if pushes and where is None:
         remedy = "write the vertebra that is pushed"
-        yield row.problem("applied_at", f"{pushes[0]} and no vertebra", one_of(PUSHED_AT), remedy)
+        yield row.problem(PUSHED, f"{pushes[0]} and no vertebra", vertebrae.allowed, remedy)
     bends = any(row.number(name) != 0.0 for name in PUSH_NM[:2])
     if row.word("applied_as") == FORCE and not bends:
         found = "a force that makes a moment, and no moment"
