@@ -4,13 +4,14 @@ Has every joint of every specimen a pose? Are neighbours as far apart as in a sp
 for millimetres show here)? Can the bodies exist, and are all there that gravity needs?
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import isnan
 
 import numpy as np
 
 from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.exchanged_landmarks import Suspect, suspect
 from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose
 from spinepipe.problems import Problem
@@ -53,13 +54,18 @@ def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Pro
     """
     points, lines = _points(draft)
     for specimen in draft.specimens:
+        told = [
+            (name, points[specimen, name]) for name in draft.vertebrae if (specimen, name) in points
+        ]
+        behind = suspect(dict(told))
         pairs = zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True)
         for joint, (lower, upper) in zip(draft.joint_names, pairs, strict=True):
             if (specimen, joint) not in given:
                 sides = (points.get((specimen, lower), {}), points.get((specimen, upper), {}))
                 line = lines.get((specimen, upper)) or lines.get((specimen, lower))
                 place = (draft.file("landmarks"), line, None)
-                yield from _joint_problems(place, f"{joint} of specimen '{specimen}'", *sides)
+                name = f"{joint} of specimen '{specimen}'"
+                yield from _joint_problems(place, name, *sides, behind)
 
 
 def _points(
@@ -76,7 +82,11 @@ def _points(
 
 
 def _joint_problems(
-    place: Place, joint: str, lower: Mapping[str, Array], upper: Mapping[str, Array]
+    place: Place,
+    joint: str,
+    lower: Mapping[str, Array],
+    upper: Mapping[str, Array],
+    behind: Suspect | None,
 ) -> Iterator[Problem]:
     if any(np.isnan(point).any() for side in (lower, upper) for point in side.values()):
         return  # a bad cell, reported there
@@ -84,16 +94,20 @@ def _joint_problems(
         if face not in side:
             yield _no_pose(place, joint, f"the {which} vertebra has no {face}")
             return
-    distance = float(np.linalg.norm(upper[UPPER_FACE] - lower[LOWER_FACE]))
-    wrong_unit = list(spacing_problem(place, distance, f"the endplate centres at {joint}"))
+    apart = upper[UPPER_FACE] - lower[LOWER_FACE]
+    wrong_unit = list(spacing_problem(place, apart, XYZ, f"the endplate centres at {joint}"))
     if wrong_unit:
         yield from wrong_unit
         return
-    yield from _frame_problems(place, joint, lower, upper)
+    yield from _frame_problems(place, joint, lower, upper, behind)
 
 
 def _frame_problems(
-    place: Place, joint: str, lower: Mapping[str, Array], upper: Mapping[str, Array]
+    place: Place,
+    joint: str,
+    lower: Mapping[str, Array],
+    upper: Mapping[str, Array],
+    behind: Suspect | None,
 ) -> Iterator[Problem]:
     try:
         pose = joint_pose(_metres(lower), _metres(upper))
@@ -104,6 +118,8 @@ def _frame_problems(
         found = f"an axis of {joint} that points the wrong way"
         allowed = "x anterior, y superior, z right, each within 90 deg of ground's"
         remedy = "look for left and right, or superior and inferior, exchanged"
+        if behind is not None:
+            place, remedy = (*place[:2], behind.column), behind.words
         yield Problem(*place, found, allowed, remedy)
 
 
@@ -117,7 +133,10 @@ def _no_pose(place: Place, joint: str, reason: str) -> Problem:
         "centres and both pedicle bases, or a row in joints.csv"
     )
     found = f"no frame for {joint}: {reason}"
-    return Problem(*place, found, allowed, "add or correct the landmarks")
+    remedy = "add or correct the landmarks: one may be misplaced"
+    return Problem(
+        *place[:2], XYZ[0] if reason.startswith("the pedicle") else place[2], found, allowed, remedy
+    )
 
 
 def _origin_spacing(draft: Draft) -> Iterator[Problem]:
@@ -128,10 +147,10 @@ def _origin_spacing(draft: Draft) -> Iterator[Problem]:
         for below, joint in pairwise(names):
             if (specimen, below) in origins and (specimen, joint) in origins:
                 line, origin = origins[specimen, joint]
-                distance = float(np.linalg.norm(origin - origins[specimen, below][1]))
-                place = (draft.file("joints"), line, "x_mm")
+                apart = origin - origins[specimen, below][1]
+                place = (draft.file("joints"), line, None)
                 what = f"the origins of {below} and {joint}"
-                yield from spacing_problem(place, distance, what)
+                yield from spacing_problem(place, apart, XYZ, what)
 
 
 INERTIA = tuple(f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
@@ -203,22 +222,34 @@ def _spacing(draft: Draft) -> Iterator[Problem]:
         for lower, upper in zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True):
             if (specimen, lower) in centres and (specimen, upper) in centres:
                 line, centre = centres[specimen, upper]
-                distance = float(np.linalg.norm(centre - centres[specimen, lower][1]))
+                apart = centre - centres[specimen, lower][1]
                 what = f"the centres of mass of {lower} and {upper}"
-                place = (draft.file("bodies"), line, "com_x_mm")
-                yield from spacing_problem(place, distance, what)
+                place = (draft.file("bodies"), line, None)
+                yield from spacing_problem(place, apart, columns[2:], what)
 
 
-def spacing_problem(place: Place, distance_mm: float, what: str) -> Iterator[Problem]:
+METRES_MM = (3.0, 150.0)
+"""Neighbours that are so far apart once multiplied by 1000 were given in m."""
+
+
+def spacing_problem(
+    place: Place, apart: Array, columns: Sequence[str], what: str
+) -> Iterator[Problem]:
     """The problem of two neighbouring points, if their distance says the unit is wrong.
 
     Parameters
     ----------
-    place : file, line and column to report.
-    distance_mm : NaN, from a cell that is bad and reported there, is no problem here.
+    place : file and line to report.
+    apart : (3,) mm; NaN, from a cell that is bad and reported there, is no problem here.
+    columns : x, y and z.
     what : which points.
     """
-    if distance_mm < SMALLEST_MM or distance_mm > LARGEST_MM:
-        found = f"{what} {distance_mm:.3g} mm apart"
+    distance = float(np.linalg.norm(apart))
+    if distance < SMALLEST_MM or distance > LARGEST_MM:
+        column = columns[int(np.argmax(np.abs(apart)))] if distance > LARGEST_MM else columns[0]
+        remedy = "give millimetres, and look for a misplaced point"
+        if METRES_MM[0] <= MM_PER_M * distance <= METRES_MM[1]:
+            remedy = f"suspected: lengths in m and not mm; multiply {', '.join(columns)} by 1000"
+        found = f"{what} {distance:.3g} mm apart"
         allowed = f"{SMALLEST_MM:g} mm to {LARGEST_MM:g} mm"
-        yield Problem(*place, found, allowed, "give millimetres, and look for a misplaced point")
+        yield Problem(*place[:2], column, found, allowed, remedy)

@@ -20,11 +20,19 @@ LEAST_SD = 1e-6
 FINEST_SD = {"rotation_deg": 1e-3, "translation_mm": 1e-4, "force_n": 1e-4, "moment_nm": 1e-5}
 """Laboratory encoders and interferometers resolve this."""
 
+LEAST_PALPATION_MM = 0.02
+"""Nobody digitises a point of bone more finely."""
+
 COARSEST_SD = {"rotation_deg": 10.0, "translation_mm": 10.0, "force_n": 500.0, "moment_nm": 20.0}
 """A joint of the spine hardly moves so far, a rig hardly loads it so much."""
 
 LARGEST_DEG = 45.0
-"""No joint of the spine turns further to one side than C1C2, 40 deg (White and Panjabi 1990)."""
+"""To one side, chosen: what was read is less by half. Flexion and extension together reach 20 deg in
+lumbar joints (mean and two SDs; BMC Musculoskelet Disord 2006 7:45, Table 5) and 14 deg at T1T2 under
+7.5 N m (Wilke 2017, abstract). C1C2 turns by up to 53 deg (Roche 2002, doi 10.1053/crad.2001.0703)."""
+
+ATLAS_DEG = 60.0
+"""Of C1C2 alone."""
 
 LARGEST_MM = 25.0
 """Vertebrae slide by 9 mm at most in vivo (as Wang 2021 cites it)."""
@@ -81,12 +89,15 @@ def _errors(cohort: Cohort) -> Iterator[Doubt]:
         yield Doubt(problem, "errors", certain=sd < LEAST_SD)
     if cohort.landmarks is not None:
         sd = cohort.landmarks["sd_mm"].to_numpy(float)
-        odd = np.flatnonzero(((sd > 0.0) & (sd < 1e-3)) | (sd > 20.0))
+        odd = np.flatnonzero(((sd > 0.0) & (sd < LEAST_PALPATION_MM)) | (sd > 20.0))
         if len(odd):
             line = first_line(cohort, "landmarks", int(odd[0]))
             place = (file_of(cohort, "landmarks"), line, "sd_mm")
-            allowed = "0 where a point is known, or 0.001 to 20 mm"
-            problem = Problem(*place, f"{sd[odd[0]]:.3g}", allowed, "give the SD of one palpation")
+            allowed = f"0 where a point is known, or {LEAST_PALPATION_MM:g} to 20 mm"
+            remedy = "give the SD of one palpation"
+            if sd[odd[0]] < LEAST_PALPATION_MM:
+                remedy += "; suspected: m and not mm; multiply sd_mm by 1000"
+            problem = Problem(*place, f"{sd[odd[0]]:.3g}", allowed, remedy)
             yield Doubt(problem, "errors", certain=bool(sd[odd[0]] < LEAST_SD))
 
 
@@ -129,7 +140,8 @@ def _unloaded(cohort: Cohort) -> Iterator[Doubt]:
             continue
         if (rows["follower_n"] > 0.0).any() or not (moved.fillna(0.0) != 0.0).any(axis=None):
             continue
-        place = (file_of(cohort, "loads"), first_line(cohort, "loads", int(rows.index[0])), None)
+        line = first_line(cohort, "loads", int(rows.index[0]))
+        place = (file_of(cohort, "loads"), line, f"{LOADS[0]} to {LOADS[-1]}")
         found = f"no load in any of the {len(rows)} rows of test '{test}', and motion"
         remedy = "fill in the loads, or say in supports.csv or preload.csv what moved the joints"
         problem = Problem(*place, found, "a load that makes the motion", remedy)
@@ -145,7 +157,8 @@ def _unmoved(cohort: Cohort) -> Iterator[Doubt]:
         later = rows[motion.loc[rows.index, "step"] > 0]
         if later.notna().any(axis=None) and not (later.fillna(0.0) != 0.0).any(axis=None):
             line = first_line(cohort, "motion", int(rows.index[0]))
-            place = (file_of(cohort, "motion"), line, None)
+            column = str(later.notna().any().idxmax())
+            place = (file_of(cohort, "motion"), line, column)
             found = f"zero in every reading of {specimen}, test '{test}'"
             remedy = "leave cells empty where nothing was measured"
             yield Doubt(Problem(*place, found, "motion under load", remedy), "motion")
@@ -236,7 +249,8 @@ def _absurd(cohort: Cohort) -> Iterator[Doubt]:
     assert motion is not None
     for column in COORDINATE_COLUMNS:
         limit = LARGEST_DEG if column.endswith("_deg") else LARGEST_MM
-        beyond = np.flatnonzero(motion[column].abs() > limit)
+        atlas = (motion["joint"] == "C1C2") & column.endswith("_deg")
+        beyond = np.flatnonzero(motion[column].abs() > np.where(atlas, ATLAS_DEG, limit))
         if len(beyond):
             row = int(beyond[0])
             place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)

@@ -17,7 +17,9 @@ BOTH = (MOTION, LOADS)
 READ = (*ANGLES, *SHIFTS)
 
 
-def _times(columns: Sequence[str], factor: float, where: Callable[..., pd.Series] | None = None) -> Table:
+def _times(
+    columns: Sequence[str], factor: float, where: Callable[..., pd.Series] | None = None
+) -> Table:
     def spoil(table: pd.DataFrame) -> None:
         there = [name for name in columns if name in table]
         rows = slice(None) if where is None else where(table)
@@ -186,7 +188,9 @@ def _of_places() -> Iterator[Mistake]:
     spoil = _times(ANGLES[:1], -1.0)
     yield Mistake("joints_extension_sign", JOINTS, spoil, ANGLES, (), ANGLES[:1], "sign of extens")
     yield Mistake("joints_z_left", JOINTS, _times(XYZ[2:], -1.0), XYZ, (), XYZ[2:], "sign of z")
-    yield Mistake("landmarks_z_left", LANDMARKS, _times(XYZ[2:], -1.0), XYZ, (), XYZ[2:], "sign|left")
+    yield Mistake(
+        "landmarks_z_left", LANDMARKS, _times(XYZ[2:], -1.0), XYZ, (), XYZ[2:], "sign|left"
+    )
     spoil = _times(XYZ, 0.1, _first_specimen)
     yield Mistake("one_specimen_cm", LANDMARKS, spoil, XYZ, (), XYZ, r"in cm")
     yield Mistake("one_specimen_cm_joints", JOINTS, spoil, XYZ, (), XYZ, r"in cm")
@@ -199,15 +203,21 @@ def _of_places() -> Iterator[Mistake]:
     faces = {"superior_endplate_centre": "inferior_endplate_centre"}
     told = ((), ("landmark", "y_mm"), "superior and inferior|endplates")
     yield Mistake("faces_exchanged", LANDMARKS, _renamed("landmark", faces), XYZ, *told)
-    yield Mistake("landmark_sd_m", LANDMARKS, _times(("sd_mm",), 1e-3), ("sd_mm",), (), ("sd_mm",), "m")
+    yield Mistake(
+        "landmark_sd_m", LANDMARKS, _times(("sd_mm",), 1e-3), ("sd_mm",), (), ("sd_mm",), "m"
+    )
 
 
 def _of_loads() -> Iterator[Mistake]:
     yield Mistake("kgf", LOADS, _times(FORCES, 1.0 / 9.81), FORCES, BOTH, (*FORCES, *READ), "kgf")
-    yield Mistake("mx_mz", LOADS, _swap(*MOMENTS[::2]), MOMENTS, BOTH, (*MOMENTS, *ANGLES), "exchang")
+    yield Mistake(
+        "mx_mz", LOADS, _swap(*MOMENTS[::2]), MOMENTS, BOTH, (*MOMENTS, *ANGLES), "exchang"
+    )
     told = (("vertebra",), "vertebra")
     yield Mistake("load_on_lowest", LOADS, _moved_down, MOMENTS, BOTH, *told)
-    yield Mistake("loads_reversed", LOADS, _reversed_loads, MOMENTS, BOTH, ("step", *MOMENTS), "revers")
+    yield Mistake(
+        "loads_reversed", LOADS, _reversed_loads, MOMENTS, BOTH, ("step", *MOMENTS), "revers"
+    )
     spoil = _below_zero(POINT)
     yield Mistake("points_from_joint", LOADS, spoil, POINT, (), POINT, "ground|misplaced")
     yield Mistake("time_ms", LOADS, _times(("time_s",), 1e3), ("time_s",), (), ("time_s",), "ms")
@@ -219,7 +229,9 @@ def _of_readings() -> Iterator[Mistake]:
     pairs = ((0, 1), (1, 2))
     for first, second in pairs:
         pair = (ANGLES[first], ANGLES[second])
-        yield Mistake(f"swapped_{first}{second}", MOTION, _swap(*pair), pair, BOTH, pair, "exchanged")
+        yield Mistake(
+            f"swapped_{first}{second}", MOTION, _swap(*pair), pair, BOTH, pair, "exchanged"
+        )
     spoil, told = _times(ANGLES[:1], -1.0), (BOTH, ANGLES[:1], "sign of")
     yield Mistake("flexion_positive", MOTION, spoil, ANGLES[:1], *told)
     spoil = _times(ANGLES, np.pi / 180.0, _first_specimen)

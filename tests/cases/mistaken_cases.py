@@ -201,7 +201,10 @@ def _of_geometry() -> Iterator[Mistake]:
     yield Mistake("mass_g", "bodies.csv", _times(("mass_kg",), 1e3), COM, *mass, r"in g\b")
     pair = ("mass_kg", "com_x_mm")
     yield Mistake("mass_com_x", "bodies.csv", _swap(*pair), COM, (), pair, _both(*pair))
-    for columns, file, sizes in ((COM, "bodies.csv", (200.0, 9e3)), (POINT, "loads.csv", (5e2, 9e3))):
+    for columns, file, sizes in (
+        (COM, "bodies.csv", (200.0, 9e3)),
+        (POINT, "loads.csv", (5e2, 9e3)),
+    ):
         for far in sizes:
             for axis in range(3):
                 name = f"{'com' if columns is COM else 'point'}_{far:g}_{'xyz'[axis]}"
