@@ -252,3 +252,79 @@ def _of_readings() -> Iterator[Mistake]:
 
 FRESH = (*_of_places(), *_of_loads(), *_of_readings())
 """36 kinds; none is one of `mistaken_cases.MISTAKES`."""
+
+
+def _tests_exchanged(table: pd.DataFrame) -> None:
+    names = list(dict.fromkeys(table["test"]))
+    if len(names) > 1:
+        pairs = {names[0]: names[1], names[1]: names[0]}
+        table["test"] = table["test"].replace(pairs)
+
+
+def _joints_reversed(table: pd.DataFrame) -> None:
+    names = sorted(set(table["joint"]))
+    table["joint"] = table["joint"].replace(dict(zip(names, names[::-1], strict=True)))
+
+
+def _shifted(column: str, by: float) -> Table:
+    def spoil(table: pd.DataFrame) -> None:
+        table[column] += by
+
+    return spoil
+
+
+def _from_the_top(table: pd.DataFrame) -> None:
+    """Heights counted downwards from above the head."""
+    table["y_mm"] = 900.0 - table["y_mm"]
+
+
+def _clipped(table: pd.DataFrame) -> None:
+    """An encoder that ends at half of the largest reading."""
+    for column in ANGLES:
+        if column in table:
+            limit = table[column].abs().max() / 2.0
+            table[column] = table[column].clip(-limit, limit)
+
+
+def _drift(table: pd.DataFrame) -> None:
+    """5 deg more from the first to the last step."""
+    there = [name for name in ANGLES if name in table]
+    for _, rows in _series(table):
+        table.loc[rows.index, there] += (
+            5.0 * (rows["step"] / rows["step"].max()).to_numpy()[:, None]
+        )
+
+
+def _sides_of_one(table: pd.DataFrame) -> None:
+    """Left and right exchanged in the middle vertebra alone."""
+    names = list(dict.fromkeys(table["vertebra"]))
+    rows = table["vertebra"] == names[len(names) // 2]
+    sides = {"left_pedicle_base": "right_pedicle_base", "left_pedicle": "right_pedicle"}
+    both = sides | {new: old for old, new in sides.items()}
+    table.loc[rows, "landmark"] = table.loc[rows, "landmark"].replace(both)
+
+
+def _of_last() -> Iterator[Mistake]:
+    told = (BOTH, ("test", *READ), "test|sign of")
+    yield Mistake("tests_exchanged", MOTION, _tests_exchanged, ANGLES[:1], *told)
+    told = ((), ("joint", *READ), "joint|vertebrae")
+    yield Mistake("motion_joints_reversed", MOTION, _joints_reversed, ANGLES[:1], *told)
+    spoil = _times(ANGLES, 60.0)
+    yield Mistake("arcminutes", MOTION, spoil, ANGLES[:1], BOTH, ANGLES, "minutes|unit|degrees")
+    yield Mistake("com_z_aside", BODIES, _shifted("com_z_mm", 100.0), COM, (), COM[2:], "misplaced")
+    told = ((), XYZ[1:2], "downwards|sign of y_mm|reverse")
+    yield Mistake("joints_from_the_top", JOINTS, _from_the_top, XYZ, *told)
+    spoil = _times(COM, 0.1, _first_specimen)
+    yield Mistake("one_specimen_com_cm", BODIES, spoil, COM, (), COM, "in cm")
+    spoil = _times(MOMENTS, 100.0)
+    yield Mistake("moments_n_cm", LOADS, spoil, MOMENTS, BOTH, MOMENTS, "N cm|unit|N mm")
+    spoil = _times(FORCES, 0.1)
+    yield Mistake("forces_dan", LOADS, spoil, FORCES, BOTH, (*FORCES, *READ), "daN|unit|kN")
+    yield Mistake("clipped", MOTION, _clipped, ANGLES[:1], (), ANGLES, "same|clip|end")
+    yield Mistake("drift", MOTION, _drift, ANGLES[:1], BOTH, READ, "drift|step 0|sign")
+    told = ((), ("landmark", *XYZ), "left and right")
+    yield Mistake("sides_of_one", LANDMARKS, _sides_of_one, XYZ, *told)
+
+
+LAST = tuple(_of_last())
+"""Written down when the rules for `FRESH` were made, and scored once, at the end."""

@@ -10,7 +10,7 @@ import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cases"))
 
-from fresh_mistakes import FRESH
+from fresh_mistakes import FRESH, LAST
 from mistaken_cases import MISTAKES, Mistake
 from mistaken_cohorts import (
     FRESH_COHORTS,
@@ -22,18 +22,20 @@ from mistaken_cohorts import (
 )
 
 COHORTS = {"known": (*SMALL, *SHIPPED, *REAL_SPINES), "fresh": FRESH_COHORTS}
-KINDS = {"known": MISTAKES, "fresh": FRESH}
+KINDS = {"known": MISTAKES, "fresh": FRESH, "last": LAST}
 SHARES = ("told", "column", "remedy", "alone")
 
 
-def every() -> pd.DataFrame:
+def every(
+    cohorts: Sequence[str] = tuple(COHORTS), kinds: Sequence[str] = tuple(KINDS)
+) -> pd.DataFrame:
     """One row for each mistake in each cohort."""
     rows = []
-    for cohorts, names in COHORTS.items():
-        for kinds, mistakes in KINDS.items():
-            for name in filter(there, names):
-                for one in _scores(name, mistakes):
-                    rows.append({"cohorts": cohorts, "kinds": kinds, **one})
+    for group in cohorts:
+        for kind in kinds:
+            for name in filter(there, COHORTS[group]):
+                for one in _scores(name, KINDS[kind]):
+                    rows.append({"cohorts": group, "kinds": kind, **one})
     return pd.DataFrame(rows)
 
 
