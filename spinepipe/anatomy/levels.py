@@ -12,8 +12,8 @@ Study of the Vertebral Body and Pedicle of Typical Cervical Vertebrae") and disc
 
 Discs: lumbar Shukri 2013 (doi 10.17656/jsmc.10028, abstract: 8.37, 9.64, 10.71, 11.44, 10.56 mm),
 T12L1 chosen at 7 mm; thoracic 4.5 to 7.2 mm (Kunkel 2011, doi 10.1111/j.1469-7580.2011.01397.x,
-abstract), taken as 5.9; bodies are what discs leave. They are not far off what is printed of bodies:
-posterior 17.6 (T2) to 20.5 mm (T9) (Egwu 2019, doi 10.4103/JASI.JASI_8_19), 26.3 mm of L5, SD 1.9
+abstract), taken as 5.9; bodies are what discs leave, not far off what is printed of them: posterior
+17.6 (T2) to 20.5 mm (T9) (Egwu 2019, doi 10.4103/JASI.JASI_8_19), 26.3 mm of L5, SD 1.9
 (Cook and Baker 2021, Int J Spine Surg 15:1072, Table 6).
 """
 
@@ -55,8 +55,8 @@ HEAVIEST_KG = 300.0
 """Of a person, chosen."""
 
 LEAN_DEG = 60.0
-"""Sideways, at every level, chosen: curved spines in CT reach 41 deg, and curves of 86 deg (Jalalian
-2017, Table 1) tilt their ends by half of it; 15 deg to spare."""
+"""Sideways, at every level, chosen: curved spines in CT reach 41 deg, curves of 86 deg (Jalalian 2017,
+Table 1) tilt their ends by half of it; 15 deg to spare."""
 
 TURN_DEG = 55.0
 """About the long axis, at every level, chosen: curved spines in CT reach 36 deg."""
@@ -79,7 +79,7 @@ adults, 24 to 55 deg within two SDs (Mac-Thiong 2011, doi 10.1007/s00586-011-192
 the disc's lordosis, 21.6 deg, SD 7.7 (doi 10.1038/s41598-022-21840-x, Table 2)."""
 
 REACH_SDS, MOUNTED_DEG = 4.0, 20.0
-"""Chosen: how many SDs a spine may be off the mean, and how far rig or ground may tilt it besides."""
+"""Chosen: SDs that a spine may be off the mean, and how far rig or ground may tilt it besides."""
 
 NECK_EXTENSION_DEG = (-75.0, 60.0)
 """Of C7T1 and above, chosen wide: nothing was read of how single levels of a neck stand."""

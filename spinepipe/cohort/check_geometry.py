@@ -6,7 +6,7 @@ for millimetres show here)? Can the bodies exist, and are all there that gravity
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import isnan
+from math import isnan, sqrt
 
 import numpy as np
 
@@ -92,7 +92,7 @@ def _joint_problems(
         return  # a bad cell, reported there
     for side, face, which in ((upper, UPPER_FACE, "upper"), (lower, LOWER_FACE, "lower")):
         if face not in side:
-            yield _no_pose(place, joint, f"the {which} vertebra has no {face}")
+            yield _no_pose(place, joint, f"the {which} vertebra has no {face}", behind)
             return
     apart = upper[UPPER_FACE] - lower[LOWER_FACE]
     wrong_unit = list(spacing_problem(place, apart, XYZ, f"the endplate centres at {joint}"))
@@ -127,16 +127,17 @@ def _metres(points: Mapping[str, Array]) -> dict[str, Array]:
     return {name: point / MM_PER_M for name, point in points.items()}
 
 
-def _no_pose(place: Place, joint: str, reason: str) -> Problem:
+def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> Problem:
     allowed = (
         f"{UPPER_FACE} above, {LOWER_FACE} below, and one of the two vertebrae with both endplate "
         "centres and both pedicle bases, or a row in joints.csv"
     )
     found = f"no frame for {joint}: {reason}"
+    column = XYZ[0] if reason.startswith("the pedicle") else place[2]
     remedy = "add or correct the landmarks: one may be misplaced"
-    return Problem(
-        *place[:2], XYZ[0] if reason.startswith("the pedicle") else place[2], found, allowed, remedy
-    )
+    if behind is not None:
+        column, remedy = behind.column, behind.words
+    return Problem(*place[:2], column, found, allowed, remedy)
 
 
 def _origin_spacing(draft: Draft) -> Iterator[Problem]:
@@ -158,6 +159,13 @@ INERTIA = tuple(f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"
 ROUNDING = 1e-3
 """Inertias in files are rounded to a few digits; a flat body sits exactly on the limit."""
 
+KG_PER_T = 1e3
+
+LIKELY_GYRATION_M = (0.005, 0.15)
+"""Of a vertebra alone to a slice of a trunk."""
+
+LIKELY_KG = (0.003, 5.0)
+
 LARGEST_GYRATION_M = 1.0
 """No part of a trunk has its mass further than this from its centre."""
 
@@ -168,8 +176,20 @@ def check_bodies(draft: Draft) -> Iterator[Problem]:
         if all(map(isnan, inertia)):
             continue
         yield from _inertia_problems(draft.file("bodies"), line, mass, np.array(inertia))
+    yield from _exchanged(draft)
     yield from _missing(draft)
     yield from _spacing(draft)
+
+
+def _exchanged(draft: Draft) -> Iterator[Problem]:
+    """Masses that are none beside centres of mass that are masses."""
+    rows = list(draft.rows("bodies", "mass_kg", "com_x_mm"))
+    bad = [line for line, (mass, _) in rows if isnan(mass)]
+    if bad and all(LIKELY_KG[0] <= x <= LIKELY_KG[1] for _, (_, x) in rows):
+        found = "masses that are none, and com_x_mm that could be masses"
+        remedy = "suspected: mass_kg and com_x_mm exchanged; exchange them back"
+        place = (draft.file("bodies"), bad[0], "mass_kg")
+        yield Problem(*place, found, "mass_kg in kg and com_x_mm in mm", remedy)
 
 
 def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator[Problem]:
@@ -193,7 +213,10 @@ def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator
         gyration = np.sqrt(moments[2] / mass)
         found = f"a radius of gyration of {gyration:.3g} m"
         allowed = f"at most {LARGEST_GYRATION_M:g} m"
-        yield Problem(file, line, INERTIA[0], found, allowed, "give kg m2, not kg mm2 or kg cm2")
+        remedy = "give kg m2, not kg mm2 or kg cm2"
+        if LIKELY_GYRATION_M[0] <= gyration / sqrt(KG_PER_T) <= LIKELY_GYRATION_M[1]:
+            remedy = f"suspected: mass_kg in t and not kg, multiply it by 1000; or {remedy}"
+        yield Problem(file, line, INERTIA[0], found, allowed, remedy)
 
 
 def _missing(draft: Draft) -> Iterator[Problem]:

@@ -118,6 +118,7 @@ def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
 
 
 _MISTAKEN = {
+    "height_m": (0.01, "cm and not m"),
     "_nm": (1e-3, "moments in N mm and not N m"),
     "_kg": (1e-3, "masses in g and not kg"),
 }
@@ -129,7 +130,7 @@ def _remedy(number: float, column: Column) -> str:
     for end, (factor, words) in _MISTAKEN.items():
         if column.name.endswith(end) and column.low < factor * number < column.high:
             return f"suspected: {words}; multiply the column by {factor:.3g}"
-    return "correct it; check its unit and its sign"
+    return "correct it; check its unit, its sign, and for a slip of the decimal point"
 
 
 def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:

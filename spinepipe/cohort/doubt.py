@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, get_args
 
 from spinepipe.problems import Problem
 
-Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors"]
+Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors", "persons"]
 """What can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml."""
 
 GROUPS: tuple[Group, ...] = get_args(Group)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.anatomy.stiffness_range import plausible
 from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.doubt import Doubt
@@ -62,7 +61,7 @@ def doubtful_order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
             told[found].append(place)
     seen = {place for places in told.values() for place in places}
     rest = {place: own for place, own in of_place.items() if place not in seen}
-    for key, places in (*_columns(rest), *_in_ground(cohort, rest)):
+    for key, places in (*_columns(rest), *_in_ground(rest)):
         told[key] += places
     doubts = [_doubt(cohort, *key, places) for key, places in told.items()]
     return Explained(tuple(doubts), frozenset(p for places in told.values() for p in places))
@@ -106,6 +105,9 @@ def _steps(cycles: Sequence[LoadedCycle]) -> tuple[str, str, str, str] | None:
     if not given:
         return None
     here = float(np.median(given))
+    if all(map(_stands_still, cycles)):
+        remedy = "suspected: readings one step late; write them beside the step before"
+        return "motion", "step", "the readings of step 0 once more under the first load", remedy
     if here < FOLLOWS and float(np.median(turned)) > BEST:
         remedy = "suspected: steps in reverse order, here or in loads.csv; number them alike"
         return "motion", "step", "readings that follow the loads from the last step back", remedy
@@ -115,6 +117,16 @@ def _steps(cycles: Sequence[LoadedCycle]) -> tuple[str, str, str, str] | None:
         remedy = "suspected: readings one step late; write them beside the step before"
         return "motion", "step", "readings that follow the load of the step before", remedy
     return None
+
+
+def _stands_still(cycle: LoadedCycle) -> bool:
+    """Whether the first loaded step reads what step 0 does, to the last digit, and others not."""
+    if len(cycle.readings) < FEW + 1 or np.array_equal(cycle.loads[0], cycle.loads[1]):
+        return False
+    same = [
+        np.array_equal(cycle.readings[k], cycle.readings[k + 1], equal_nan=True) for k in (0, 1)
+    ]
+    return same == [True, False] and bool(np.isfinite(cycle.readings[1]).any())
 
 
 def _alike(load: Array, read: Array) -> float:
@@ -206,7 +218,7 @@ def _answer(cycle: LoadedCycle, main: int, number: int) -> float | None:
 
 
 def _in_ground(
-    cohort: Cohort, of_place: Mapping[Place, Sequence[LoadedCycle]]
+    of_place: Mapping[Place, Sequence[LoadedCycle]],
 ) -> Iterator[tuple[_Key, list[Place]]]:
     """Rotations that grow from joint to joint, as those of vertebrae in ground do."""
     grown, places, column = [], [], ""
@@ -215,7 +227,7 @@ def _in_ground(
             driven = _driven(cycle)
             if cycle.pushed or len(driven) < 3 or len({number for _, number in driven}) > 1:
                 continue
-            slopes = np.array([_slope(cohort, cycle, *one) for one in driven])
+            slopes = np.array([_slope(cycle, *one) for one in driven])
             if np.any(slopes <= 0.0):
                 return
             numbers = np.array([joint + 1.0 for joint, _ in driven])
@@ -235,10 +247,9 @@ def _in_ground(
     yield ("motion", column, words, remedy), list(dict.fromkeys(places))
 
 
-def _slope(cohort: Cohort, cycle: LoadedCycle, joint: int, number: int) -> float:
-    """Motion over load, times the usual stiffness of the level."""
+def _slope(cycle: LoadedCycle, joint: int, number: int) -> float:
+    """Motion over load."""
     load, read = cycle.loads[:, joint, number], cycle.readings[:, joint, number]
     there = np.isfinite(read)
     load, read = load[there] - load[there].mean(), read[there] - read[there].mean()
-    usual = plausible(cohort.joint_names[joint], COORDINATES[number])
-    return float(load @ read / (load @ load)) * usual if load @ load > 0.0 else 0.0
+    return float(load @ read / (load @ load)) if load @ load > 0.0 else 0.0

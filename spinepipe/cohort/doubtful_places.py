@@ -232,6 +232,12 @@ def _points(cohort: Cohort, poses: Sequence[NeutralPose], stem: str) -> Iterator
         if len(rows):
             points = table[list(COLUMNS[stem])].to_numpy(float)[rows]
             near = np.array([pose.near(name) for name in table["vertebra"].iloc[rows]])
+            other = _at_another(pose, points, near) if "fx_n" in table else None
+            if other is not None:
+                away = float(np.linalg.norm(points - near, axis=1).max())
+                words = f"suspected: the wrong vertebra; the points lie at {other}"
+                told[words, "vertebra", False].append((int(rows[0]), pose.specimen, away))
+                continue
             for suspect in _suspects(stem, table.iloc[rows], points, near):
                 key = (suspect.words, suspect.column, suspect.certain)
                 told[key].append((int(rows[suspect.row]), pose.specimen, suspect.away_mm))
@@ -267,6 +273,14 @@ def _suspects(stem: str, table: Any, points: Array, near: Array) -> Iterator[_Su
         column = COLUMNS[stem][int(np.argmax(np.abs(points[row] - near[row])))]
         sure = bool(away[row] > NOWHERE_MM)
         yield _Suspect(row, "look for a misplaced point", column, sure, float(away[row]))
+
+
+def _at_another(pose: NeutralPose, points: Array, near: Array) -> str | None:
+    """The vertebra at which all loads act, where that is another one than they name."""
+    here = _distance(points, near)
+    away = {name: _distance(points, pose.near(name)) for name in pose.vertebrae[1:]}
+    best = min(away, key=lambda name: away[name])
+    return best if here > NEAR_MM and away[best] * NEARER_SWAPPED < here else None
 
 
 def _exchanged_names(table: Any, points: Array, near: Array) -> Iterator[int]:

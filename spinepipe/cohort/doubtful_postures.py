@@ -35,7 +35,7 @@ from spinepipe.units import MM_PER_M
 STRAY_DEG = 5.0
 """Root mean square angle between the line of joints and their axes: at most so in good spines."""
 
-ASKEW_DEG = 30.0
+ASKEW_DEG = 20.0
 """And beyond which it is told whatever is behind it."""
 
 BETTER = 2.0
@@ -183,14 +183,17 @@ def _apart(cohort: Cohort, pose: NeutralPose) -> tuple[str, str] | None:
     aside = lines - np.sum(lines * up, axis=1)[:, None] * up
     sizes = np.linalg.norm(aside, axis=1)
     gap = int(np.argmax(sizes))
-    if sizes[gap] < ASIDE_MM or np.any(np.delete(sizes, gap) > ASIDE_MM / 3.0):
+    near = max(range(len(sizes)), key=lambda k: sizes[k] if abs(k - gap) == 1 else -1.0)
+    whole = aside[gap] + aside[near]  # a joint halfway between two vertebrae has half of each
+    rest = np.delete(sizes, [gap, near])
+    if np.linalg.norm(whole) < ASIDE_MM or np.any(rest > ASIDE_MM / 3.0):
         return None
-    above = cohort.joint_names[gap + 1]
+    above = cohort.joint_names[max(gap, near if sizes[near] > ASIDE_MM / 3.0 else 0) + 1]
     words = (
-        f"suspected: {above} of {pose.specimen} and all above it misplaced by {sizes[gap]:.0f} mm, "
-        "as of a scan in two pieces"
+        f"suspected: {above} of {pose.specimen} and all above it misplaced by "
+        f"{np.linalg.norm(whole):.0f} mm, as of a scan in two pieces"
     )
-    return words, XYZ[int(np.argmax(np.abs(aside[gap])))]
+    return words, XYZ[int(np.argmax(np.abs(whole)))]
 
 
 def _tried(pose: NeutralPose) -> _Tried:

@@ -47,6 +47,9 @@ LEAST_FORCE_N, LEAST_MOMENT_NM = 1.0, 0.02
 SHARE_OF_SD = 0.2
 """Of the SD of a reading: at least eight readings that are all smaller have no such error."""
 
+SURE_SDS = 100.0
+"""Two or three readings that are alike to the last digit are no chance where their SD is so small."""
+
 CYCLES = 6
 """Cycles of tests whose step 0 reads exactly zero before that is no chance."""
 
@@ -223,7 +226,9 @@ def _below_their_sd(cohort: Cohort) -> Iterator[Doubt]:
             place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)
             found = f"readings of at most {read.max():.3g}, whose SD is said to be {error:g}"
             allowed = "readings that scatter as their SD says"
-            remedy = "suspected: the unit of the column (m and not mm, radians), or the SD"
+            unit = "radians and not degrees; multiply by 57.3"
+            unit = unit if column.endswith("_deg") else "in m and not mm; multiply by 1000"
+            remedy = f"suspected: {unit}; or look at measurement_sd"
             yield Doubt(Problem(*place, found, allowed, remedy), "motion")
 
 
@@ -234,7 +239,16 @@ def _constant(cohort: Cohort) -> Iterator[Doubt]:
     for column in COORDINATE_COLUMNS:
         for specimen, values in motion.groupby("specimen", sort=False)[column]:
             read = values.dropna()
-            if len(read) > 3 and read.nunique() == 1 and read.iloc[0] != 0.0:
+            sd = cohort.measurement_sd
+            error = (
+                np.inf
+                if sd is None
+                else sd.rotation_deg
+                if column.endswith("_deg")
+                else sd.translation_mm
+            )
+            few = len(read) >= 2 and abs(read.iloc[0]) > SURE_SDS * error
+            if (len(read) > 3 or few) and read.nunique() == 1 and read.iloc[0] != 0.0:
                 line = first_line(cohort, "motion", int(read.index[0]))
                 place = (file_of(cohort, "motion"), line, column)
                 found = f"{read.iloc[0]:.4g} in all {len(read)} readings of {specimen}"
@@ -262,6 +276,13 @@ def _absurd(cohort: Cohort) -> Iterator[Doubt]:
             yield Doubt(Problem(*place, found, allowed, remedy), "motion")
 
 
+def _ends_at_zero(motion: pd.DataFrame) -> bool:
+    """Whether the last step of every cycle reads zero, as the first should."""
+    last = motion.groupby(_CYCLE, sort=False)["step"].transform("max") == motion["step"]
+    read = motion.loc[last, list(COORDINATE_COLUMNS)]
+    return bool(read.notna().any(axis=None) and not (read.abs() > ZERO).any(axis=None))
+
+
 def _step_0(cohort: Cohort) -> Iterator[Doubt]:
     """Readings at step 0 that contradict ``zeroed_at_step_0``."""
     motion = cohort.motion
@@ -275,6 +296,8 @@ def _step_0(cohort: Cohort) -> Iterator[Doubt]:
         place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)
         found = f"{float(start[column][row]):.4g} at step 0, and zeroed_at_step_0: true"
         remedy = "set zeroed_at_step_0: false, subtract step 0, or put steps in order"
+        if _ends_at_zero(motion):
+            remedy = "suspected: steps in reverse order; number them as the loads"
         yield Doubt(Problem(*place, found, "0 at step 0", remedy), "zeroing", certain=True)
     read = start[size.notna()]
     cycles = len(pd.MultiIndex.from_frame(motion.loc[read.index, _CYCLE]).unique())

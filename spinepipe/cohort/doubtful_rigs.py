@@ -93,7 +93,7 @@ def _prescribed(cohort: Cohort, supports: pd.DataFrame, motion: pd.DataFrame) ->
         unit = "angles in radians and not degrees; multiply by 57.3"
         unit = unit if turned else "translations in m and not mm; multiply by 1000"
         words = unit if size < least else "a slip, or another unit"
-        row = int(rows[column].abs().idxmax())
+        row = int(str(rows[column].abs().idxmax()))
         found = f"prescribed motion of at most {size:.3g} (test {test})"
         yield _of(cohort, "motion", row, column, found, f"{least:g} to {most:g}", words)
 

@@ -110,7 +110,7 @@ def _copies(cohort: Cohort) -> Iterator[Doubt]:
     """Cycles, or specimens, with the very same readings as another."""
     motion = cohort.motion
     assert motion is not None
-    seen: dict[bytes, tuple[str, str, int]] = {}
+    seen: dict[bytes, tuple[object, object, object]] = {}
     told = set()
     for (specimen, test, cycle), rows in motion.groupby(_CYCLE, sort=False):
         values = rows.sort_values(["step", "joint"])[list(COORDINATE_COLUMNS)].to_numpy(float)

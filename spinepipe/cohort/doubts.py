@@ -11,8 +11,9 @@ moment is made by a force with a lever arm of less than a centimetre, and tests 
 whose loads a rig shares.
 """
 
+import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import log, sqrt
@@ -25,6 +26,7 @@ from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.doubt import Doubt
 from spinepipe.cohort.doubtful_masses import doubtful_masses
 from spinepipe.cohort.doubtful_order import doubtful_order
+from spinepipe.cohort.doubtful_persons import doubtful_persons
 from spinepipe.cohort.doubtful_places import (
     doubtful_points,
     doubtful_sizes,
@@ -63,6 +65,27 @@ LOAD_COLUMNS = {
 """Column of loads.csv that drives each coordinate where joints are upright."""
 
 
+WAYS = (
+    ({"flexion"}, "extension_deg", -1.0),
+    ({"extension"}, "extension_deg", 1.0),
+    ({"right", "bending"}, "right_bending_deg", 1.0),
+    ({"left", "bending"}, "right_bending_deg", -1.0),
+    ({"left", "rotation"}, "left_rotation_deg", 1.0),
+    ({"right", "rotation"}, "left_rotation_deg", -1.0),
+)
+"""Words in the name of a test, the column that it turns, and to which side."""
+
+OTHER_SIDE: Mapping[str, set[str]] = {
+    "flexion": {"extension"},
+    "extension": {"flexion"},
+    "right": {"left"},
+    "left": {"right"},
+    "bending": {"rotation"},
+    "rotation": {"bending"},
+}
+"""Words beside which a name tells no side."""
+
+
 @dataclass(frozen=True)
 class _Told:
     """A joint's answer to its load as the doubts see it.
@@ -90,23 +113,6 @@ class _Told:
         return self.answer.specimen, self.answer.test, self.answer.coordinate
 
 
-def doubts(cohort: Cohort) -> tuple[Problem, ...]:
-    """What is most likely wrong with a validated cohort, and no run is stopped by.
-
-    That is all that cannot be certain, and what is but was meant.
-    """
-    return tuple(one.problem for one in suspicions(cohort) if not _refused(cohort, one))
-
-
-def refusals(cohort: Cohort) -> tuple[Problem, ...]:
-    """What cannot be right in a validated cohort, and is not said to be meant."""
-    return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
-
-
-def _refused(cohort: Cohort, one: Doubt) -> bool:
-    return one.certain and one.group not in cohort.i_mean_it
-
-
 @lru_cache(maxsize=8)
 def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     """All that looks wrong, one for each column and what is behind it.
@@ -116,15 +122,15 @@ def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     """
     geometry = tuple(_geometry(cohort) if cohort.has_frames else ())
     readings = (*doubtful_readings(cohort), *doubtful_series(cohort))
-    rigs = tuple(doubtful_rigs(cohort))
+    rigs = (*doubtful_rigs(cohort), *doubtful_persons(cohort))
     cycles = tuple(_trusted(cohort, geometry, (*readings, *rigs)))
     order = doubtful_order(cohort, cycles)
     told = [one for one in _told(cohort, cycles) if one.place[:2] not in order.places]
     told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
-    answers = [
-        Doubt(problem, "motion") for problem in (*_sizes(cohort, told), *_signs(cohort, told))
-    ]
-    known = (*order.doubts, *answers)
+    problems = [*_sizes(cohort, told), *_signs(cohort, told)]
+    judged = {one.place[:2] for one in told} | order.places
+    problems += _against_names(cohort, judged)
+    known = (*order.doubts, *(Doubt(problem, "motion") for problem in problems))
     found = (
         *geometry,
         *rigs,
@@ -274,6 +280,26 @@ def _signs(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
         found[test, coordinate, key].append(specimen)
     for (test, coordinate, named), specimens in found.items():
         yield _sign(cohort, test, coordinate, named, specimens)
+
+
+def _against_names(cohort: Cohort, judged: Container[tuple[str, str]]) -> Iterator[Problem]:
+    """Tests that turn all joints to the other side than their names say, where no load tells it."""
+    if cohort.motion is None:
+        return
+    for (specimen, test), rows in cohort.motion.groupby(["specimen", "test"], sort=False):
+        words = set(re.split(r"[^a-z]+", str(test).lower()))
+        if (str(specimen), str(test)) in judged:
+            continue
+        for way, column, sign in WAYS:
+            read = rows[column].dropna()
+            turned = read[read != 0.0] * sign
+            other = set().union(*(OTHER_SIDE[word] for word in way))
+            if way <= words and not words & other and len(turned) and (turned < 0.0).all():
+                line = first_row(cohort, "motion", str(specimen), str(test), column)
+                found = f"{column} of the other sign in all readings of {specimen}, test {test}"
+                allowed = "flexion and left bending negative, extension and left rotation positive"
+                remedy = f"suspected: the sign of {column}, or the name of the test"
+                yield Problem(file_of(cohort, "motion"), line, column, found, allowed, remedy)
 
 
 def _is_against(cohort: Cohort, one: _Told) -> bool:

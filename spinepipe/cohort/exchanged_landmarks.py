@@ -21,6 +21,9 @@ Points = Mapping[str, Mapping[str, Array]]
 UPRIGHT, ACROSS, BEHIND_MM = 0.5, 0.4, 3.0
 """Cosine of endplates' line with +y, of sides' line with +z; pedicles in front of a body."""
 
+FAR_MM = 120.0
+"""From the middle of a vertebra: its processes end nearer."""
+
 EXPLAINED = 0.9
 """Share of what is asked of vertebrae that holds in a spine, curved and crushed ones too."""
 
@@ -40,11 +43,29 @@ def suspect(points: Points) -> Suspect | None:
     """
     if _fits(points):
         return None
+    if (astray := _astray(points)) is not None:
+        return astray
     fits = [(words, column) for words, column, undone in _tried(points) if _fits(undone(points))]
     if not fits:
         return None
     told = list(dict.fromkeys(words for words, _ in fits))
     return Suspect(f"suspected: {', or '.join(told[:2])}; correct it", fits[0][1])
+
+
+def _astray(points: Points) -> Suspect | None:
+    """The one landmark that lies far from the others of its vertebra, which lie together."""
+    found = []
+    for vertebra, of_one in points.items():
+        middle = np.median(list(of_one.values()), axis=0)
+        far = {name: point - middle for name, point in of_one.items()}
+        away = [name for name, line in far.items() if np.linalg.norm(line) > FAR_MM]
+        found += [(vertebra, name, far[name]) for name in away if len(of_one) > 2]
+    if len(found) != 1:
+        return None
+    vertebra, name, line = found[0]
+    column = XYZ[int(np.argmax(np.abs(line)))]
+    words = f"{name} of {vertebra} misplaced: {column} differs by {np.abs(line).max():.0f} mm"
+    return Suspect(f"suspected: {words}, or has a slip of the decimal point", column)
 
 
 def _fits(points: Points) -> bool:
@@ -81,20 +102,25 @@ def _tried(points: Points) -> Iterator[tuple[str, str, Callable[[Points], Points
         order = [0, 1, 2]
         order[first], order[second] = second, first
         words = f"{XYZ[first]} and {XYZ[second]} exchanged"
-        yield words, XYZ[first], _moved(lambda point, order=order: point[order])
+        yield words, XYZ[first], _moved(order, np.ones(3))
     for axis, words in enumerate(("x_mm backwards", "y_mm downwards", "z_mm to the left")):
         sign = np.where(np.arange(3) == axis, -1.0, 1.0)
         told = f"the sign of {XYZ[axis]}: counted {words.split(' ', 1)[1]}"
-        yield told, XYZ[axis], _moved(lambda point, sign=sign: point * sign)
+        yield told, XYZ[axis], _moved([0, 1, 2], sign)
     yield "landmarks of left and right exchanged", "landmark", _renamed("left", "right")
     faces = "landmarks of superior and inferior endplates exchanged"
     yield faces, "landmark", _renamed("superior", "inferior")
     yield from _other_names(points)
 
 
-def _moved(way: Callable[[Array], Array]) -> Callable[[Points], Points]:
+def _moved(order: Sequence[int], sign: Array) -> Callable[[Points], Points]:
+    """Columns in another order, then with other signs."""
+
     def undone(points: Points) -> Points:
-        return {v: {name: way(p) for name, p in one.items()} for v, one in points.items()}
+        return {
+            v: {name: point[list(order)] * sign for name, point in one.items()}
+            for v, one in points.items()
+        }
 
     return undone
 

@@ -12,8 +12,8 @@ from cohort_cases import write as write_small
 from mistaken_cases import Mistake
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.doubts import suspicions
 from spinepipe.problems import InputError, Problem
+from spinepipe.studies.doubts import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, make
 from tests.generators.phantom import phantom
