@@ -55,8 +55,8 @@ HEAVIEST_KG = 300.0
 """Of a person, chosen."""
 
 LEAN_DEG = 60.0
-"""Sideways, at every level, chosen: curved spines in CT reach 41 deg, curves of 86 deg (Jalalian 2017,
-Table 1) tilt their ends by half of it; 15 deg to spare."""
+"""Sideways, at every level, chosen: curved spines in CT reach 41 deg, curves of 86 deg (Jalalian
+2017, Table 1) tilt their ends by half of it; 15 deg to spare."""
 
 TURN_DEG = 55.0
 """About the long axis, at every level, chosen: curved spines in CT reach 36 deg."""

@@ -95,8 +95,9 @@ def _steps(cycles: Sequence[LoadedCycle]) -> tuple[str, str, str, str] | None:
     """Steps in reverse, or readings one step late."""
     given, turned, late, steps = [], [], [], 0
     for cycle in cycles:
+        readings = cycle.from_rest
         for joint, number in _driven(cycle):
-            load, read = cycle.loads[:, joint, number], cycle.readings[:, joint, number]
+            load, read = cycle.loads[:, joint, number], readings[:, joint, number]
             if (load == 0.0).any() and np.isfinite(read).all():
                 steps = max(steps, int((load != 0.0).sum()))
                 given.append(_alike(load, read))
@@ -123,10 +124,9 @@ def _stands_still(cycle: LoadedCycle) -> bool:
     """Whether the first loaded step reads what step 0 does, to the last digit, and others not."""
     if len(cycle.readings) < FEW + 1 or np.array_equal(cycle.loads[0], cycle.loads[1]):
         return False
-    same = [
-        np.array_equal(cycle.readings[k], cycle.readings[k + 1], equal_nan=True) for k in (0, 1)
-    ]
-    return same == [True, False] and bool(np.isfinite(cycle.readings[1]).any())
+    read = cycle.from_rest
+    same = [np.array_equal(read[k], read[k + 1], equal_nan=True) for k in (0, 1)]
+    return same == [True, False] and bool(np.isfinite(read[1]).any())
 
 
 def _alike(load: Array, read: Array) -> float:

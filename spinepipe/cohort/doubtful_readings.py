@@ -27,9 +27,10 @@ COARSEST_SD = {"rotation_deg": 10.0, "translation_mm": 10.0, "force_n": 500.0, "
 """A joint of the spine hardly moves so far, a rig hardly loads it so much."""
 
 LARGEST_DEG = 45.0
-"""To one side, chosen: what was read is less by half. Flexion and extension together reach 20 deg in
-lumbar joints (mean and two SDs; BMC Musculoskelet Disord 2006 7:45, Table 5) and 14 deg at T1T2 under
-7.5 N m (Wilke 2017, abstract). C1C2 turns by up to 53 deg (Roche 2002, doi 10.1053/crad.2001.0703)."""
+"""To one side, chosen: what was read is less by half. Flexion and extension together reach 20 deg
+in lumbar joints (mean and two SDs; BMC Musculoskelet Disord 2006 7:45, Table 5) and 14 deg at T1T2
+under 7.5 N m (Wilke 2017, abstract). C1C2 alone turns by up to 53 deg (Roche 2002, doi
+10.1053/crad.2001.0703)."""
 
 ATLAS_DEG = 60.0
 """Of C1C2 alone."""
@@ -48,7 +49,7 @@ SHARE_OF_SD = 0.2
 """Of the SD of a reading: at least eight readings that are all smaller have no such error."""
 
 SURE_SDS = 100.0
-"""Two or three readings that are alike to the last digit are no chance where their SD is so small."""
+"""Two or three readings alike to the last digit are no chance where their SD is so small."""
 
 CYCLES = 6
 """Cycles of tests whose step 0 reads exactly zero before that is no chance."""

@@ -128,8 +128,8 @@ def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     told = [one for one in _told(cohort, cycles) if one.place[:2] not in order.places]
     told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
     problems = [*_sizes(cohort, told), *_signs(cohort, told)]
-    judged = {one.place[:2] for one in told} | order.places
-    problems += _against_names(cohort, judged)
+    turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
+    problems += _against_names(cohort, turned | order.places)
     known = (*order.doubts, *(Doubt(problem, "motion") for problem in problems))
     found = (
         *geometry,

@@ -40,6 +40,14 @@ class LoadedCycle:
         return any(wrench.force.any() for step in self.case.steps for wrench in step.wrenches)
 
     @property
+    def from_rest(self) -> Array:
+        """(T, J, 6) the readings, 0 at step 0 where it was subtracted and is no reading."""
+        found = self.readings.copy()
+        if len(found) > 1 and not np.isfinite(found[0]).any():
+            found[0] = np.where(np.isfinite(found[1]), 0.0, np.nan)
+        return found
+
+    @property
     def read_steps(self) -> int:
         """Steps with any reading."""
         return int(np.isfinite(self.readings).any(axis=(1, 2)).sum())
