@@ -13,10 +13,10 @@ from pathlib import Path
 from spinepipe import cohort as cohorts
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.doubts import doubts, refusals
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
+from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.free import unmeasured
 from spinepipe.studies.registry import PACKAGE, every_form, kind_of
 from spinepipe.studies.study import COHORTS, Study

@@ -4,13 +4,14 @@ Has every joint of every specimen a pose? Are neighbours as far apart as in a sp
 for millimetres show here)? Can the bodies exist, and are all there that gravity needs?
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import isnan
+from math import isnan, sqrt
 
 import numpy as np
 
 from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.exchanged_landmarks import Suspect, suspect
 from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose
 from spinepipe.problems import Problem
@@ -53,6 +54,10 @@ def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Pro
     """
     points, lines = _points(draft)
     for specimen in draft.specimens:
+        told = [
+            (name, points[specimen, name]) for name in draft.vertebrae if (specimen, name) in points
+        ]
+        behind = suspect(dict(told))
         pairs = zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True)
         for joint, (lower, upper) in zip(draft.joint_names, pairs, strict=True):
             if (specimen, joint) in given:
@@ -65,7 +70,8 @@ def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Pro
                 sides = (points.get((specimen, lower), {}), points.get((specimen, upper), {}))
                 line = lines.get((specimen, upper)) or lines.get((specimen, lower))
                 place = (draft.file("landmarks"), line, None)
-                yield from _joint_problems(place, f"{joint} of specimen '{specimen}'", *sides)
+                name = f"{joint} of specimen '{specimen}'"
+                yield from _joint_problems(place, name, *sides, behind)
 
 
 def _points(
@@ -82,24 +88,32 @@ def _points(
 
 
 def _joint_problems(
-    place: Place, joint: str, lower: Mapping[str, Array], upper: Mapping[str, Array]
+    place: Place,
+    joint: str,
+    lower: Mapping[str, Array],
+    upper: Mapping[str, Array],
+    behind: Suspect | None,
 ) -> Iterator[Problem]:
     if any(np.isnan(point).any() for side in (lower, upper) for point in side.values()):
         return  # a bad cell, reported there
     for side, face, which in ((upper, UPPER_FACE, "upper"), (lower, LOWER_FACE, "lower")):
         if face not in side:
-            yield _no_pose(place, joint, f"the {which} vertebra has no {face}")
+            yield _no_pose(place, joint, f"the {which} vertebra has no {face}", behind)
             return
-    distance = float(np.linalg.norm(upper[UPPER_FACE] - lower[LOWER_FACE]))
-    wrong_unit = list(spacing_problem(place, distance, f"the endplate centres at {joint}"))
+    apart = upper[UPPER_FACE] - lower[LOWER_FACE]
+    wrong_unit = list(spacing_problem(place, apart, XYZ, f"the endplate centres at {joint}"))
     if wrong_unit:
         yield from wrong_unit
         return
-    yield from _frame_problems(place, joint, lower, upper)
+    yield from _frame_problems(place, joint, lower, upper, behind)
 
 
 def _frame_problems(
-    place: Place, joint: str, lower: Mapping[str, Array], upper: Mapping[str, Array]
+    place: Place,
+    joint: str,
+    lower: Mapping[str, Array],
+    upper: Mapping[str, Array],
+    behind: Suspect | None,
 ) -> Iterator[Problem]:
     try:
         pose = joint_pose(_metres(lower), _metres(upper))
@@ -110,6 +124,8 @@ def _frame_problems(
         found = f"an axis of {joint} that points the wrong way"
         allowed = "x anterior, y superior, z right, each within 90 deg of ground's"
         remedy = "look for left and right, or superior and inferior, exchanged"
+        if behind is not None:
+            place, remedy = (*place[:2], behind.column), behind.words
         yield Problem(*place, found, allowed, remedy)
 
 
@@ -117,13 +133,17 @@ def _metres(points: Mapping[str, Array]) -> dict[str, Array]:
     return {name: point / MM_PER_M for name, point in points.items()}
 
 
-def _no_pose(place: Place, joint: str, reason: str) -> Problem:
+def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> Problem:
     allowed = (
         f"{UPPER_FACE} above, {LOWER_FACE} below, and one of the two vertebrae with both endplate "
         "centres and both pedicle bases, or a row in joints.csv"
     )
     found = f"no frame for {joint}: {reason}"
-    return Problem(*place, found, allowed, "add or correct the landmarks")
+    column = XYZ[0] if reason.startswith("the pedicle") else place[2]
+    remedy = "add or correct the landmarks: one may be misplaced"
+    if behind is not None:
+        column, remedy = behind.column, behind.words
+    return Problem(*place[:2], column, found, allowed, remedy)
 
 
 def _origin_spacing(draft: Draft) -> Iterator[Problem]:
@@ -134,16 +154,23 @@ def _origin_spacing(draft: Draft) -> Iterator[Problem]:
         for below, joint in pairwise(names):
             if (specimen, below) in origins and (specimen, joint) in origins:
                 line, origin = origins[specimen, joint]
-                distance = float(np.linalg.norm(origin - origins[specimen, below][1]))
-                place = (draft.file("joints"), line, "x_mm")
+                apart = origin - origins[specimen, below][1]
+                place = (draft.file("joints"), line, None)
                 what = f"the origins of {below} and {joint}"
-                yield from spacing_problem(place, distance, what)
+                yield from spacing_problem(place, apart, XYZ, what)
 
 
 INERTIA = tuple(f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
 
 ROUNDING = 1e-3
 """Inertias in files are rounded to a few digits; a flat body sits exactly on the limit."""
+
+KG_PER_T = 1e3
+
+LIKELY_GYRATION_M = (0.005, 0.15)
+"""Of a vertebra alone to a slice of a trunk."""
+
+LIKELY_KG = (0.003, 5.0)
 
 LARGEST_GYRATION_M = 1.0
 """No part of a trunk has its mass further than this from its centre."""
@@ -155,8 +182,20 @@ def check_bodies(draft: Draft) -> Iterator[Problem]:
         if all(map(isnan, inertia)):
             continue
         yield from _inertia_problems(draft.file("bodies"), line, mass, np.array(inertia))
+    yield from _exchanged(draft)
     yield from _missing(draft)
     yield from _spacing(draft)
+
+
+def _exchanged(draft: Draft) -> Iterator[Problem]:
+    """Masses that are none beside centres of mass that are masses."""
+    rows = list(draft.rows("bodies", "mass_kg", "com_x_mm"))
+    bad = [line for line, (mass, _) in rows if isnan(mass)]
+    if bad and all(LIKELY_KG[0] <= x <= LIKELY_KG[1] for _, (_, x) in rows):
+        found = "masses that are none, and com_x_mm that could be masses"
+        remedy = "suspected: mass_kg and com_x_mm exchanged; exchange them back"
+        place = (draft.file("bodies"), bad[0], "mass_kg")
+        yield Problem(*place, found, "mass_kg in kg and com_x_mm in mm", remedy)
 
 
 def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator[Problem]:
@@ -180,7 +219,10 @@ def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator
         gyration = np.sqrt(moments[2] / mass)
         found = f"a radius of gyration of {gyration:.3g} m"
         allowed = f"at most {LARGEST_GYRATION_M:g} m"
-        yield Problem(file, line, INERTIA[0], found, allowed, "give kg m2, not kg mm2 or kg cm2")
+        remedy = "give kg m2, not kg mm2 or kg cm2"
+        if LIKELY_GYRATION_M[0] <= gyration / sqrt(KG_PER_T) <= LIKELY_GYRATION_M[1]:
+            remedy = f"suspected: mass_kg in t and not kg, multiply it by 1000; or {remedy}"
+        yield Problem(file, line, INERTIA[0], found, allowed, remedy)
 
 
 def _missing(draft: Draft) -> Iterator[Problem]:
@@ -209,22 +251,34 @@ def _spacing(draft: Draft) -> Iterator[Problem]:
         for lower, upper in zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True):
             if (specimen, lower) in centres and (specimen, upper) in centres:
                 line, centre = centres[specimen, upper]
-                distance = float(np.linalg.norm(centre - centres[specimen, lower][1]))
+                apart = centre - centres[specimen, lower][1]
                 what = f"the centres of mass of {lower} and {upper}"
-                place = (draft.file("bodies"), line, "com_x_mm")
-                yield from spacing_problem(place, distance, what)
+                place = (draft.file("bodies"), line, None)
+                yield from spacing_problem(place, apart, columns[2:], what)
 
 
-def spacing_problem(place: Place, distance_mm: float, what: str) -> Iterator[Problem]:
+METRES_MM = (3.0, 150.0)
+"""Neighbours that are so far apart once multiplied by 1000 were given in m."""
+
+
+def spacing_problem(
+    place: Place, apart: Array, columns: Sequence[str], what: str
+) -> Iterator[Problem]:
     """The problem of two neighbouring points, if their distance says the unit is wrong.
 
     Parameters
     ----------
-    place : file, line and column to report.
-    distance_mm : NaN, from a cell that is bad and reported there, is no problem here.
+    place : file and line to report.
+    apart : (3,) mm; NaN, from a cell that is bad and reported there, is no problem here.
+    columns : x, y and z.
     what : which points.
     """
-    if distance_mm < SMALLEST_MM or distance_mm > LARGEST_MM:
-        found = f"{what} {distance_mm:.3g} mm apart"
+    distance = float(np.linalg.norm(apart))
+    if distance < SMALLEST_MM or distance > LARGEST_MM:
+        column = columns[int(np.argmax(np.abs(apart)))] if distance > LARGEST_MM else columns[0]
+        remedy = "give millimetres, and look for a misplaced point"
+        if METRES_MM[0] <= MM_PER_M * distance <= METRES_MM[1]:
+            remedy = f"suspected: lengths in m and not mm; multiply {', '.join(columns)} by 1000"
+        found = f"{what} {distance:.3g} mm apart"
         allowed = f"{SMALLEST_MM:g} mm to {LARGEST_MM:g} mm"
-        yield Problem(*place, found, allowed, "give millimetres, and look for a misplaced point")
+        yield Problem(*place[:2], column, found, allowed, remedy)

@@ -92,7 +92,7 @@ class CohortHeader(BaseModel):
     i_mean_it: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
         default=(),
         description="what looks impossible and is meant: lengths, postures, masses, loads, motion, "
-        "zeroing, errors; such refusals of the plausibility checks become warnings",
+        "zeroing, errors, persons; such refusals of the plausibility checks become warnings",
     )
 
 

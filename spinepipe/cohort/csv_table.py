@@ -146,6 +146,22 @@ def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
     return pd.Series([cell or None for cell in cells], index=lines, dtype="str")
 
 
+_MISTAKEN = {
+    "height_m": (0.01, "cm and not m"),
+    "_nm": (1e-3, "moments in N mm and not N m"),
+    "_kg": (1e-3, "masses in g and not kg"),
+}
+"""By the end of a column's name: by what a number in another unit must be multiplied, and which."""
+
+
+def _remedy(number: float, column: Column) -> str:
+    """What to do with a number out of range: the unit that brings it back, where there is one."""
+    for end, (factor, words) in _MISTAKEN.items():
+        if column.name.endswith(end) and column.low < factor * number < column.high:
+            return f"suspected: {words}; multiply the column by {factor:.3g}"
+    return "correct it; check its unit, its sign, and for a slip of the decimal point"
+
+
 def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:
     """What is allowed and what to do, when a number is wrong."""
     if not isfinite(number):
@@ -157,7 +173,7 @@ def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] |
     low_bad = number <= column.low if column.open_low else number < column.low
     high_bad = number >= column.high if column.open_high else number > column.high
     if low_bad or high_bad:
-        return f"{column.meaning}: {column.range_text}", "correct it; check its unit and its sign"
+        return f"{column.meaning}: {column.range_text}", _remedy(number, column)
     return None
 
 

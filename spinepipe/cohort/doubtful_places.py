@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.anatomy.levels import HEIGHT_MM, ONE_SPREAD, SIZE_SPREAD, spacing_mm
+from spinepipe.anatomy.levels import ONE_SPREAD, SIZE_SPREAD, height_mm, spacing_mm
 from spinepipe.cohort.answers import of_specimens, typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.csv_table import read_rows
-from spinepipe.cohort.doubt import Doubt, Group
+from spinepipe.cohort.doubt import Doubt, Found, Group
 from spinepipe.cohort.neutral_pose import NeutralPose
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
@@ -40,6 +40,9 @@ NEARER = 1.5
 THERE_MM = 70.0
 """And how near: as slices of a trunk have their centres of mass in front of the spine."""
 
+MOST_ALIKE = 0.6
+"""Share of the lengths of a specimen that are too large or small by one factor, if a unit is."""
+
 MOST = 0.8
 """Share of the points that a mistake of the whole column must explain."""
 
@@ -52,9 +55,9 @@ FAR_MM: Mapping[str, float] = {
     "preload": 300.0,
     "landmarks": 120.0,
 }
-"""From the middle of a vertebra. Bodies: the pelvis, 121 mm from L5S1, and slices of a trunk, 65 mm
-(Pearsall et al. 1996, Ann Biomed Eng 24:198); loads: lever arms of rigs; landmarks: tips of
-processes."""
+"""From the middle of a vertebra, chosen. Bodies: slices of a trunk lie up to 50 mm in front
+(Pearsall 1996, doi 10.1007/BF02667349), those of a full-body model 63 mm, its pelvis 121 mm from
+L5S1, and arms may hang on them; loads: lever arms of rigs; landmarks: tips of processes."""
 
 NOWHERE_MM = 1000.0
 """No point of a specimen is so far from its vertebra."""
@@ -81,6 +84,24 @@ def first_line(cohort: Cohort, stem: str, row: int) -> int | None:
     """Line, as an editor shows it, of a row of a table, counted from 0."""
     rows, _ = read_rows(cohort.folder / f"{stem}.csv", stem)
     return None if rows is None or row >= len(rows.lines) else rows.lines[row]
+
+
+def first_row(
+    cohort: Cohort,
+    stem: str,
+    specimen: str,
+    test: str,
+    column: str | None = None,
+    joint: str | None = None,
+) -> int | None:
+    """Line of a test's first row; of a column the first whose cell is not empty or 0."""
+    table: Any = getattr(cohort, stem)
+    rows = table["specimen"].isin([specimen, "*"]) & (table["test"] == test)
+    if joint is not None:
+        rows &= table["joint"] == joint
+    filled = rows if column is None else rows & table[column].notna() & (table[column] != 0.0)
+    chosen = np.flatnonzero(filled if filled.any() else rows)
+    return first_line(cohort, stem, int(chosen[0])) if len(chosen) else None
 
 
 def file_of(cohort: Cohort, stem: str) -> str:
@@ -116,42 +137,61 @@ def heights(cohort: Cohort, specimen: str) -> dict[str, float]:
     faces = ("superior_endplate_centre", "inferior_endplate_centre")
     return {
         name: float(np.linalg.norm(points[name, faces[0]] - points[name, faces[1]])) / usual
-        for name, usual in HEIGHT_MM.items()
+        for name in cohort.vertebrae
+        if (usual := height_mm(name)) is not None
         if (name, faces[0]) in points and (name, faces[1]) in points
     }
 
 
-def doubtful_sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Doubt]:
+def doubtful_sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Found:
     """Vertebrae of a size that no spine has: all of a specimen, or one between its neighbours."""
-    stem = "landmarks" if cohort.joints is None else "joints"
     whole: dict[float | None, dict[str, float]] = defaultdict(dict)
+    single: dict[str, list[Doubt]] = {}
     for pose in poses:
         ratios = _ratios(cohort, pose)
-        size = typical(list(ratios.values())) if ratios else 1.0
+        size = _typical_size(cohort, pose, ratios)
         if size <= 0.0 or abs(log(size)) > log(SIZE_SPREAD):
             whole[unit_like(size) if size > 0.0 else None][pose.specimen] = size
-        else:
-            yield from _odd_vertebrae(cohort, stem, pose, ratios)
-    for unit, found in whole.items():
-        yield _of_another_size(cohort, stem, unit, found)
+        elif odd := list(_odd_vertebrae(cohort, pose, ratios, size)):
+            single[pose.specimen] = odd
+    every = [_of_another_size(cohort, unit, found) for unit, found in whole.items()]
+    every += [doubt for doubts in single.values() for doubt in doubts]
+    return Found.of(every, [*single, *(name for found in whole.values() for name in found)])
 
 
-def _of_another_size(
-    cohort: Cohort, stem: str, unit: float | None, found: Mapping[str, float]
-) -> Doubt:
+def _stem(cohort: Cohort) -> str:
+    return "landmarks" if cohort.joints is None else "joints"
+
+
+def _typical_size(cohort: Cohort, pose: NeutralPose, ratios: Mapping[str, float]) -> float:
+    """Of a specimen over that of its levels; 1 where single points make the difference.
+
+    Bodies count too, so that no single point decides.
+    """
+    lengths = list(ratios.values())
+    if cohort.joints is None:
+        lengths += heights(cohort, pose.specimen).values()
+    size = typical(lengths) if lengths else 1.0
+    alike = [
+        one for one in lengths if size > 0.0 and one < SIZE_SPREAD * size < SIZE_SPREAD**2 * one
+    ]
+    return size if not lengths or size == 0.0 or len(alike) > MOST_ALIKE * len(lengths) else 1.0
+
+
+def _of_another_size(cohort: Cohort, unit: float | None, found: Mapping[str, float]) -> Doubt:
     size = typical(list(found.values()))
     shown = (
         f"neighbouring joints {size:.3g} times as far apart as in a spine "
         f"({of_specimens(found, cohort.specimen_names)})"
     )
-    allowed = (
-        f"1/{SIZE_SPREAD:g} to {SIZE_SPREAD:g} times the mean of the level (Panjabi 1991, 1992)"
-    )
+    allowed = f"1/{SIZE_SPREAD:g} to {SIZE_SPREAD:g} times the mean of the level"
     remedy = (
         "look at the unit of lengths"
         if unit is None
-        else f"suspected: {UNITS[unit]} and not mm ({1.0 / unit:.3g}); convert the file"
+        else f"suspected: {UNITS[unit]} and not mm ({1.0 / unit:.3g}); multiply "
+        f"{', '.join(COLUMNS['landmarks'])} by {unit:.3g}"
     )
+    stem = _stem(cohort)
     rows = np.flatnonzero(getattr(cohort, stem)["specimen"] == next(iter(found)))
     line = first_line(cohort, stem, int(rows[0]))
     problem = Problem(file_of(cohort, stem), line, "x_mm", shown, allowed, remedy)
@@ -159,10 +199,10 @@ def _of_another_size(
 
 
 def _odd_vertebrae(
-    cohort: Cohort, stem: str, pose: NeutralPose, ratios: Mapping[str, float]
+    cohort: Cohort, pose: NeutralPose, ratios: Mapping[str, float], usual: float
 ) -> Iterator[Doubt]:
     """Single vertebrae much longer or shorter than the rest of their specimen."""
-    usual = typical(list(ratios.values())) if ratios else 1.0
+    stem = _stem(cohort)
     for vertebra, ratio in ratios.items():
         if 1.0 / ONE_SPREAD <= ratio / usual <= ONE_SPREAD:
             continue
@@ -192,6 +232,12 @@ def _points(cohort: Cohort, poses: Sequence[NeutralPose], stem: str) -> Iterator
         if len(rows):
             points = table[list(COLUMNS[stem])].to_numpy(float)[rows]
             near = np.array([pose.near(name) for name in table["vertebra"].iloc[rows]])
+            other = _at_another(pose, points, near) if "fx_n" in table else None
+            if other is not None:
+                away = float(np.linalg.norm(points - near, axis=1).max())
+                words = f"suspected: the wrong vertebra; the points lie at {other}"
+                told[words, "vertebra", False].append((int(rows[0]), pose.specimen, away))
+                continue
             for suspect in _suspects(stem, table.iloc[rows], points, near):
                 key = (suspect.words, suspect.column, suspect.certain)
                 told[key].append((int(rows[suspect.row]), pose.specimen, suspect.away_mm))
@@ -229,6 +275,14 @@ def _suspects(stem: str, table: Any, points: Array, near: Array) -> Iterator[_Su
         yield _Suspect(row, "look for a misplaced point", column, sure, float(away[row]))
 
 
+def _at_another(pose: NeutralPose, points: Array, near: Array) -> str | None:
+    """The vertebra at which all loads act, where that is another one than they name."""
+    here = _distance(points, near)
+    away = {name: _distance(points, pose.near(name)) for name in pose.vertebrae[1:]}
+    best = min(away, key=lambda name: away[name])
+    return best if here > NEAR_MM and away[best] * NEARER_SWAPPED < here else None
+
+
 def _exchanged_names(table: Any, points: Array, near: Array) -> Iterator[int]:
     """Rows of two neighbours that are much nearer to each other's middle than to their own."""
     names = table["vertebra"].to_numpy()
@@ -250,17 +304,7 @@ def _behind(
     here = _distance(points, near)
     if here <= (NEAR_MM if len(points) == 1 or "fx_n" in table else NEAR_MM / 2.0):
         return None
-    names = COLUMNS[stem]
-    tried = []
-    for factor, words in UNITS.items():
-        what = words.replace("lengths", "points")
-        told = f"suspected: {what} and not mm ({1.0 / factor:.3g}); convert the columns"
-        tried.append((NEARER, told, names[0], stem == "bodies", factor * points))
-    for first, second in ((0, 1), (1, 2), (0, 2)):
-        order = [0, 1, 2]
-        order[first], order[second] = second, first
-        told = f"suspected: {names[first]} and {names[second]} exchanged; exchange them back"
-        tried.append((NEARER_SWAPPED, told, names[first], False, points[:, order]))
+    tried = [*_units(stem, points), *_others(stem, points)]
     best = min(tried, key=lambda one: one[0] * _distance(one[4], near))
     needed, told, column, sure, moved = best
     there = _distance(moved, near)
@@ -271,7 +315,41 @@ def _behind(
     if nearer.mean() < MOST:  # a unit is that of all rows
         return None
     sure = sure and len(points) > 1 and there < NEAR_MM and here > 3.0 * there
-    return told, column, sure or here > NOWHERE_MM, moved
+    return f"suspected: {told}", column, sure or here > NOWHERE_MM, moved
+
+
+_Try = tuple[float, str, str, bool, Array]
+"""Times nearer that is asked, what is suspected, column, whether it may be certain, the points."""
+
+
+def _units(stem: str, points: Array) -> Iterator[_Try]:
+    names = COLUMNS[stem]
+    for factor, words in UNITS.items():
+        what = words.replace("lengths", "points")
+        told = (
+            f"{what} and not mm ({1.0 / factor:.3g}); multiply {', '.join(names)} by {factor:.3g}"
+        )
+        yield NEARER, told, names[0], stem == "bodies", factor * points
+
+
+def _others(stem: str, points: Array) -> Iterator[_Try]:
+    """Exchanged columns, turned signs, and points of other rows."""
+    names = COLUMNS[stem]
+    for first, second in ((0, 1), (1, 2), (0, 2)):
+        order = [0, 1, 2]
+        order[first], order[second] = second, first
+        told = f"{names[first]} and {names[second]} exchanged; exchange them back"
+        yield NEARER_SWAPPED, told, names[first], False, points[:, order]
+    for axis, way in enumerate(("backwards", "downwards", "to the left")):
+        told = f"the sign of {names[axis]}: counted {way}; turn it"
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        yield NEARER_SWAPPED, told, names[axis], False, sign * points
+    if stem == "bodies" and len(points) > 2:
+        told = f"{', '.join(names)} relative to the row before and not in ground; add them up"
+        yield NEARER_SWAPPED, told, names[1], False, np.cumsum(points, axis=0)
+        for step, way in ((-1, "down"), (1, "up")):
+            told = f"{', '.join(names)} one row too far {way}: each vertebra has its neighbour's"
+            yield NEARER_SWAPPED, told, names[1], False, np.roll(points, step, axis=0)
 
 
 def _distance(points: Array, near: Array) -> float:

@@ -20,11 +20,20 @@ LEAST_SD = 1e-6
 FINEST_SD = {"rotation_deg": 1e-3, "translation_mm": 1e-4, "force_n": 1e-4, "moment_nm": 1e-5}
 """Laboratory encoders and interferometers resolve this."""
 
+LEAST_PALPATION_MM = 0.02
+"""Nobody digitises a point of bone more finely."""
+
 COARSEST_SD = {"rotation_deg": 10.0, "translation_mm": 10.0, "force_n": 500.0, "moment_nm": 20.0}
 """A joint of the spine hardly moves so far, a rig hardly loads it so much."""
 
 LARGEST_DEG = 45.0
-"""No joint of the spine turns further to one side than C1C2, 40 deg (White and Panjabi 1990)."""
+"""To one side, chosen: what was read is less by half. Flexion and extension together reach 20 deg
+in lumbar joints (mean and two SDs; BMC Musculoskelet Disord 2006 7:45, Table 5) and 14 deg at T1T2
+under 7.5 N m (Wilke 2017, abstract). C1C2 alone turns by up to 53 deg (Roche 2002, doi
+10.1053/crad.2001.0703)."""
+
+ATLAS_DEG = 60.0
+"""Of C1C2 alone."""
 
 LARGEST_MM = 25.0
 """Vertebrae slide by 9 mm at most in vivo (as Wang 2021 cites it)."""
@@ -38,6 +47,9 @@ LEAST_FORCE_N, LEAST_MOMENT_NM = 1.0, 0.02
 
 SHARE_OF_SD = 0.2
 """Of the SD of a reading: at least eight readings that are all smaller have no such error."""
+
+SURE_SDS = 100.0
+"""Two or three readings alike to the last digit are no chance where their SD is so small."""
 
 CYCLES = 6
 """Cycles of tests whose step 0 reads exactly zero before that is no chance."""
@@ -82,12 +94,15 @@ def _errors(cohort: Cohort) -> Iterator[Doubt]:
         yield Doubt(problem, "errors", certain=sd < LEAST_SD)
     if cohort.landmarks is not None:
         sd = cohort.landmarks["sd_mm"].to_numpy(float)
-        odd = np.flatnonzero(((sd > 0.0) & (sd < 1e-3)) | (sd > 20.0))
+        odd = np.flatnonzero(((sd > 0.0) & (sd < LEAST_PALPATION_MM)) | (sd > 20.0))
         if len(odd):
             line = first_line(cohort, "landmarks", int(odd[0]))
             place = (file_of(cohort, "landmarks"), line, "sd_mm")
-            allowed = "0 where a point is known, or 0.001 to 20 mm"
-            problem = Problem(*place, f"{sd[odd[0]]:.3g}", allowed, "give the SD of one palpation")
+            allowed = f"0 where a point is known, or {LEAST_PALPATION_MM:g} to 20 mm"
+            remedy = "give the SD of one palpation"
+            if sd[odd[0]] < LEAST_PALPATION_MM:
+                remedy += "; suspected: m and not mm; multiply sd_mm by 1000"
+            problem = Problem(*place, f"{sd[odd[0]]:.3g}", allowed, remedy)
             yield Doubt(problem, "errors", certain=bool(sd[odd[0]] < LEAST_SD))
 
 
@@ -130,7 +145,8 @@ def _unloaded(cohort: Cohort) -> Iterator[Doubt]:
             continue
         if (rows["follower_n"] > 0.0).any() or not (moved.fillna(0.0) != 0.0).any(axis=None):
             continue
-        place = (file_of(cohort, "loads"), first_line(cohort, "loads", int(rows.index[0])), None)
+        line = first_line(cohort, "loads", int(rows.index[0]))
+        place = (file_of(cohort, "loads"), line, f"{LOADS[0]} to {LOADS[-1]}")
         found = f"no load in any of the {len(rows)} rows of test '{test}', and motion"
         remedy = "fill in the loads, or say in supports.csv or preload.csv what moved the joints"
         problem = Problem(*place, found, "a load that makes the motion", remedy)
@@ -146,7 +162,8 @@ def _unmoved(cohort: Cohort) -> Iterator[Doubt]:
         later = rows[motion.loc[rows.index, "step"] > 0]
         if later.notna().any(axis=None) and not (later.fillna(0.0) != 0.0).any(axis=None):
             line = first_line(cohort, "motion", int(rows.index[0]))
-            place = (file_of(cohort, "motion"), line, None)
+            column = str(later.notna().any().idxmax())
+            place = (file_of(cohort, "motion"), line, column)
             found = f"zero in every reading of {specimen}, test '{test}'"
             remedy = "leave cells empty where nothing was measured"
             yield Doubt(Problem(*place, found, "motion under load", remedy), "motion")
@@ -211,7 +228,9 @@ def _below_their_sd(cohort: Cohort) -> Iterator[Doubt]:
             place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)
             found = f"readings of at most {read.max():.3g}, whose SD is said to be {error:g}"
             allowed = "readings that scatter as their SD says"
-            remedy = "suspected: the unit of the column (m and not mm, radians), or the SD"
+            unit = "radians and not degrees; multiply by 57.3"
+            unit = unit if column.endswith("_deg") else "in m and not mm; multiply by 1000"
+            remedy = f"suspected: {unit}; or look at measurement_sd"
             yield Doubt(Problem(*place, found, allowed, remedy), "motion")
 
 
@@ -222,7 +241,16 @@ def _constant(cohort: Cohort) -> Iterator[Doubt]:
     for column in COORDINATE_COLUMNS:
         for specimen, values in motion.groupby("specimen", sort=False)[column]:
             read = values.dropna()
-            if len(read) > 3 and read.nunique() == 1 and read.iloc[0] != 0.0:
+            sd = cohort.measurement_sd
+            error = (
+                np.inf
+                if sd is None
+                else sd.rotation_deg
+                if column.endswith("_deg")
+                else sd.translation_mm
+            )
+            few = len(read) >= 2 and abs(read.iloc[0]) > SURE_SDS * error
+            if (len(read) > 3 or few) and read.nunique() == 1 and read.iloc[0] != 0.0:
                 line = first_line(cohort, "motion", int(read.index[0]))
                 place = (file_of(cohort, "motion"), line, column)
                 found = f"{read.iloc[0]:.4g} in all {len(read)} readings of {specimen}"
@@ -252,7 +280,8 @@ def _absurd(cohort: Cohort) -> Iterator[Doubt]:
     assert motion is not None
     for column in COORDINATE_COLUMNS:
         limit = LARGEST_DEG if column.endswith("_deg") else LARGEST_MM
-        beyond = np.flatnonzero(motion[column].abs() > limit)
+        atlas = (motion["joint"] == "C1C2") & column.endswith("_deg")
+        beyond = np.flatnonzero(motion[column].abs() > np.where(atlas, ATLAS_DEG, limit))
         if len(beyond):
             row = int(beyond[0])
             place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)
@@ -262,6 +291,13 @@ def _absurd(cohort: Cohort) -> Iterator[Doubt]:
             allowed = f"at most {limit:g} to each side: no joint of the spine moves further"
             remedy = "look for a slip of the decimal point, or a wrong unit"
             yield Doubt(Problem(*place, found, allowed, remedy), "motion")
+
+
+def _ends_at_zero(motion: pd.DataFrame) -> bool:
+    """Whether the last step of every cycle reads zero, as the first should."""
+    last = motion.groupby(_CYCLE, sort=False)["step"].transform("max") == motion["step"]
+    read = motion.loc[last, list(COORDINATE_COLUMNS)]
+    return bool(read.notna().any(axis=None) and not (read.abs() > ZERO).any(axis=None))
 
 
 def _step_0(cohort: Cohort) -> Iterator[Doubt]:
@@ -277,6 +313,8 @@ def _step_0(cohort: Cohort) -> Iterator[Doubt]:
         place = (file_of(cohort, "motion"), first_line(cohort, "motion", row), column)
         found = f"{float(start[column][row]):.4g} at step 0, and zeroed_at_step_0: true"
         remedy = "set zeroed_at_step_0: false, subtract step 0, or put steps in order"
+        if _ends_at_zero(motion):
+            remedy = "suspected: steps in reverse order; number them as the loads"
         yield Doubt(Problem(*place, found, "0 at step 0", remedy), "zeroing", certain=True)
     read = start[size.notna()]
     cycles = len(pd.MultiIndex.from_frame(motion.loc[read.index, _CYCLE]).unique())

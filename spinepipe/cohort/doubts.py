@@ -11,34 +11,39 @@ moment is made by a force with a lever arm of less than a centimetre, and tests 
 whose loads a rig shares.
 """
 
+import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import log, sqrt
 
 import numpy as np
-import pandas as pd
 
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
-from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads, of_specimens, typical
+from spinepipe.cohort.answers import Answer, answers_of_test, of_specimens, typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.doubt import Doubt
 from spinepipe.cohort.doubtful_masses import doubtful_masses
+from spinepipe.cohort.doubtful_order import doubtful_order
+from spinepipe.cohort.doubtful_persons import doubtful_persons
 from spinepipe.cohort.doubtful_places import (
     doubtful_points,
     doubtful_sizes,
     file_of,
-    first_line,
+    first_row,
 )
 from spinepipe.cohort.doubtful_postures import (
+    doubtful_landmarks,
     doubtful_postures,
     doubtful_shapes,
     doubtful_sides,
 )
 from spinepipe.cohort.doubtful_readings import doubtful_readings, doubtful_sizes_of_readings
+from spinepipe.cohort.doubtful_rigs import doubtful_rigs
+from spinepipe.cohort.doubtful_series import doubtful_series
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
-from spinepipe.cohort.measured import measured_specimen
+from spinepipe.cohort.loaded_cycles import LoadedCycle, loaded_cycles
 from spinepipe.cohort.motion_size import PLAUSIBLE, Unit, geometric_mean, is_plausible, unit_like
 from spinepipe.cohort.neutral_pose import neutral_poses
 from spinepipe.problems import Problem
@@ -58,6 +63,27 @@ LOAD_COLUMNS = {
     **{name: f"f{axis}_n" for name, axis in zip(PUSHED, "xyz", strict=True)},
 }
 """Column of loads.csv that drives each coordinate where joints are upright."""
+
+
+WAYS = (
+    ({"flexion"}, "extension_deg", -1.0),
+    ({"extension"}, "extension_deg", 1.0),
+    ({"right", "bending"}, "right_bending_deg", 1.0),
+    ({"left", "bending"}, "right_bending_deg", -1.0),
+    ({"left", "rotation"}, "left_rotation_deg", 1.0),
+    ({"right", "rotation"}, "left_rotation_deg", -1.0),
+)
+"""Words in the name of a test, the column that it turns, and to which side."""
+
+OTHER_SIDE: Mapping[str, set[str]] = {
+    "flexion": {"extension"},
+    "extension": {"flexion"},
+    "right": {"left"},
+    "left": {"right"},
+    "bending": {"rotation"},
+    "rotation": {"bending"},
+}
+"""Words beside which a name tells no side."""
 
 
 @dataclass(frozen=True)
@@ -87,36 +113,30 @@ class _Told:
         return self.answer.specimen, self.answer.test, self.answer.coordinate
 
 
-def doubts(cohort: Cohort) -> tuple[Problem, ...]:
-    """What is most likely wrong with a validated cohort, and no run is stopped by.
-
-    That is all that cannot be certain, and what is but was meant.
-    """
-    return tuple(one.problem for one in suspicions(cohort) if not _refused(cohort, one))
-
-
-def refusals(cohort: Cohort) -> tuple[Problem, ...]:
-    """What cannot be right in a validated cohort, and is not said to be meant."""
-    return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
-
-
-def _refused(cohort: Cohort, one: Doubt) -> bool:
-    return one.certain and one.group not in cohort.i_mean_it
-
-
 @lru_cache(maxsize=8)
 def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     """All that looks wrong, one for each column and what is behind it.
 
-    Kept per cohort object: doubts and refusals are asked one after the other.
+    Kept per cohort object: doubts and refusals are asked one after the other. What explains a
+    reading keeps quiet what would be said of it besides.
     """
-    told = list(_told(cohort))
-    answers = (*_sizes(cohort, told), *_signs(cohort, told))
+    geometry = tuple(_geometry(cohort) if cohort.has_frames else ())
+    readings = (*doubtful_readings(cohort), *doubtful_series(cohort))
+    rigs = (*doubtful_rigs(cohort), *doubtful_persons(cohort))
+    cycles = tuple(_trusted(cohort, geometry, (*readings, *rigs)))
+    order = doubtful_order(cohort, cycles)
+    told = [one for one in _told(cohort, cycles) if one.place[:2] not in order.places]
+    told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
+    problems = [*_sizes(cohort, told), *_signs(cohort, told)]
+    turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
+    problems += _against_names(cohort, turned | order.places)
+    known = (*order.doubts, *(Doubt(problem, "motion") for problem in problems))
     found = (
-        *(_geometry(cohort) if cohort.has_frames else ()),
-        *doubtful_readings(cohort),
-        *(Doubt(problem, "motion") for problem in answers),
-        *(() if answers else doubtful_sizes_of_readings(cohort)),
+        *geometry,
+        *rigs,
+        *(one for one in readings if not (order.doubts and one.group == "zeroing")),
+        *known,
+        *(() if known or geometry else doubtful_sizes_of_readings(cohort)),
     )
     return tuple(dict.fromkeys(found))
 
@@ -124,37 +144,54 @@ def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
 def _geometry(cohort: Cohort) -> Iterator[Doubt]:
     """Of joints, then of what stands beside joints that are trusted: one mistake is told once."""
     poses = list(neutral_poses(cohort))
-    trusted = []
-    for pose in poses:
-        joints = (*doubtful_sizes(cohort, [pose]), *doubtful_postures(cohort, [pose]))
-        if not joints:
-            trusted.append(pose)
-    yield from doubtful_sizes(cohort, poses)
-    yield from doubtful_postures(cohort, poses)
-    shapes = list(doubtful_shapes(cohort))
-    yield from shapes or doubtful_sides(cohort)
+    landmarks = doubtful_landmarks(cohort)
+    left = [pose for pose in poses if pose.specimen not in landmarks.specimens]
+    sizes = doubtful_sizes(cohort, left)
+    left = [pose for pose in left if pose.specimen not in sizes.specimens]
+    postures = doubtful_postures(cohort, left)
+    trusted = [pose for pose in left if pose.specimen not in postures.specimens]
+    shapes = doubtful_shapes(cohort, landmarks.specimens | sizes.specimens)
+    for found in (landmarks, sizes, postures, shapes):
+        yield from found.doubts
+    if not shapes.doubts:
+        yield from doubtful_sides(cohort, landmarks.specimens)
     yield from doubtful_points(cohort, trusted)
     yield from doubtful_masses(cohort, trusted)
 
 
-def _told(cohort: Cohort) -> Iterator[_Told]:
-    """Every joint that a test drives, cycle by cycle."""
-    if cohort.loads is None or cohort.motion is None or not cohort.has_frames:
+def _trusted(
+    cohort: Cohort, geometry: Sequence[Doubt], readings: Sequence[Doubt]
+) -> Iterator[LoadedCycle]:
+    """Cycles whose loads on the joints are known: not of forces where places are doubted."""
+    places = {"joints.csv", "landmarks.csv", "loads.csv", "preload.csv"}
+    doubted = {one.problem.file.split("/")[-1] for one in geometry} & places
+    loads = file_of(cohort, "loads")
+    if any(one.problem.file == loads and one.problem.column != "time_s" for one in readings):
         return
-    for specimen in cohort.specimen_names:
-        one = measured_specimen(cohort, specimen, cohort.tests)
-        for cycle in one.tested:
-            if cycle.case.steps and cycle.case.steps[0].supports:
-                continue
-            loads = joint_loads(one.frames, cycle.case)
-            read = np.isfinite(cycle.readings).any(axis=(1, 2)).sum()
-            from_start = cohort.zeroed_at_step_0 or read == 1  # one counts from the neutral pose
-            of_test = (specimen, cycle.case.test, loads, cycle.readings, from_start)
-            for answer in answers_of_test(*of_test):
-                joint = cohort.joint_names[answer.joint]
-                ratio = answer.slope * plausible(joint, answer.coordinate)
-                if ratio != 0.0:
-                    yield _Told(answer, joint, ratio)
+    if doubted & {"joints.csv", "landmarks.csv"}:
+        return
+    for cycle in loaded_cycles(cohort):
+        if not (doubted and cycle.pushed):
+            yield cycle
+
+
+def _spoilt(cohort: Cohort, coordinate: str, readings: Sequence[Doubt]) -> bool:
+    """Whether a column is doubted already, whatever its motion is over its load."""
+    column = _motion_column(coordinate)
+    file = file_of(cohort, "motion")
+    return any(one.problem.file == file and one.problem.column == column for one in readings)
+
+
+def _told(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Iterator[_Told]:
+    """Every joint that a test drives, cycle by cycle."""
+    for cycle in cycles:
+        from_start = cohort.zeroed_at_step_0 or cycle.read_steps == 1  # from the neutral pose
+        of_test = (cycle.specimen, cycle.test, cycle.loads, cycle.readings, from_start)
+        for answer in answers_of_test(*of_test):
+            joint = cohort.joint_names[answer.joint]
+            ratio = answer.slope * plausible(joint, answer.coordinate)
+            if ratio != 0.0:
+                yield _Told(answer, joint, ratio)
 
 
 def _sizes(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
@@ -224,7 +261,7 @@ def _size(
         if unit is not None
         else "look for a wrong unit of motion or loads, and for joints that are fused or cut"
     )
-    line = _first_line(cohort, stem, places[0][0], places[0][1], column)
+    line = first_row(cohort, stem, places[0][0], places[0][1], column)
     return Problem(file_of(cohort, stem), line, column, found, allowed, remedy)
 
 
@@ -243,6 +280,26 @@ def _signs(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
         found[test, coordinate, key].append(specimen)
     for (test, coordinate, named), specimens in found.items():
         yield _sign(cohort, test, coordinate, named, specimens)
+
+
+def _against_names(cohort: Cohort, judged: Container[tuple[str, str]]) -> Iterator[Problem]:
+    """Tests that turn all joints to the other side than their names say, where no load tells it."""
+    if cohort.motion is None:
+        return
+    for (specimen, test), rows in cohort.motion.groupby(["specimen", "test"], sort=False):
+        words = set(re.split(r"[^a-z]+", str(test).lower()))
+        if (str(specimen), str(test)) in judged:
+            continue
+        for way, column, sign in WAYS:
+            read = rows[column].dropna()
+            turned = read[read != 0.0] * sign
+            other = set().union(*(OTHER_SIDE[word] for word in way))
+            if way <= words and not words & other and len(turned) and (turned < 0.0).all():
+                line = first_row(cohort, "motion", str(specimen), str(test), column)
+                found = f"{column} of the other sign in all readings of {specimen}, test {test}"
+                allowed = "flexion and left bending negative, extension and left rotation positive"
+                remedy = f"suspected: the sign of {column}, or the name of the test"
+                yield Problem(file_of(cohort, "motion"), line, column, found, allowed, remedy)
 
 
 def _is_against(cohort: Cohort, one: _Told) -> bool:
@@ -265,7 +322,7 @@ def _sign(
     remedy = f"suspected: the sign of {column}" + (
         ", or vertebrae exchanged; turn it" if joints else f", or of {driving}; turn one of them"
     )
-    line = _first_line(cohort, "motion", specimens[0], test, column, joints[0] if joints else None)
+    line = first_row(cohort, "motion", specimens[0], test, column, joints[0] if joints else None)
     return Problem(file_of(cohort, "motion"), line, column, found, allowed, remedy)
 
 
@@ -278,16 +335,3 @@ def _whose(cohort: Cohort, places: Sequence[tuple[str, str]]) -> str:
 
 def _motion_column(coordinate: str) -> str:
     return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
-
-
-def _first_line(
-    cohort: Cohort, stem: str, specimen: str, test: str, column: str, joint: str | None = None
-) -> int | None:
-    """Line, as an editor shows it, of the first row in question whose cell is not empty or 0."""
-    table: pd.DataFrame = getattr(cohort, stem)
-    rows = table["specimen"].isin([specimen, "*"]) & (table["test"] == test)
-    if joint is not None:
-        rows &= table["joint"] == joint
-    filled = rows & table[column].notna() & (table[column] != 0.0)
-    chosen = np.flatnonzero(filled if filled.any() else rows)
-    return first_line(cohort, stem, int(chosen[0])) if len(chosen) else None

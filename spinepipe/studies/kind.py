@@ -115,6 +115,8 @@ class Kind:
     told_by_check : ``file:function`` of what `spinepipe check` says of a sound study besides;
         called with study, cohort and the folder of the Snakefile, it returns words, and what it
         warns of.
+    doubts : ``file:function`` of what most likely is wrong with files that it alone reads; called
+        with a cohort that has any of them, it yields doubts.
     """
 
     settings: type[Study]
@@ -132,6 +134,7 @@ class Kind:
     holds: bool = False
     settled: Callable[[Any, Cohort], Any] | None = None
     told_by_check: str | None = None
+    doubts: str | None = None
 
     def job(self, name: str) -> Job:
         """The job of that name."""

@@ -18,6 +18,8 @@ BMI = (14.0, 55.0)
 LARGEST_HEIGHT_M = 3.0
 """A height that is no more than this is in metres."""
 
+M_PER_INCH, M_PER_FOOT = 0.0254, 0.3048
+
 STANDARD_GRAVITY = 9.80665
 
 SUBJECTS = TableForm(
@@ -67,6 +69,14 @@ def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[Pr
         remedy = "correct it"
         if cm <= LARGEST_HEIGHT_M:
             remedy = f"is it in m? write {100.0 * cm:g}"
+        elif HEIGHT_CM[0] <= 100.0 * M_PER_FOOT * cm <= HEIGHT_CM[1]:
+            remedy = f"is it in feet? write {100.0 * M_PER_FOOT * cm:.1f}"
+        elif HEIGHT_CM[0] <= kg <= HEIGHT_CM[1] and MASS_KG[0] <= cm <= MASS_KG[1]:
+            remedy = (
+                f"are height_cm and mass_kg exchanged, or inches ({100.0 * M_PER_INCH * cm:.0f})?"
+            )
+        elif HEIGHT_CM[0] <= 100.0 * M_PER_INCH * cm <= HEIGHT_CM[1]:
+            remedy = f"is it in inches? write {100.0 * M_PER_INCH * cm:.1f}"
         elif HEIGHT_CM[0] <= cm / 10.0 <= HEIGHT_CM[1]:
             remedy = f"is it in mm? write {cm / 10.0:g}"
         yield Problem(*place, "height_cm", f"{who} is {cm:g} cm tall", _range(HEIGHT_CM), remedy)

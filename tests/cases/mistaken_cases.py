@@ -26,6 +26,8 @@ class Mistake:
     ----------
     spoil : changes a table in place. needs : columns without which it changes nothing.
     told_in : files in which it may be told, one of them at least.
+    columns : what is wrong, one of which must be named. remedy : pattern of the words that tell how
+        to mend it.
     """
 
     name: str
@@ -33,6 +35,8 @@ class Mistake:
     spoil: Table
     needs: tuple[str, ...]
     told_in: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    remedy: str = ""
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -156,6 +160,7 @@ def _copy(column: str, onto: str) -> Table:
 
 
 _FACTORS = {"cm": 0.1, "inch": 1.0 / 25.4, "m": 1e-3, "x10": 10.0}
+_WORDS = {"cm": r"in cm", "inch": r"inches", "m": r"in m\b", "x10": r"multiplied by 10\b"}
 _PLACES = {
     "landmarks": ("landmarks.csv", XYZ),
     "joints": ("joints.csv", XYZ),
@@ -164,48 +169,76 @@ _PLACES = {
 }
 
 
+def _both(first: str, second: str) -> str:
+    """A pattern of two names in any order and exchanged."""
+    return rf"(?s)(?=.*{first})(?=.*{second}).*exchanged"
+
+
 def _of_geometry() -> Iterator[Mistake]:
     for name, (file, columns) in _PLACES.items():
         for unit, factor in _FACTORS.items():
-            yield Mistake(f"{name}_{unit}", file, _times(columns, factor), columns)
-        yield Mistake(f"{name}_xy", file, _swap(*columns[:2]), columns)
+            spoil = _times(columns, factor)
+            yield Mistake(f"{name}_{unit}", file, spoil, columns, (), columns, _WORDS[unit])
+        for first, second in ((0, 1), (0, 2)) if name in ("landmarks", "joints") else ((0, 1),):
+            pair = (columns[first], columns[second])
+            axes = "xyz"[first] + "xyz"[second]
+            yield Mistake(f"{name}_{axes}", file, _swap(*pair), columns, (), pair, _both(*pair))
         if name in ("landmarks", "joints"):
-            yield Mistake(f"{name}_xz", file, _swap(columns[0], columns[2]), columns)
-            yield Mistake(f"{name}_upside_down", file, _times(columns[1:2], -1.0), columns)
-    yield Mistake("joints_radians", "joints.csv", _times(ANGLES, np.pi / 180.0), ANGLES)
-    yield Mistake("joints_exchanged", "joints.csv", _exchange(0, 1, "joint"), XYZ)
-    yield Mistake("joints_backwards", "joints.csv", _backwards, XYZ)
-    yield Mistake("vertebrae_exchanged", "landmarks.csv", _exchange(0, 1, "vertebra"), XYZ)
-    yield Mistake("collinear", "landmarks.csv", _collinear, XYZ)
-    yield Mistake("mass_t", "bodies.csv", _times(("mass_kg",), 1e-3), COM)
-    yield Mistake("mass_g", "bodies.csv", _times(("mass_kg",), 1e3), COM)
-    yield Mistake("mass_com_x", "bodies.csv", _swap("mass_kg", "com_x_mm"), COM)
-    for far in (200.0, 9000.0):
-        for axis in range(3):
-            spoil = _move(COM, axis, far, 1)
-            yield Mistake(f"com_{far:g}_{'xyz'[axis]}", "bodies.csv", spoil, COM)
-    for far in (500.0, 9000.0):
-        for axis in range(3):
-            spoil = _move(POINT, axis, far, 0)
-            yield Mistake(f"point_{far:g}_{'xyz'[axis]}", "loads.csv", spoil, POINT)
+            spoil = _times(columns[1:2], -1.0)
+            down = r"downwards|sign of y_mm"
+            yield Mistake(f"{name}_upside_down", file, spoil, columns, (), ("y_mm",), down)
+    spoil = _times(ANGLES, np.pi / 180.0)
+    yield Mistake("joints_radians", "joints.csv", spoil, ANGLES, (), ANGLES, "radians")
+    names = (("joint", *XYZ), r"exchanged|reverse")
+    spoil = _exchange(0, 1, "joint")
+    yield Mistake("joints_exchanged", "joints.csv", spoil, XYZ, (), *names)
+    yield Mistake("joints_backwards", "joints.csv", _backwards, XYZ, (), *names)
+    spoil, names = _exchange(0, 1, "vertebra"), (("vertebra", *XYZ), "exchanged")
+    yield Mistake("vertebrae_exchanged", "landmarks.csv", spoil, XYZ, (), *names)
+    yield Mistake("collinear", "landmarks.csv", _collinear, XYZ, (), XYZ, "misplaced")
+    mass = ((), ("mass_kg",))
+    yield Mistake("mass_t", "bodies.csv", _times(("mass_kg",), 1e-3), COM, *mass, r"in t\b")
+    yield Mistake("mass_g", "bodies.csv", _times(("mass_kg",), 1e3), COM, *mass, r"in g\b")
+    pair = ("mass_kg", "com_x_mm")
+    yield Mistake("mass_com_x", "bodies.csv", _swap(*pair), COM, (), pair, _both(*pair))
+    for columns, file, sizes in (
+        (COM, "bodies.csv", (200.0, 9e3)),
+        (POINT, "loads.csv", (5e2, 9e3)),
+    ):
+        for far in sizes:
+            for axis in range(3):
+                name = f"{'com' if columns is COM else 'point'}_{far:g}_{'xyz'[axis]}"
+                spoil = _move(columns, axis, far, int(columns is COM))
+                told = ((), columns[axis : axis + 1], "misplaced")
+                yield Mistake(name, file, spoil, columns, *told)
 
 
 def _of_motion() -> Iterator[Mistake]:
     both = ("motion.csv", "loads.csv")
-    yield Mistake("no_loads", "loads.csv", _set((*MOMENTS, *FORCES), 0.0), MOMENTS)
-    yield Mistake("n_mm", "loads.csv", _times(MOMENTS, 1e3), MOMENTS, both)
-    yield Mistake("kn", "loads.csv", _times(FORCES, 1e-3), FORCES, both)
-    yield Mistake("loads_turned", "loads.csv", _times((*MOMENTS, *FORCES), -1.0), MOMENTS, both)
-    yield Mistake("radians", "motion.csv", _times(ANGLES, np.pi / 180.0), ANGLES[:1], both)
-    yield Mistake("shifts_m", "motion.csv", _times(SHIFTS, 1e-3), SHIFTS[:1], both)
-    yield Mistake("turned", "motion.csv", _times(ANGLES, -1.0), ANGLES[:1], both)
-    yield Mistake("all_equal", "motion.csv", _set((*ANGLES, *SHIFTS), 1.5), ANGLES[:1])
-    yield Mistake("all_zero", "motion.csv", _set((*ANGLES, *SHIFTS), 0.0), ANGLES[:1])
-    yield Mistake("one_89", "motion.csv", _one("extension_deg", 89.0), ANGLES[:1])
-    yield Mistake("steps_reversed", "motion.csv", _steps_reversed, ANGLES[:1])
-    yield Mistake("constant", "motion.csv", _set(ANGLES[:1], -2.0), ANGLES[:1])
-    yield Mistake("repeated", "motion.csv", _copy(*ANGLES[:2]), ANGLES[:2])
-    yield Mistake("repeated_xy", "joints.csv", _copy(*XYZ[:2]), XYZ)
+    read = (*ANGLES, *SHIFTS)
+    loads, motion = "loads.csv", "motion.csv"
+    zero = _set((*MOMENTS, *FORCES), 0.0)
+    yield Mistake("no_loads", loads, zero, MOMENTS, (), (*FORCES, *MOMENTS), "fill in the loads")
+    yield Mistake("n_mm", loads, _times(MOMENTS, 1e3), MOMENTS, both, MOMENTS, "N mm")
+    yield Mistake("kn", loads, _times(FORCES, 1e-3), FORCES, both, (*FORCES, *SHIFTS), "kN")
+    turned = (*MOMENTS, *FORCES)
+    sign = ((*turned, *read), r"sign of")
+    yield Mistake("loads_turned", loads, _times(turned, -1.0), MOMENTS, both, *sign)
+    spoil = _times(ANGLES, np.pi / 180.0)
+    yield Mistake("radians", motion, spoil, ANGLES[:1], both, ANGLES, "radians")
+    yield Mistake("shifts_m", motion, _times(SHIFTS, 1e-3), SHIFTS[:1], both, SHIFTS, r"in m\b")
+    yield Mistake("turned", motion, _times(ANGLES, -1.0), ANGLES[:1], both, ANGLES, "sign of")
+    copied = "filled down|copied"
+    yield Mistake("all_equal", motion, _set(read, 1.5), ANGLES[:1], (), read, copied)
+    yield Mistake("all_zero", motion, _set(read, 0.0), ANGLES[:1], (), read, "leave cells empty")
+    spoil = _one("extension_deg", 89.0)
+    yield Mistake("one_89", motion, spoil, ANGLES[:1], (), ANGLES[:1], "slip|decimal")
+    steps = (("step", *read), "reverse")
+    yield Mistake("steps_reversed", motion, _steps_reversed, ANGLES[:1], (), *steps)
+    yield Mistake("constant", motion, _set(ANGLES[:1], -2.0), ANGLES[:1], (), ANGLES[:1], copied)
+    spoil = _copy(*ANGLES[:2])
+    yield Mistake("repeated", motion, spoil, ANGLES[:2], (), ANGLES[:2], copied)
+    yield Mistake("repeated_xy", "joints.csv", _copy(*XYZ[:2]), XYZ, (), XYZ[:2], copied)
 
 
 MISTAKES = (*_of_geometry(), *_of_motion())

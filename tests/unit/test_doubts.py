@@ -14,8 +14,8 @@ from cohort_cases import write as write_small
 from cohort_edge_cases import A
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort.doubts import suspicions
 from spinepipe.problems import Problem
+from spinepipe.studies.doubts import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, draw_hidden, make
 from tests.generators.phantom import phantom

@@ -14,9 +14,9 @@ from mistaken_cases import MISTAKES, XYZ
 from spinepipe import cohort as cohorts
 from spinepipe.anatomy.levels import spacing_mm
 from spinepipe.cli.program import main
-from spinepipe.cohort.doubts import doubts, refusals, suspicions
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
+from spinepipe.studies.doubts import doubts, refusals, suspicions
 from spinepipe.studies.free import unmeasured
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, make

@@ -8,8 +8,8 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
-from spinepipe.cohort.doubts import doubts, refusals
 from spinepipe.jobs.pool import JobFailed, Progress, submit_and_wait, warm_up
+from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import place_of
 
 

@@ -159,6 +159,7 @@ KIND = Kind(
         *_ANALYSES,
     ),
     forms=(FILMS, PATIENTS),
+    doubts="doubts:doubts",
     why_no_export="films show rotations in one plane, without loads and masses, which a file of "
     "OpenSim needs: take the personal laws from laws.parquet",
 )

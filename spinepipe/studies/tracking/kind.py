@@ -240,4 +240,5 @@ KIND = Kind(
     ),
     exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),
+    doubts="doubts:doubts",
 )

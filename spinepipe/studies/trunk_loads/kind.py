@@ -188,6 +188,7 @@ KIND = Kind(
         _AGAINST,
     ),
     forms=(SUBJECTS, TASK_FORM, *GEOMETRY_FORMS),
+    doubts="doubts:doubts",
     why_no_export="a task is solved for muscle forces in a given posture, and muscles are not "
     "written: the source package of the trunk is the model to take elsewhere",
 )
