@@ -6,8 +6,10 @@ from pathlib import Path
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.names import name_fault
 from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
+from spinepipe.muscles.regressions import PACKAGED
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
@@ -41,7 +43,7 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
         yield from _without_geometry(document, cohort)
         yield from _several_trunks(cohort)
     yield from muscle_problems(cohort)
-    yield from _regressions(study, cohort)
+    yield from _regressions(document, study, cohort)
 
 
 def check_source(
@@ -86,8 +88,15 @@ def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
             yield Problem(f"{cohort.name}/joints.csv", line, "specimen", found, allowed, remedy)
 
 
-def _regressions(study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
-    """Faults of a table of the user's own."""
+def _regressions(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
+    """Faults of a table of the user's own, which lies in the cohort's folder."""
+    name = study.regressions
+    if name not in PACKAGED and (name_fault(name) or not (cohort.folder / name).is_file()):
+        found = f"'{name}', which is no file of {cohort.name}"
+        remedy = "correct the name, or add the file to the cohort's folder"
+        allowed = f"{', '.join(PACKAGED)}, or a CSV file of the cohort"
+        yield Problem(*at(document, "regressions"), found, allowed, remedy)
+        return
     try:
         regressions_of(study, cohort.folder)
     except InputError as error:
