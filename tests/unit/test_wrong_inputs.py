@@ -5,11 +5,10 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
-import spoilt_cases
-from spoilt_cases import MOST_TOLD, Verdict, asked, look, verdict
 
 from spinepipe import problems
 from spinepipe.problems import InputError, Problem
+from tests.cases.spoilt_cases import MOST_TOLD, Seen, Verdict, asked, look, verdict
 from tests.generators.spoilt.case import Case, Expected
 from tests.generators.spoilt.catalogue import cases
 from tests.generators.spoilt.documented import columns, keys
@@ -75,9 +74,9 @@ def test_a_check_that_is_wrong_would_be_seen(stand_in: Verdict) -> None:
     """The judge itself: what a check that says nothing, breaks or points elsewhere would get."""
     case = case_of("nan", "/joints.csv")
     said = {
-        Verdict.ACCEPTED: spoilt_cases.Seen(0, "ok    study x: y"),
-        Verdict.STACK: spoilt_cases.Seen(-1, "Traceback"),
-        Verdict.ELSEWHERE: spoilt_cases.Seen(1, "      a/loads.csv, line 2: found x; allowed: y"),
+        Verdict.ACCEPTED: Seen(0, "ok    study x: y"),
+        Verdict.STACK: Seen(-1, "Traceback"),
+        Verdict.ELSEWHERE: Seen(1, "      a/loads.csv, line 2: found x; allowed: y"),
     }
     assert verdict(case, said[stand_in]) is stand_in
     fine = next(case for case in EVERY if case.expected is Expected.FINE)
