@@ -2,13 +2,13 @@
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from heapq import nsmallest
 from itertools import accumulate
 
-__all__ = ["InputError", "Problem", "Spelling", "closest", "did_you_mean", "one_of"]
+__all__ = ["InputError", "Problem", "Spelling", "closest", "did_you_mean", "first_of", "one_of"]
 
 LONGEST_FOUND = 160
 """Longer findings are cut: a message is read on a terminal."""
@@ -105,6 +105,25 @@ class InputError(Exception):
         count = len(self.problems)
         head = f"{count} problem{'' if count == 1 else 's'} in the input"
         return "\n".join([f"{head}:", *(f"  {problem}" for problem in self.problems)])
+
+
+MOST_MADE = 5000
+"""Faults that one check of one input tells apart; a file with more is none of this kind."""
+
+
+def first_of(found: Iterable[Problem]) -> Iterator[Problem]:
+    """The first `MOST_MADE` problems, the last of them told as one of more."""
+    before: Problem | None = None
+    for number, problem in enumerate(found):
+        if before is not None:
+            yield before
+        before = problem
+        if number == MOST_MADE:
+            remedy = f"{problem.remedy}; there are more than {MOST_MADE} faults: mend these first"
+            before = replace(problem, remedy=remedy)
+            break
+    if before is not None:
+        yield before
 
 
 MOST_THE_SAME = 3

@@ -108,11 +108,8 @@ def _checked(root: Path, name: str) -> tuple[Study, Cohort]:
     """
     try:
         return studies.check(root, name)
-    except InputError as error:
-        cohort = studies.misfitting_cohort(root, name)
-        if cohort is None:
-            raise
-        raise InputError([*refusals(cohort), *error.problems]) from error
+    except studies.Misfit as error:
+        raise InputError([*refusals(error.cohort), *error.problems]) from error
 
 
 def _cohort_task(root: Path, name: str) -> Task:

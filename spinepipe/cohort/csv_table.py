@@ -19,7 +19,7 @@ from spinepipe.documents.text import (
     longest_word,
     read_text,
 )
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import MOST_MADE, Problem, Spelling, first_of
 
 MOST_ROWS = 150_000
 
@@ -125,20 +125,22 @@ def _converted(
     cells: list[str], column: Column, rows: Rows, problems: list[Problem]
 ) -> "pd.Series":
     if column.required:
-        problems += [
+        problems += first_of(
             Problem(rows.file, line, column.name, "an empty cell", column.meaning, "fill it")
             for line, cell in zip(rows.lines, cells, strict=True)
             if not cell and line not in rows.ragged
-        ]
+        )
     if column.kind == "text":
         return _text_series(cells, rows.lines)
     numbers = [float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells]
+    wrong: list[Problem] = []
     for index, (number, cell) in enumerate(zip(numbers, cells, strict=True)):
         if cell and (fault := _number_fault(cell, number, column)):
-            allowed, remedy = fault
-            place = (rows.file, rows.lines[index], column.name)
-            problems.append(Problem(*place, f"'{cell}'", allowed, remedy))
             numbers[index] = nan
+            if len(wrong) <= MOST_MADE:
+                place = (rows.file, rows.lines[index], column.name)
+                wrong.append(Problem(*place, f"'{cell}'", *fault))
+    problems += first_of(wrong)
     return pd.Series(numbers, index=rows.lines, dtype="float64")
 
 
@@ -290,7 +292,8 @@ def _squared(
             problems.append(_ragged(file, line, len(row), width))
             ragged.add(line)
         cells.append((row + [""] * width)[:width])
-    return Rows(file, header, [line for line, _ in records], cells, frozenset(ragged)), problems
+    rows = Rows(file, header, [line for line, _ in records], cells, frozenset(ragged))
+    return rows, list(first_of(problems))
 
 
 def _ragged(file: str, line: int, found: int, width: int) -> Problem:

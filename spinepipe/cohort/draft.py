@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isnan
 from typing import Any
 
@@ -34,7 +35,7 @@ class Draft:
     absent: frozenset[str]
     forms: Mapping[str, TableForm] = field(default_factory=lambda: TABLES)
 
-    @property
+    @cached_property
     def specimens(self) -> tuple[str, ...]:
         """Specimens of ``specimens.csv`` in its order; empty when it cannot be read."""
         table = self.tables.get("specimens")

@@ -27,7 +27,7 @@ from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.documents.inside import outside
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import Document, read_yaml
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, Problem, first_of
 
 __all__ = ["read"]
 
@@ -148,13 +148,16 @@ def _without(draft: Draft, *stems: str) -> Draft:
 
 def _checks(draft: Draft) -> Iterator[Problem]:
     applied = list(applied_loads(draft))
-    yield from check_names(draft)
-    yield from check_keys(draft)
-    yield from check_geometry(draft)
-    yield from check_bodies(draft)
-    yield from check_loads(draft, applied)
-    yield from check_steps(draft, applied)
-    yield from check_motion(draft, applied)
+    for found in (
+        check_names(draft),
+        check_keys(draft),
+        check_geometry(draft),
+        check_bodies(draft),
+        check_loads(draft, applied),
+        check_steps(draft, applied),
+        check_motion(draft, applied),
+    ):
+        yield from first_of(found)
 
 
 def _missing(file: str) -> Problem:

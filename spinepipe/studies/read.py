@@ -3,6 +3,7 @@
 Whatever is wrong is told at once, with file, line, what was found, what is allowed and what to do.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -88,6 +89,19 @@ def _name_problems(document: Document, stem: str) -> list[Problem]:
     return [Problem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
 
 
+class Misfit(InputError):
+    """A sound study and a sound cohort that do not fit.
+
+    Attributes
+    ----------
+    cohort : the cohort, which may be what is wrong though each of its cells is sound.
+    """
+
+    def __init__(self, problems: Iterable[Problem], cohort: Cohort) -> None:
+        super().__init__(problems)
+        self.cohort = cohort
+
+
 def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Cohort]:
     """Read a study and its cohort and hold them against each other.
 
@@ -109,7 +123,10 @@ def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Co
     problems += faults
     if document and study and cohort:
         study = _settled(study, cohort)
-        problems += _misfits(document, study, cohort, root, starting and not problems)
+        sound = not problems
+        problems += _misfits(document, study, cohort, root, starting and sound)
+        if problems and sound:
+            raise Misfit(problems, cohort)
     if problems or study is None or cohort is None:
         raise InputError(problems)
     return study, cohort
@@ -162,12 +179,6 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         return cohorts.read(folder, _further(document)), []
     except InputError as error:
         return None, list(error.problems)
-
-
-def misfitting_cohort(root: Path, study_name: str) -> Cohort | None:
-    """The cohort of a study where both are sound by themselves, though they do not fit."""
-    document, study, problems = load(root / STUDIES / f"{study_name}.yaml", root)
-    return None if problems or study is None else _cohort(document, root)[0]
 
 
 def _further(document: Document) -> tuple[TableForm, ...]:

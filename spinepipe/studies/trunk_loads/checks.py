@@ -7,8 +7,10 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.inside import outside
+from spinepipe.documents.names import name_fault
 from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
+from spinepipe.muscles.regressions import PACKAGED
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
@@ -88,11 +90,17 @@ def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
 
 
 def _regressions(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
-    """Faults of a table of the user's own."""
+    """Faults of a table of the user's own, which lies in the cohort's folder."""
     name, folder = study.regressions, cohort.folder
     led_out = outside(folder / name, folder, at(document, "regressions"), name)
     if led_out is not None:
         yield led_out
+        return
+    if name not in PACKAGED and (name_fault(name) or not (folder / name).is_file()):
+        found = f"'{name}', which is no file of {cohort.name}"
+        remedy = "correct the name, or add the file to the cohort's folder"
+        allowed = f"{', '.join(PACKAGED)}, or a CSV file of the cohort"
+        yield Problem(*at(document, "regressions"), found, allowed, remedy)
         return
     try:
         regressions_of(study, cohort.folder)

@@ -100,9 +100,9 @@ def keys(name: str) -> tuple[Entry, ...]:
             default == "**required**",
             **_ends(allowed),
             choices=_choices(allowed),
-            nullable="or null" in words or default == "`null`",
+            nullable="or null" in words or default == "`null`" or "null:" in " ".join(meaning),
         )
-        for key, words, default, allowed, *_ in rows
+        for key, words, default, allowed, *meaning in rows
     )
 
 

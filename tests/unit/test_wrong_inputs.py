@@ -1,0 +1,118 @@
+"""Projects spoilt in one place each: a sample of what `make validate` tries (wrong_inputs)."""
+
+import random
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from spinepipe import problems
+from spinepipe.problems import InputError, Problem
+from tests.cases.spoilt_cases import MOST_TOLD, Seen, Verdict, asked, look, verdict
+from tests.generators.spoilt.case import Case, Expected
+from tests.generators.spoilt.catalogue import cases
+from tests.generators.spoilt.documented import columns, keys
+from tests.generators.spoilt.keys import yaml_files
+from tests.generators.spoilt.projects import projects, write
+
+EVERY = list(cases())
+
+SEED, EACH = 19, 1
+"""The sample has so many of each kind of mutation in each project."""
+
+
+def sample() -> list[Case]:
+    """Cases of every family and project; a pipe could hold a test up for good."""
+    groups: dict[tuple[str, str], list[Case]] = defaultdict(list)
+    for case in EVERY:
+        if case.what != "a pipe":
+            groups[case.family, case.project.name].append(case)
+    rng = random.Random(SEED)
+    return [case for group in groups.values() for case in rng.sample(group, min(EACH, len(group)))]
+
+
+@pytest.mark.parametrize("case", sample(), ids=lambda case: case.name)
+def test_what_is_wrong_is_told_at_its_place_and_what_is_not_passes(case: Case, tmp_path: Path):
+    seen = look(case.write(tmp_path / "project"), *asked(case))
+    assert verdict(case, seen) is Verdict.RIGHT, seen.printed
+
+
+@pytest.mark.parametrize("project", projects(), ids=lambda project: project.name)
+def test_what_is_spoilt_is_sound(project, tmp_path: Path) -> None:
+    seen = look(write(project.files, tmp_path))
+    assert (seen.code, seen.messages) == (0, []), seen.printed
+
+
+def test_cases_are_many_and_the_same_each_time() -> None:
+    again = [(case.name, case.expected) for case in cases()]
+    assert again == [(case.name, case.expected) for case in EVERY]
+    assert len(EVERY) > 1845 + 1000
+    assert {case.expected for case in EVERY} == set(Expected)
+    assert len({name for name, _ in again}) == len(again)
+
+
+def test_every_documented_key_and_every_column_that_is_there_is_spoilt() -> None:
+    spoilt = {(case.file, case.place) for case in EVERY}
+    for project in projects():
+        for file, form in yaml_files(project):
+            there = {place for name, place in spoilt if name == file}
+            assert {entry.name for entry in keys(form) if "[" not in entry.name} <= there
+        for stem in project.tables:
+            file = f"{project.folder}/{stem}.csv"
+            known = {entry.name for entry in columns(stem, project.kind)}
+            for column in known & set(project.table(stem)[0]):
+                assert (file, column) in spoilt
+
+
+def case_of(what: str, file: str) -> Case:
+    """The first case of a mutation of a file."""
+    return next(case for case in EVERY if case.what == what and case.file.endswith(file))
+
+
+@pytest.mark.parametrize("stand_in", [Verdict.ACCEPTED, Verdict.STACK, Verdict.ELSEWHERE])
+def test_a_check_that_is_wrong_would_be_seen(stand_in: Verdict) -> None:
+    """The judge itself: what a check that says nothing, breaks or points elsewhere would get."""
+    case = case_of("nan", "/joints.csv")
+    said = {
+        Verdict.ACCEPTED: Seen(0, "ok    study x: y"),
+        Verdict.STACK: Seen(-1, "Traceback"),
+        Verdict.ELSEWHERE: Seen(1, "      a/loads.csv, line 2: found x; allowed: y"),
+    }
+    assert verdict(case, said[stand_in]) is stand_in
+    fine = next(case for case in EVERY if case.expected is Expected.FINE)
+    assert verdict(fine, said[Verdict.ELSEWHERE]) is Verdict.REFUSED
+
+
+@pytest.mark.parametrize(
+    ("what", "file"),
+    [
+        ("10 000 unknown", "/small_rig.yaml"),
+        ("10 000 unknown", "config.yaml"),
+        ("10 000 unknown names", "/tasks.csv"),
+        ("10 000 unknown names", "/trials.csv"),
+        ("500 unknown names", "/subjects.csv"),
+    ],
+)
+def test_unknown_names_are_compared_a_few_times(what, file, tmp_path, monkeypatch) -> None:
+    compared = []
+    closest = problems.closest
+
+    def counted(name, known):
+        compared.append(name)
+        return closest(name, known)
+
+    monkeypatch.setattr(problems, "closest", counted)
+    case = case_of(what, file)
+    seen = look(case.write(tmp_path / "project"), *asked(case))
+    assert seen.code == 1
+    assert len(compared) <= 2 * problems.MOST_ALIKE * 10  # so many columns have names
+    assert len(seen.printed) < MOST_TOLD
+
+
+def test_problems_of_one_input_fit_on_a_few_pages() -> None:
+    wordy = [Problem(f"f{n}", n, f"c{n}", "x" * 150, "y" * 1400, "z" * 1400) for n in range(900)]
+    error = InputError(wordy)
+    assert len(str(error)) < problems.MOST_CHARACTERS + 5000
+    assert sum(1 + problem.others for problem in error.problems) == 900
+    one = InputError([Problem("f", 1, "c", "x", "y" * 10**6, "z")])
+    assert len(str(one)) < 5000
