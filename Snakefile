@@ -46,6 +46,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    tell_remade()
     tell_how_many_lost()
     tell_doubts()
     lift_rate_limit()
@@ -55,9 +56,11 @@ onstart:
 
 
 onsuccess:
+    tell_how_many_lost()
     sweep_logs()
     say_where()
 
 
 onerror:
+    tell_how_many_lost()
     sweep_logs()
