@@ -96,6 +96,21 @@ def test_of_many_damaged_files_five_are_named(done: Project) -> None:
     assert done.contents() == content
 
 
+def test_a_second_run_at_the_same_time_is_told(done: Project) -> None:
+    """By what the first one keeps while it runs: the files that it is about to make."""
+    locks = done.path(".snakemake/locks")
+    locks.mkdir(exist_ok=True)
+    (locks / "0.output.lock").write_text(f"{TABLES[0]}\n")
+    spoil(done, EMPTY, b"")
+    before = done.files()
+    ended = done.snakemake("-j2", *TABLES)
+    assert ended.returncode != 0
+    assert "cannot be locked" in ended.stdout
+    assert "--unlock" in ended.stdout
+    assert "Traceback" not in ended.stdout
+    assert done.files() == before
+
+
 def test_results_removed_in_mid_run_are_told_in_a_sentence(done: Project) -> None:
     content, snakefile = done.contents(), done.path("Snakefile")
     whole = snakefile.read_text()
