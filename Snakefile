@@ -47,6 +47,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    tell_remade()
     tell_how_many_lost()
     tell_doubts()
     lift_rate_limit()
@@ -56,10 +57,12 @@ onstart:
 
 
 onsuccess:
+    tell_how_many_lost()
     sweep_logs()
     say_where()
 
 
 onerror:
+    tell_how_many_lost()
     sweep_logs()
     tell_failed()

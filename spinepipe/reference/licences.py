@@ -110,14 +110,14 @@ def _of(name: str, version: str) -> Licence:
 
 def _told(found: Distribution) -> str:
     """The licence of a package by its own word; empty where it says nothing that is known."""
-    expression = found.metadata.get("License-Expression")
-    if expression:
-        return str(expression)
-    told = [one.split(" :: ")[-1] for one in found.metadata.get_all("Classifier") or ()]
+    about = found.metadata.json
+    if "license_expression" in about:
+        return str(about["license_expression"])
+    told = [one.split(" :: ")[-1] for one in about.get("classifier", ())]
     said = [one for one in told if "Licen" in one or one == "Public Domain"]
     if said:
         return " AND ".join(_BY_CLASSIFIER.get(one, one) for one in sorted(said))
-    word = str(found.metadata.get("License") or "").strip()
+    word = str(about.get("license", "")).strip()
     if word in ALLOWED:
         return word
     return next((of for text in _texts(found) for form, of in _BY_TEXT if form.search(text)), "")
@@ -127,4 +127,4 @@ def _texts(found: Distribution) -> Iterator[str]:
     """Texts of licences in the package's own folder of metadata."""
     for path in found.files or ():
         if re.match(r"(?i)licen[sc]e|copying", path.name) and ".dist-info" in str(path):
-            yield path.locate().read_text(encoding="utf-8", errors="replace")
+            yield Path(str(path.locate())).read_text(encoding="utf-8", errors="replace")

@@ -47,7 +47,6 @@ def test_damage_is_named_and_computed_again_by_the_same_run(done: Project) -> No
     flipped = bytearray(content[FLIPPED])
     flipped[len(flipped) // 3] ^= 0x10
     spoil(done, FLIPPED, bytes(flipped))
-    spoil(done, EMPTY, b"")
     spoil(done, CUT, content[CUT][:-100])
     spoil(done, BLOCK, content[BLOCK] + b"more")
     spoil(done, RANKED, content[RANKED].replace(b'"pose": ', b'"pose": 1'))
@@ -65,7 +64,7 @@ def test_damage_is_named_and_computed_again_by_the_same_run(done: Project) -> No
     assert planned.returncode == 0, planned.stdout
     assert (folder / dead).exists()  # a look changes nothing
     said = done.run(*TABLES)
-    for name in (FLIPPED, EMPTY, CUT, PICKLED, RANKED):  # the block is made again as its jobs are
+    for name in (FLIPPED, CUT, PICKLED, RANKED, BLOCK):
         assert said.count(f"results/{name} is damaged") == 1
     assert f"results/{LATE} is dated" in said
     assert "Traceback" not in said
@@ -95,6 +94,21 @@ def test_of_many_damaged_files_five_are_named(done: Project) -> None:
     assert said.count("is damaged, cut off, empty") == 5
     assert f"so do {len(jobs) - 5} more files" in said
     assert done.contents() == content
+
+
+def test_a_second_run_at_the_same_time_is_told(done: Project) -> None:
+    """By what the first one keeps while it runs: the files that it is about to make."""
+    locks = done.path(".snakemake/locks")
+    locks.mkdir(exist_ok=True)
+    (locks / "0.output.lock").write_text(f"{TABLES[0]}\n")
+    spoil(done, EMPTY, b"")
+    before = done.files()
+    ended = done.snakemake("-j2", *TABLES)
+    assert ended.returncode != 0
+    assert "cannot be locked" in ended.stdout
+    assert "--unlock" in ended.stdout
+    assert "Traceback" not in ended.stdout
+    assert done.files() == before
 
 
 def test_results_removed_in_mid_run_are_told_in_a_sentence(done: Project) -> None:

@@ -40,13 +40,20 @@ def tell_lost(path):
         )
 
 
+def tell_remade():
+    """Name also damaged files that are made again anyway, as what they are made of is."""
+    for job in workflow.dag.needrun_jobs():
+        if mark_of_rule(job) is not None:
+            for path in job.output:
+                mark_in(str(path))
+
+
 def tell_how_many_lost():
-    """Say how many such files are not named."""
-    if len(LOST) > MOST_NAMED:
-        print(
-            f"warn  so do {len(LOST) - MOST_NAMED} more files below results",
-            file=sys.stderr,
-        )
+    """Say how many such files are not named, each time those that have come since."""
+    more = len(LOST) - MOST_NAMED
+    if more > 0:
+        print(f"warn  so do {more} more files below results", file=sys.stderr)
+        del LOST[MOST_NAMED:]
 
 
 def params_changed(self, job, file=None):

@@ -237,6 +237,19 @@ def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:
         decoded(written(["data", name, "true"]))
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("spinepipe.tables.parquet:Table", "is called spinepipe.tables.schema:Table"),
+        ("spinepipe.files:re.RegexFlag", "cannot be kept as data"),
+    ],
+)
+def test_a_class_is_known_by_its_own_name_alone(name: str, words: str) -> None:
+    """Not by that of a file that imports it, which would open all that any file imports."""
+    with pytest.raises(ValueError, match=words):
+        decoded(written(["data", name, "true"]))
+
+
 def test_the_program_is_not_run_by_its_name() -> None:
     """To import `spinepipe.cli.__main__` would be to run it, and to exit."""
     with pytest.raises(ValueError, match="is not of spinepipe"):
