@@ -163,6 +163,42 @@ def test_curvatures_are_products_of_differences(force_cost: str) -> None:
     )
 
 
+@pytest.mark.numeric
+@pytest.mark.parametrize("held", [None, (False, True, False, True)])
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_a_step_is_that_of_the_whole_damped_matrix(
+    damping: float, held: tuple[bool, ...] | None
+) -> None:
+    """Marquardt's: every diagonal by so much larger; parameters that are held do not move."""
+    fitted = np.zeros((17, 6), dtype=bool)
+    fitted[3:5, 3] = True
+    ask = Ask(passive=law(), fitted=fitted)
+    seen = watched(spine(), markers(), trial_of(bent(4), markers()), 3)
+    rng, size = np.random.default_rng(6), seen.grid.coefficients * COUNT
+    coefficients = rng.normal(0.0, 0.01, (seen.grid.coefficients, 18, 6))
+    loose = np.ones(4, dtype=bool) if held is None else ~np.array(held)
+    given = None if held is None else np.array(held)
+    problem = Trajectory(ask, (seen,), given)
+    asked = problem.normal(_State((coefficients,), rng.normal(0.0, 0.2, 4)))
+    band, whole = asked.bands[0], np.zeros((size + 4, size + 4))
+    for below in range(min(size, len(band.lower))):
+        at = np.arange(size - below)
+        whole[at + below, at] = whole[at, at + below] = band.lower[below, : size - below]
+    whole[:size, size:], whole[size:, :size] = band.border, band.border.T
+    whole[size:, size:] = asked.square
+    whole += damping * np.diag(np.diag(whole))
+    whole[range(size), range(size)] += 1e-9 * band.lower[0].max()
+    moves = np.concatenate([np.ones(size, dtype=bool), loose])
+    expected = np.zeros(size + 4)
+    down = np.concatenate([band.slope, asked.slope])
+    expected[moves] = -np.linalg.solve(whole[np.ix_(moves, moves)], down[moves])
+    (step,), shared = problem.step(asked, damping)
+    # beside what nothing asks about, which is 1e9 times as soft
+    found = np.concatenate([step, shared])
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
+    assert not shared[~loose].any()
+
+
 def test_what_markers_show_is_found_when_nothing_else_costs() -> None:
     q = bent(9)
     seen = watched(spine(), everywhere(), trial_of(q, everywhere()), 8)
