@@ -39,7 +39,7 @@ def toned(person: Person, task: Task, how: How, gain: float, tone: float) -> Ton
 
 
 def least_stable(person: Person, task: Task, how: How, gain: float) -> Toned | None:
-    """The least tone that is stable, to a hundredth of it; None where none is or can be held.
+    """The least tone that is stable, to a sixtieth of it; None where none is or can be held.
 
     Raises
     ------

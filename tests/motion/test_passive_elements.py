@@ -175,6 +175,7 @@ def test_translations_of_a_cohort_are_read_in_mm() -> None:
         ({"a": -1.0}, 2, "a", "above 0"),
         ({"a": float("nan")}, 2, "a", "finite"),
         ({"lower": 1.2}, 2, "lower", "around 1"),
+        ({"upper": 0.9}, 2, "lower", "around 1"),
         ({"source": " "}, 2, "source", "where it comes from"),
         ({"a": 0.035, "b": 17.2}, 2, "b", "per degree"),
         ({"a": 2.5}, 2, "a", "same stiffness at rest"),

@@ -12,7 +12,8 @@ from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted_postures
 from spinepipe.motion.skeleton import MarkerSet, Trial
 from spinepipe.motion.spline import Grid
-from spinepipe.motion.trajectory import Trajectory, _State, solve
+from spinepipe.motion.terms import Loads, Markers, beyond
+from spinepipe.motion.trajectory import Trajectory, _State, law_of, solve
 from spinepipe.status import Status
 
 NODES = 6
@@ -104,6 +105,98 @@ def test_slopes_of_the_cost_are_differences(force_cost: str) -> None:
         apart = problem.costs(state.moved(still, step)).total
         apart -= problem.costs(state.moved(still, -step)).total
         assert asked.slope[k] == pytest.approx(apart / 4e-5, rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("force_cost", ["squared", "level_difference"])
+def test_curvatures_are_products_of_differences(force_cost: str) -> None:
+    """Gauss and Newton's: slopes of all residuals, by differences, times each other."""
+    fitted = np.zeros((17, 6), dtype=bool)
+    fitted[3:5, 3] = True
+    low, high = np.full((18, 6), -1e-3), np.full((18, 6), 1e-3)
+    ask = Ask(low=low, high=high, passive=law(), force_cost=force_cost, fitted=fitted)  # type: ignore[arg-type]
+    seen = watched(spine(), markers(), trial_of(bent(NODES + 1), markers()), NODES)
+    rng, nodes = np.random.default_rng(3), seen.grid.coefficients
+    state = _State((rng.normal(0.0, 0.01, (nodes, 18, 6)),), rng.normal(0.0, 0.2, 4))
+    problem = Trajectory(ask, (seen,))
+
+    def residuals(there: _State) -> np.ndarray:
+        """Everything that costs, each with its share."""
+        motion = seen.grid.at_nodes(there.coefficients[0])
+        parts = [
+            Markers(seen, ask).residuals(motion[0]),
+            Loads.of(seen, ask).residuals(law_of(ask, there.parameters), motion),
+            motion[2] / ([2.0] * 3 + [10.0] * 3),
+            beyond(ask, motion[0])[0],
+        ]
+        worth = np.sqrt(10.0 / (NODES + 1))  # all nodes together are ten frames
+        prior = there.parameters / [0.7, 0.7, 0.35, 0.35]
+        return np.concatenate([*(worth * part.ravel() for part in parts), prior])
+
+    assert problem.costs(state).total == pytest.approx(np.sum(residuals(state) ** 2))
+    first = np.array([0, 1, 5, 6 * 4 + 3, 6 * 5 + 3, 6 * 17 + 4])
+    columns = np.concatenate([2 * COUNT + first, 3 * COUNT + first[:3], 4 * COUNT + first[3:]])
+    slopes, none, small = [], np.zeros(4), 1e-6
+    for column in columns:
+        step = np.zeros(nodes * COUNT)
+        step[column] = small
+        there, back = (state.moved([sign * step], none) for sign in (1.0, -1.0))
+        slopes.append((residuals(there) - residuals(back)) / (2.0 * small))
+    for which in range(4):
+        step = small * np.eye(4)[which]
+        still = [np.zeros(nodes * COUNT)]
+        there, back = (state.moved(still, sign * step) for sign in (1.0, -1.0))
+        slopes.append((residuals(there) - residuals(back)) / (2.0 * small))
+    expected = np.array(slopes) @ np.array(slopes).T
+    asked = problem.normal(state)
+    band, count = asked.bands[0], len(columns)
+    found = np.zeros_like(expected)
+    for i, one in enumerate(columns):
+        for j, other in enumerate(columns):
+            found[i, j] = band.lower[abs(one - other), min(one, other)]
+    found[:count, count:] = band.border[columns]
+    found[count:, :count] = band.border[columns].T
+    found[count:, count:] = asked.square
+    # rows and columns of N, N m, m and rad: each beside its own size
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        found / np.outer(size, size), expected / np.outer(size, size), rtol=0.0, atol=1e-6
+    )
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("held", [None, (False, True, False, True)])
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_a_step_is_that_of_the_whole_damped_matrix(
+    damping: float, held: tuple[bool, ...] | None
+) -> None:
+    """Marquardt's: every diagonal by so much larger; parameters that are held do not move."""
+    fitted = np.zeros((17, 6), dtype=bool)
+    fitted[3:5, 3] = True
+    ask = Ask(passive=law(), fitted=fitted)
+    seen = watched(spine(), markers(), trial_of(bent(4), markers()), 3)
+    rng, size = np.random.default_rng(6), seen.grid.coefficients * COUNT
+    coefficients = rng.normal(0.0, 0.01, (seen.grid.coefficients, 18, 6))
+    loose = np.ones(4, dtype=bool) if held is None else ~np.array(held)
+    given = None if held is None else np.array(held)
+    problem = Trajectory(ask, (seen,), given)
+    asked = problem.normal(_State((coefficients,), rng.normal(0.0, 0.2, 4)))
+    band, whole = asked.bands[0], np.zeros((size + 4, size + 4))
+    for below in range(min(size, len(band.lower))):
+        at = np.arange(size - below)
+        whole[at + below, at] = whole[at, at + below] = band.lower[below, : size - below]
+    whole[:size, size:], whole[size:, :size] = band.border, band.border.T
+    whole[size:, size:] = asked.square
+    whole += damping * np.diag(np.diag(whole))
+    whole[range(size), range(size)] += 1e-9 * band.lower[0].max()
+    moves = np.concatenate([np.ones(size, dtype=bool), loose])
+    expected = np.zeros(size + 4)
+    down = np.concatenate([band.slope, asked.slope])
+    expected[moves] = -np.linalg.solve(whole[np.ix_(moves, moves)], down[moves])
+    (step,), shared = problem.step(asked, damping)
+    # beside what nothing asks about, which is 1e9 times as soft
+    found = np.concatenate([step, shared])
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
+    assert not shared[~loose].any()
 
 
 def test_what_markers_show_is_found_when_nothing_else_costs() -> None:

@@ -5,7 +5,7 @@ not name one. Those of the default options stand in docs/effects.md; the others 
 """
 
 from collections.abc import Iterator
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,27 @@ def test_translations_are_told_in_metres_and_rotations_in_radians(
     wrong = ("rad",) if options["coordinate"] in TRANSLATIONS else ("m", "N", "N/m", "1/m", "1/m^2")
     for one in create(name, options).parameters:
         assert one.unit.removeprefix("N m/") not in wrong
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "off", "side"),
+    [
+        (0.0, 2.0, 0.0, 1.0),
+        (0.5, 2.0, 0.0, 1.0),
+        (0.0, 1.0, 1.0, -1.0),
+        (0.0, 0.5, 1.0, -1.0),
+        (-1.0, 1.0, 0.0, 0.0),
+        (0.1, 9.0, 1.0, 0.0),
+        (0.0, 2.0, None, 0.0),
+    ],
+)
+def test_bounds_tell_to_which_side_of_off_a_strength_may_go(
+    low: float, high: float, off: float | None, side: float
+) -> None:
+    one = Parameter("strength", "1", low, high, high, 1.0, False, "made up", off=off)
+    assert one.side == side
+    assert one.in_a_file == high
+    assert replace(one, unsaid=low).in_a_file == low
 
 
 # Entered again: usual size and prior SD (of the logarithm where it is one), low, high
