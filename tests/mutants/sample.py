@@ -36,6 +36,9 @@ LEFT_OUT = ("figures", "__init__.py", "settings.py", "tables.py", "kind.py", "pa
 ANNOTATIONS = ("tfpdef", "annassign")
 """Parts of the grammar that Python does not compute with."""
 
+DECORATOR = "decorator"
+"""Nor with what stands in one: that data are frozen is asked of all files by test_house.py."""
+
 _ENDS_AT_ONCE = ("LShift", "RShift", "BitOr", "BitAnd", "BitXor")
 """Of floats these are errors, which any test sees: they would only make the share look good."""
 
@@ -111,10 +114,10 @@ def _every(area: str, path: Path) -> Iterator[tuple[tuple[str, int, int], Mutant
 
 
 def _is_annotation(node: NodeOrLeaf | None) -> bool:
-    """Whether a node stands in the type of an argument, a variable or what is returned."""
+    """Whether a node is in a decorator or the type of an argument, a variable, what is returned."""
     while node is not None and node.parent is not None:
         parent = node.parent
-        if parent.type in ANNOTATIONS:
+        if parent.type in (*ANNOTATIONS, DECORATOR):
             return True
         if parent.type == "funcdef" and getattr(parent, "annotation", None) is node:
             return True

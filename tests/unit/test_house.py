@@ -46,6 +46,9 @@ LARGEST_BYTES = 1_500_000
 LARGE_ON_PURPOSE: frozenset[str] = frozenset()
 """Tracked files that may be larger, as paths from the root."""
 
+CHANGING = ("progress.Progress", "studies.trunk_loads.tune.Volunteer", "motion.banded.Band")
+"""Dataclasses that are not frozen."""
+
 # Put together here, so that this file does not itself hold what it forbids.
 REGISTRY_HOSTS = re.compile(
     "|".join(
@@ -349,6 +352,26 @@ def test_only_one_module_decomposes(path: Path) -> None:
     """Others would fail on some processors: see `spinepipe.decomposition`."""
     if dotted(path) != f"{PACKAGE}.decomposition":
         assert decompositions(ast.parse(path.read_bytes())) == []
+
+
+def test_data_are_frozen() -> None:
+    """All dataclasses but those that are for being changed: progress, and what is filled once."""
+    changing = {f"{PACKAGE}.{name}" for name in CHANGING}
+    found = {
+        f"{dotted(path)}.{node.name}"
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_bytes()))
+        if isinstance(node, ast.ClassDef)
+        for by in node.decorator_list
+        if "dataclass" in ast.unparse(by) and "frozen=True" not in ast.unparse(by)
+    }
+    assert found == changing
+
+
+def test_no_test_passes_over_what_the_dev_lock_holds() -> None:
+    """A peer that is missing or broken must fail its tests: only data of others may be missing."""
+    skipped = re.compile("import" + r"orskip\(")
+    assert [one for one in matches(skipped) if one.startswith("tests/")] == []
 
 
 def test_no_tracked_file_names_a_package_registry() -> None:

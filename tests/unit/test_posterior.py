@@ -14,6 +14,7 @@ from spinepipe.calibrate.posterior import (
     TIPPED,
     Point,
     Target,
+    _mode,
     between,
     modes,
     noise_of,
@@ -221,3 +222,36 @@ def test_the_slope_of_a_density_in_other_coordinates_is_that_of_its_values(along
     y, step = np.array([0.7, along]), 1e-5
     slope = [energy(y + move)[1] - energy(y - move)[1] for move in step * np.eye(2)]
     np.testing.assert_allclose(energy(y)[0], np.array(slope) / (2.0 * step), rtol=1e-6, atol=1e-6)
+
+
+def made_point(energy: float) -> Point:
+    nothing = np.zeros((2, 2))
+    return Point(np.zeros(2), np.zeros(2), energy, np.zeros(2), nothing, None)  # type: ignore[arg-type]
+
+
+def test_the_evidence_of_a_mode_is_that_of_the_normal_with_its_curvature() -> None:
+    curved = np.array([[4.0, 1.0], [1.0, 9.0]])
+    mode = _mode(made_point(2.5), "", curved)
+    np.testing.assert_allclose(mode.covariance, np.linalg.inv(curved), rtol=1e-12)
+    np.testing.assert_allclose(mode.root @ mode.root.T, mode.covariance, rtol=1e-12)
+    # exp(-2.5) times the integral of exp(-z'Cz/2), over (2 pi)^(m/2)
+    assert mode.log_evidence == pytest.approx(-2.5 - 0.5 * np.log(np.linalg.det(curved)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("point", "curved"),
+    [
+        (None, None),
+        (made_point(0.0), None),
+        (made_point(0.0), np.diag([1.0, -1.0])),
+        (made_point(0.0), np.diag([1.0, 0.0])),
+    ],
+    ids=["nowhere", "beside an edge", "saddle", "flat"],
+)
+def test_what_is_no_mode_has_no_evidence_and_says_why(
+    point: Point | None, curved: Array | None
+) -> None:
+    mode = _mode(point, "nowhere", curved)
+    assert mode.point is None
+    assert mode.log_evidence == -np.inf
+    assert mode.message

@@ -16,6 +16,7 @@ from held_out_cases import (
     read,
     serial,
 )
+from scipy.spatial.transform import Rotation
 
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
@@ -165,6 +166,23 @@ def test_a_load_gain_found_in_one_test_says_nothing_of_another(shown: float, siz
     left_open = JOINTS * motion @ precision @ motion
     row = result.folds[0]
     assert row.expected - row.readings == pytest.approx(left_open, rel=0.05)
+
+
+@pytest.mark.parametrize("refit", [False, True])
+def test_a_tilt_that_the_training_shows_is_foreseen_in_the_unseen_test(refit: bool) -> None:
+    """Read about axes turned by 3 degrees, extension shows bending, and so will flexion."""
+    readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
+    turn = Rotation.from_rotvec([0.0, 0.0, np.deg2rad(3.0)]).as_matrix()
+    tests = []
+    for test in readings[0].tests:
+        parts = test.cycles[..., :3], test.cycles[..., 3:] @ turn.T
+        tests.append(replace(test, cycles=np.concatenate(parts, axis=-1)))
+    readings = (replace(readings[0], tests=tuple(tests)),)
+    for prior, foreseen in ((0.0, False), (np.deg2rad(3.0), True)):
+        there = grounds(readings, replace(NONE, registration=prior))
+        row = held_out(found(there, False), Asked(refit=refit), at_once).folds[0]
+        assert row.base is not None
+        assert (row.base.rms < 1.3) is foreseen
 
 
 def test_a_fold_without_a_fit_says_why() -> None:

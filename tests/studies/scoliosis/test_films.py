@@ -156,6 +156,28 @@ def test_curves_lie_between_the_vertebrae_tilted_farthest() -> None:
     assert 1 <= lumbar.apex <= 4
 
 
+@pytest.mark.parametrize(
+    ("bulges", "apex"),
+    [
+        (("L3", "T12", "T7"), "L3"),  # the lowest of two low ones
+        (("L3", "T7"), "L3"),
+        (("T11", "T5"), "T11"),
+        (("T8", "T4"), "T8"),  # none is low: the lowest
+    ],
+)
+def test_the_lumbar_apex_is_that_of_the_lowest_curve(bulges: tuple[str, ...], apex: str) -> None:
+    """A zigzag of lines, one vertebra tilted to neither side where it turns."""
+    corners, sides = [LEVELS.index(name) for name in bulges], 12.0 * np.array([1.0, -1.0] * 2)
+    tilt = np.zeros(len(LEVELS))
+    for number, start in enumerate([0, *(at + 1 for at in corners)]):
+        tilt[start:] = sides[number]
+    tilt[corners] = 0.0
+    right = np.concatenate([[0.0], np.cumsum(np.sin(np.deg2rad(tilt)))[:-1]])
+    film = Film(0.03 * right, 0.03 * np.arange(len(LEVELS)), np.deg2rad(tilt))
+    found = lumbar_apex(film, LEVELS)
+    assert found - LEVELS.index(apex) in (0, 1)  # between both the line is upright
+
+
 def test_ferguson_s_angle_is_smaller_than_cobb_s_by_the_known_ratio() -> None:
     """Stokes 1993: Cobb over Ferguson 1.35; a circular arc has 2."""
     film = s_shaped()
