@@ -53,16 +53,22 @@ def noted(locks: Path) -> Iterator[None]:
 
 
 def take_off(locks: Path) -> list[int]:
-    """Remove the lock of runs that are no more; their process numbers.
+    """Remove the lock of runs that are no more; their process numbers."""
+    dead = abandoned(locks)
+    if dead:
+        shutil.rmtree(locks)
+    return dead
 
-    It stays if any run may still live: one that holds its note, one on another machine, and one
-    that left no note, as jobs that it submitted may run on.
+
+def abandoned(locks: Path) -> list[int]:
+    """Process numbers of the runs that left this lock; none if any of them may still live.
+
+    That is one that holds its note, one on another machine, and one that left no note, as jobs
+    that it submitted may run on.
     """
     notes = [found for path in _files(locks) if (found := _NOTE.fullmatch(path.name))]
-    if not notes or not all(_is_over(locks, note) for note in notes):
-        return []
-    shutil.rmtree(locks)
-    return [int(note[1]) for note in notes]
+    over = all(_is_over(locks, note) for note in notes)
+    return [int(note[1]) for note in notes] if over else []
 
 
 def _files(locks: Path) -> list[Path]:
@@ -73,8 +79,8 @@ def _is_over(locks: Path, note: re.Match[str]) -> bool:
     if note[2] != _HOST:
         return False
     try:
-        with (locks / note[0]).open("a") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with (locks / note[0]).open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except OSError:
         return False
     return True

@@ -76,6 +76,7 @@ def test_a_killed_run_goes_on_where_it_was(done: Project) -> None:
     assert all(ended(pid, start) for pid, start in workers)
     cut_off = {path.name for path in done.path(".snakemake/incomplete").rglob("*")}
     before = done.files()
+    assert "cannot be locked" not in done.snakemake("-n", *TABLES).stdout
     left = done.run(*TABLES)
     assert left.count("was killed: its lock is taken off") == 1
     again = {name for name, at in done.files().items() if before.get(name, at) != at}

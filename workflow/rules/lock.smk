@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 
 from snakemake.persistence import PersistenceBase
 
-from spinepipe.jobs.run_lock import noted, one_at_a_time, take_off
+from spinepipe.jobs.run_lock import abandoned, noted, one_at_a_time, take_off
 
 
 @contextmanager
@@ -34,7 +34,13 @@ def lock_for_the_living():
     found = list(inspect.signature(PersistenceBase.lock).parameters)
     assert found == ["self"], "see decision 0038"
     PersistenceBase.lock = lock_of_the_living
+    PersistenceBase.locked = property(locked_by_the_living)
 
 
-lock_of_snakemake = PersistenceBase.lock
+def locked_by_the_living(self):
+    """Whether files of this run are locked; a run with -n asks this alone."""
+    return not abandoned(self.path / "locks") and locked_of_snakemake.fget(self)
+
+
+lock_of_snakemake, locked_of_snakemake = PersistenceBase.lock, PersistenceBase.locked
 lock_for_the_living()

@@ -63,10 +63,11 @@ class Disturbed:
             if run.process.poll() is not None:
                 assert run.process.returncode == 0, run.words()
                 return False
+            at_work = incomplete(self.project)
             family = self._kill(run, way)
         self.told["processes left"] += not ended(family)
         self.told[way] += 1
-        self._look()
+        self._look(at_work)
         return True
 
     def _wait(self, run: Started, before: set[str], more: int, delay: float) -> None:
@@ -93,9 +94,13 @@ class Disturbed:
                 return family
         return run.kill_all()
 
-    def _look(self) -> None:
-        """What was finished before is still there and was not made again."""
-        now, at_work = seen(self.project), incomplete(self.project)
+    def _look(self, at_work: set[str]) -> None:
+        """What was finished before is still there and was not made again.
+
+        Files of jobs that were at work do not count as finished, though some may be there: a job
+        that writes several files writes one after the other.
+        """
+        now, at_work = seen(self.project), at_work | incomplete(self.project)
         self._count_twice(now)
         self.finished |= {
             name: stamp
