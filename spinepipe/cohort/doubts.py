@@ -129,7 +129,9 @@ def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
     problems = [*_sizes(cohort, told), *_signs(cohort, told)]
     turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
-    problems += _against_names(cohort, turned | order.places)
+    named = _against_names(cohort, turned | order.places)
+    spoilt = {one.problem.column for one in readings}
+    problems += [one for one in named if one.column not in spoilt]
     known = (*order.doubts, *(Doubt(problem, "motion") for problem in problems))
     found = (
         *geometry,

@@ -113,7 +113,7 @@ def _size(cohort: Cohort, films: list[Film], as_corners: bool) -> _Fault | None:
     remedy = (
         "look at the unit of lengths"
         if unit is None
-        else f"suspected: {UNITS[unit]} and not mm; multiply {names} by {unit:.3g}"
+        else f"suspected: {UNITS[unit]} and not mm; multiply {names} by {round(unit, 4):g}"
     )
     found = f"vertebrae {size:.1g} times as far apart as in a spine"
     allowed = f"1/{SIZE_SPREAD:g} to {SIZE_SPREAD:g} times the mean of the level"
