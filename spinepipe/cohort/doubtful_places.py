@@ -330,7 +330,8 @@ def _units(stem: str, points: Array) -> Iterator[_Try]:
     names = COLUMNS[stem]
     for factor, words in UNITS.items():
         what = words.replace("lengths", "points")
-        told = f"{what} and not mm ({1.0 / factor:.3g}); multiply {', '.join(names)} by {round(factor, 4):g}"
+        todo = f"multiply {', '.join(names)} by {round(factor, 4):g}"
+        told = f"{what} and not mm ({1.0 / factor:.3g}); {todo}"
         yield NEARER, told, names[0], stem == "bodies", factor * points
 
 
