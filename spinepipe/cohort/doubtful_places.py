@@ -71,6 +71,9 @@ COLUMNS = {
     "landmarks": ("x_mm", "y_mm", "z_mm"),
 }
 
+_Behind = tuple[str, str, bool, Array]
+"""Words, column, whether certain, and the points as they would be without the mistake."""
+
 _Told = dict[tuple[str, str, bool], list[tuple[int, str, float]]]
 
 
@@ -189,7 +192,7 @@ def _of_another_size(cohort: Cohort, unit: float | None, found: Mapping[str, flo
         "look at the unit of lengths"
         if unit is None
         else f"suspected: {UNITS[unit]} and not mm ({1.0 / unit:.3g}); multiply "
-        f"{', '.join(COLUMNS['landmarks'])} by {unit:.3g}"
+        f"{', '.join(COLUMNS['landmarks'])} by {round(unit, 4):g}"
     )
     stem = _stem(cohort)
     rows = np.flatnonzero(getattr(cohort, stem)["specimen"] == next(iter(found)))
@@ -233,12 +236,14 @@ def _points(cohort: Cohort, poses: Sequence[NeutralPose], stem: str) -> Iterator
             points = table[list(COLUMNS[stem])].to_numpy(float)[rows]
             near = np.array([pose.near(name) for name in table["vertebra"].iloc[rows]])
             other = _at_another(pose, points, near) if "fx_n" in table else None
-            if other is not None:
+            behind = _behind(stem, table.iloc[rows], points, near)
+            grown = behind is not None and np.linalg.norm(behind[3]) > 2.0 * np.linalg.norm(points)
+            if other is not None and not grown:  # small ones are at a low vertebra in cm too
                 away = float(np.linalg.norm(points - near, axis=1).max())
                 words = f"suspected: the wrong vertebra; the points lie at {other}"
                 told[words, "vertebra", False].append((int(rows[0]), pose.specimen, away))
                 continue
-            for suspect in _suspects(stem, table.iloc[rows], points, near):
+            for suspect in _suspects(stem, table.iloc[rows], points, near, behind):
                 key = (suspect.words, suspect.column, suspect.certain)
                 told[key].append((int(rows[suspect.row]), pose.specimen, suspect.away_mm))
     for (words, column, certain), found in told.items():
@@ -256,10 +261,11 @@ class _Suspect:
     away_mm: float
 
 
-def _suspects(stem: str, table: Any, points: Array, near: Array) -> Iterator[_Suspect]:
+def _suspects(
+    stem: str, table: Any, points: Array, near: Array, behind: _Behind | None
+) -> Iterator[_Suspect]:
     """Rows of a specimen whose points are elsewhere."""
     away = np.linalg.norm(points - near, axis=1)
-    behind = _behind(stem, table, points, near)
     if behind is not None:
         words, column, certain, moved = behind
         nearer = np.linalg.norm(moved - near, axis=1) < away
@@ -297,9 +303,7 @@ def _exchanged_names(table: Any, points: Array, near: Array) -> Iterator[int]:
             yield from np.flatnonzero(np.isin(names, [levels[at] for at in pair])).tolist()
 
 
-def _behind(
-    stem: str, table: Any, points: Array, near: Array
-) -> tuple[str, str, bool, Array] | None:
+def _behind(stem: str, table: Any, points: Array, near: Array) -> _Behind | None:
     """What brings the points of a specimen near their vertebrae: a unit or exchanged columns."""
     here = _distance(points, near)
     if here <= (NEAR_MM if len(points) == 1 or "fx_n" in table else NEAR_MM / 2.0):
@@ -326,9 +330,8 @@ def _units(stem: str, points: Array) -> Iterator[_Try]:
     names = COLUMNS[stem]
     for factor, words in UNITS.items():
         what = words.replace("lengths", "points")
-        told = (
-            f"{what} and not mm ({1.0 / factor:.3g}); multiply {', '.join(names)} by {factor:.3g}"
-        )
+        todo = f"multiply {', '.join(names)} by {round(factor, 4):g}"
+        told = f"{what} and not mm ({1.0 / factor:.3g}); {todo}"
         yield NEARER, told, names[0], stem == "bodies", factor * points
 
 

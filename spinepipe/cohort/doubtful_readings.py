@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.cohort.doubt import Doubt, Group
@@ -69,10 +70,11 @@ def doubtful_readings(cohort: Cohort) -> Iterator[Doubt]:
         return
     yield from _unloaded(cohort)
     yield from _unmoved(cohort)
-    yield from _constant(cohort)
+    constant = list(_constant(cohort))
+    yield from constant
     yield from _never(cohort)
     yield from _absurd(cohort)
-    yield from _step_0(cohort)
+    yield from () if constant else _step_0(cohort)
 
 
 def doubtful_sizes_of_readings(cohort: Cohort) -> Iterator[Doubt]:
@@ -239,24 +241,31 @@ def _constant(cohort: Cohort) -> Iterator[Doubt]:
     motion = cohort.motion
     assert motion is not None
     for column in COORDINATE_COLUMNS:
-        for specimen, values in motion.groupby("specimen", sort=False)[column]:
-            read = values.dropna()
-            sd = cohort.measurement_sd
-            error = (
-                np.inf
-                if sd is None
-                else sd.rotation_deg
-                if column.endswith("_deg")
-                else sd.translation_mm
-            )
-            few = len(read) >= 2 and abs(read.iloc[0]) > SURE_SDS * error
-            if (len(read) > 3 or few) and read.nunique() == 1 and read.iloc[0] != 0.0:
-                line = first_line(cohort, "motion", int(read.index[0]))
-                place = (file_of(cohort, "motion"), line, column)
-                found = f"{read.iloc[0]:.4g} in all {len(read)} readings of {specimen}"
-                remedy = "look for a column filled down, or take it out"
-                problem = Problem(*place, found, "readings that follow the loads", remedy)
-                yield Doubt(problem, "motion")
+        told = {
+            str(specimen): values.dropna()
+            for specimen, values in motion.groupby("specimen", sort=False)[column]
+            if _is_constant(cohort, column, values.dropna())
+        }
+        if told:
+            read = next(iter(told.values()))
+            line = first_line(cohort, "motion", int(read.index[0]))
+            whose = of_specimens(told, cohort.specimen_names)
+            found = f"{read.iloc[0]:.4g} in all {len(read)} readings of {whose}"
+            place = (file_of(cohort, "motion"), line, column)
+            remedy = "look for a column filled down, or take it out"
+            problem = Problem(*place, found, "readings that follow the loads", remedy)
+            yield Doubt(problem, "motion")
+
+
+def _is_constant(cohort: Cohort, column: str, read: pd.Series) -> bool:
+    """One number in more than three readings, or in fewer where they err by far less."""
+    if len(read) < 2 or read.nunique() != 1 or read.iloc[0] == 0.0:
+        return False
+    sd = cohort.measurement_sd
+    if len(read) > 3 or sd is None:
+        return len(read) > 3
+    error = sd.rotation_deg if column.endswith("_deg") else sd.translation_mm
+    return bool(abs(read.iloc[0]) > SURE_SDS * error)
 
 
 def _never(cohort: Cohort) -> Iterator[Doubt]:

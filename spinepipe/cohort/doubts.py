@@ -125,20 +125,43 @@ def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     rigs = (*doubtful_rigs(cohort), *doubtful_persons(cohort))
     cycles = tuple(_trusted(cohort, geometry, (*readings, *rigs)))
     order = doubtful_order(cohort, cycles)
-    told = [one for one in _told(cohort, cycles) if one.place[:2] not in order.places]
-    told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
-    problems = [*_sizes(cohort, told), *_signs(cohort, told)]
-    turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
-    problems += _against_names(cohort, turned | order.places)
-    known = (*order.doubts, *(Doubt(problem, "motion") for problem in problems))
+    answers = tuple(_answers(cohort, cycles, order.places, readings))
+    explained = order.doubts or answers
     found = (
         *geometry,
         *rigs,
         *(one for one in readings if not (order.doubts and one.group == "zeroing")),
-        *known,
-        *(() if known or geometry else doubtful_sizes_of_readings(cohort)),
+        *order.doubts,
+        *answers,
+        *(() if explained or geometry else doubtful_sizes_of_readings(cohort)),
     )
     return tuple(dict.fromkeys(found))
+
+
+def _answers(
+    cohort: Cohort,
+    cycles: Sequence[LoadedCycle],
+    explained: Container[tuple[str, str]],
+    readings: Sequence[Doubt],
+) -> Iterator[Doubt]:
+    """Units and signs of motion against its loads, where nothing else is behind them.
+
+    Parameters
+    ----------
+    explained : specimens and tests that follow their loads in another order. readings : doubts
+        about columns of motion.
+    """
+    told = [one for one in _told(cohort, cycles) if one.place[:2] not in explained]
+    told = [one for one in told if not _spoilt(cohort, one.place[2], readings)]
+    turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
+    spoilt = {one.problem.column for one in readings}
+    named = [
+        (place, one)
+        for place, one in _against_names(cohort)
+        if place not in turned and place not in explained and one.column not in spoilt
+    ]
+    problems = (*_sizes(cohort, told), *_signs(cohort, told), *(one for _, one in named))
+    yield from (Doubt(problem, "motion") for problem in problems)
 
 
 def _geometry(cohort: Cohort) -> Iterator[Doubt]:
@@ -282,24 +305,24 @@ def _signs(cohort: Cohort, told: Sequence[_Told]) -> Iterator[Problem]:
         yield _sign(cohort, test, coordinate, named, specimens)
 
 
-def _against_names(cohort: Cohort, judged: Container[tuple[str, str]]) -> Iterator[Problem]:
-    """Tests that turn all joints to the other side than their names say, where no load tells it."""
+def _against_names(cohort: Cohort) -> Iterator[tuple[tuple[str, str], Problem]]:
+    """Specimens and tests that turn all joints to the other side than the test's name says."""
     if cohort.motion is None:
         return
     for (specimen, test), rows in cohort.motion.groupby(["specimen", "test"], sort=False):
-        words = set(re.split(r"[^a-z]+", str(test).lower()))
-        if (str(specimen), str(test)) in judged:
-            continue
+        place = str(specimen), str(test)
+        words = set(re.split(r"[^a-z]+", place[1].lower()))
         for way, column, sign in WAYS:
             read = rows[column].dropna()
             turned = read[read != 0.0] * sign
             other = set().union(*(OTHER_SIDE[word] for word in way))
             if way <= words and not words & other and len(turned) and (turned < 0.0).all():
-                line = first_row(cohort, "motion", str(specimen), str(test), column)
+                line = first_row(cohort, "motion", *place, column)
                 found = f"{column} of the other sign in all readings of {specimen}, test {test}"
                 allowed = "flexion and left bending negative, extension and left rotation positive"
                 remedy = f"suspected: the sign of {column}, or the name of the test"
-                yield Problem(file_of(cohort, "motion"), line, column, found, allowed, remedy)
+                told = (file_of(cohort, "motion"), line, column)
+                yield place, Problem(*told, found, allowed, remedy)
 
 
 def _is_against(cohort: Cohort, one: _Told) -> bool:

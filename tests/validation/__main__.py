@@ -18,6 +18,7 @@ from tests.validation import (
     findings,
     index_coverage,
     large_files,
+    plausibility,
     pooled_coverage,
     posterior_coverage,
     tracking,
@@ -42,6 +43,7 @@ def main() -> None:
         "findings": _findings,
         "index_coverage": _index_coverage,
         "large_files": _large_files,
+        "plausibility": _plausibility,
         "pooled_coverage": _pooled_coverage,
         "posterior_coverage": _posterior_coverage,
         "sparse": _sparse,
@@ -186,6 +188,22 @@ def _film_ratios() -> None:
         "half widths are of natural logarithms."
     )
     _write("film_ratios", head, found)
+
+
+def _plausibility() -> None:
+    found = plausibility.every()
+    head = (
+        "Mistakes put into sound cohorts, and what `spinepipe check` says: told at all in the "
+        "right file; with a column that is wrong; with what mends it; and with no line that says "
+        "anything else. known cohorts: those that come along, and real spines where they are at "
+        "hand; fresh: made up from seeds that nobody looked at while rules were written. known "
+        "kinds: those that the rules were written for; fresh: written down before rules were "
+        "changed for them (docs/decisions/0039 has the score of the first run); last: written "
+        "down afterwards, and no rule was changed for them."
+    )
+    _write("plausibility", head, plausibility.table(found))
+    by_kind = plausibility.by_kind(found)
+    _write("plausibility_by_kind", "The same, mistake by mistake.", by_kind)
 
 
 def _index_coverage() -> None:

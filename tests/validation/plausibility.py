@@ -50,3 +50,11 @@ def table(rows: pd.DataFrame) -> pd.DataFrame:
     found = groups[list(SHARES)].sum()
     found.insert(0, "mistakes", groups.size())
     return found.reset_index()
+
+
+def by_kind(rows: pd.DataFrame) -> pd.DataFrame:
+    """The same for each kind of mistake."""
+    groups = rows.groupby(["kinds", "mistake"], sort=False)
+    found = groups[list(SHARES)].sum()
+    found.insert(0, "cohorts", groups.size())
+    return found.reset_index()

@@ -113,9 +113,9 @@ def _size(cohort: Cohort, films: list[Film], as_corners: bool) -> _Fault | None:
     remedy = (
         "look at the unit of lengths"
         if unit is None
-        else f"suspected: {UNITS[unit]} and not mm; multiply {names} by {unit:.3g}"
+        else f"suspected: {UNITS[unit]} and not mm; multiply {names} by {round(unit, 4):g}"
     )
-    found = f"vertebrae {size:.3g} times as far apart as in a spine"
+    found = f"vertebrae {size:.1g} times as far apart as in a spine"
     allowed = f"1/{SIZE_SPREAD:g} to {SIZE_SPREAD:g} times the mean of the level"
     return column, found, allowed, remedy, "lengths", unit is not None
 
