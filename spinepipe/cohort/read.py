@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -105,11 +106,30 @@ def _read_tables(
         problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
     for stem, form in forms.items():
         if stem not in absent:
-            table, faults = read_table(folder / form.file, form, f"{name}/{form.file}")
+            path = folder / form.file
+            table, faults = _table(path, form, f"{name}/{form.file}", _state(path))
             problems += faults
             if table is not None:
                 tables[stem] = table
     return tables, frozenset(absent)
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """What changes with a file, even if only a digit of it does."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ()
+    return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _table(
+    path: Path, form: TableForm, file: str, state: tuple[int, ...]
+) -> tuple[pd.DataFrame | None, tuple[Problem, ...]]:
+    """A table as it was read when the file was in this state: `check` asks for it again."""
+    table, problems = read_table(path, form, file)
+    return table, tuple(problems)
 
 
 def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:
