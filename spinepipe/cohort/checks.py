@@ -299,7 +299,8 @@ def check_names(draft: Draft) -> Iterator[Problem]:
                 wildcard = ("*",) if (stem, column) in FOR_ALL else ()
                 yield from _unknown(draft, stem, column, (*names, *wildcard))
         for one in form.columns:
-            if one.name in form.keys and one.kind == "text" and one.name not in known:
+            is_name = one.names or (one.name in form.keys and one.kind == "text")
+            if is_name and one.name not in known:
                 yield from _unfit(draft, stem, one.name)
 
 

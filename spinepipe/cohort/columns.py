@@ -31,6 +31,7 @@ class Column:
     required : the column must be there and no cell of it may be empty.
     low, high : range of a number.
     open_low, open_high : whether the limit itself is outside the range.
+    names : whether texts are names, though they are no key: of groups, say.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Column:
     high: float = inf
     open_low: bool = False
     open_high: bool = False
+    names: bool = False
 
     @property
     def range_text(self) -> str:

@@ -269,11 +269,11 @@ def _is_constant(cohort: Cohort, column: str, read: pd.Series) -> bool:
 
 
 def _never(cohort: Cohort) -> Iterator[Doubt]:
-    """Columns of motion that are zero in every row, beside others that are not."""
+    """Rotations that are zero in every row, beside motion that is not."""
     motion = cohort.motion
     assert motion is not None
     moved = [c for c in COORDINATE_COLUMNS if motion[c].fillna(0.0).ne(0.0).any()]
-    for column in COORDINATE_COLUMNS if moved else ():
+    for column in COORDINATE_COLUMNS[3:] if moved else ():
         read = motion[column].dropna()
         if len(read) and column not in moved and (motion.loc[read.index, "step"] > 0).any():
             line = first_line(cohort, "motion", int(read.index[0]))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -121,7 +122,25 @@ def _read_one(
 ) -> tuple[pd.DataFrame | None, Sequence[Problem]]:
     """A table of the folder; a link that leads out of it is not followed."""
     led_out = outside(path, path.parent, (file, None, None), form.file)
-    return read_table(path, form, file) if led_out is None else (None, [led_out])
+    return _table(path, form, file, _state(path)) if led_out is None else (None, [led_out])
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """What changes with a file, even if only a digit of it does."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ()
+    return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _table(
+    path: Path, form: TableForm, file: str, state: tuple[int, ...]
+) -> tuple[pd.DataFrame | None, tuple[Problem, ...]]:
+    """A table as it was read when the file was in this state: `check` asks for it again."""
+    table, problems = read_table(path, form, file)
+    return table, tuple(problems)
 
 
 def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:

@@ -139,7 +139,7 @@ GEOMETRY_CASES = [
     Case("sides exchanged", both(cell(LANDMARKS, 4, "z_mm", "15"), cell(LANDMARKS, 5, "z_mm", "-15"), cell(LANDMARKS, 8, "z_mm", "15"), cell(LANDMARKS, 9, "z_mm", "-15")), LANDMARKS, 6, None, "exchanged", 1),
     Case("metres", text(LANDMARKS, metres(landmarks())), LANDMARKS, 6, None, "0.01 mm apart", 4),
     Case("far away", cell(LANDMARKS, 11, "x_mm", "1100"), LANDMARKS, 10, None, "0.1 mm to 1000 mm"),
-    Case("no pose", both(without(LANDMARKS), text(JOINTS, joints().replace("b,L2L3,0,41,0,4,0,0\n", ""))), LANDMARKS, None, None, "L2L3 of specimen 'b'"),
+    Case("no pose", both(without(LANDMARKS), text(JOINTS, joints().replace("b,L2L3,0,41,0,4,0,0\n", ""))), JOINTS, None, "joint", "L2L3 of specimen 'b'"),
     Case("joint turned over", both(text(JOINTS, joints()), cell(JOINTS, 2, "extension_deg", "93")), JOINTS, 2, "extension_deg", "below 90"),
     Case("origins coincide", both(text(JOINTS, joints()), cell(JOINTS, 3, "y_mm", "5")), JOINTS, 3, "x_mm", "origins of L3L4 and L2L3"),
 ]

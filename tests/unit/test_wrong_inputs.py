@@ -32,7 +32,7 @@ def sample() -> list[Case]:
 
 
 @pytest.mark.parametrize("case", sample(), ids=lambda case: case.name)
-def test_what_is_wrong_is_told_at_its_place_and_what_is_not_passes(case: Case, tmp_path: Path):
+def test_what_is_wrong_is_told_and_what_is_not_passes(case: Case, tmp_path: Path) -> None:
     seen = look(case.write(tmp_path / "project"), *asked(case))
     assert verdict(case, seen) is Verdict.RIGHT, seen.printed
 

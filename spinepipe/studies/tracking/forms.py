@@ -73,7 +73,7 @@ MARKER_SET = TableForm(
         _VERTEBRA,
         *_point("place in the body's frame"),
         Column("weight", "of its error squared; empty: 1", low=0, high=LARGEST_WEIGHT),
-        Column("cluster", "rigid cluster that it belongs to; empty: none", "text"),
+        Column("cluster", "rigid cluster that it belongs to; empty: none", "text", names=True),
     ),
     keys=("specimen", "marker"),
 )

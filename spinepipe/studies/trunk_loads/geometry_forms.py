@@ -44,7 +44,7 @@ MUSCLE_PARAMETERS = TableForm(
     "muscle",
     (
         _MUSCLE,
-        Column("group", "psoas, multifidus, longissimus_thoracis, ...", "text", required=True),
+        Column("group", "psoas, multifidus, longissimus_thoracis, ...", "text", True, names=True),
         Column("side", "right or left", "text", required=True),
         Column("pcsa_mm2", "physiological cross-section; empty: from the force", low=0),
         Column("max_isometric_force_n", "largest force, where pcsa_mm2 is empty", low=0),

@@ -126,25 +126,16 @@ def _columns(project: Project, stem: str, case: Make, rng: random.Random) -> Ite
     numbers = [n for n, name in enumerate(header) if name in known and known[name].is_number]
     if numbers:
         at = rng.choice(numbers)
-        yield case(
-            "decimal commas",
-            REFUSED,
-            lambda: as_csv(
-                [
-                    header,
-                    *(
-                        [
-                            c.replace(".", ",") if n == at else c
-                            for n, c in enumerate(
-                                [*r[:at], r[at] + ".0" if "." not in r[at] else r[at], *r[at + 1 :]]
-                            )
-                        ]
-                        for r in rows[1:]
-                    ),
-                ]
-            ),
-            place=header[at],
-        )
+        yield case("decimal commas", REFUSED, partial(_with_commas, rows, at), place=header[at])
+
+
+def _with_commas(rows: Table, at: int) -> bytes:
+    """The numbers of a column with decimal commas, in quotes."""
+    cells = [row[at] if "." in row[at] else f"{row[at]}.0" for row in rows[1:]]
+    new = [cell.replace(".", ",") for cell in cells]
+    return as_csv(
+        [rows[0], *([*r[:at], c, *r[at + 1 :]] for r, c in zip(rows[1:], new, strict=True))]
+    )
 
 
 LETTERS, COMMAS, QUOTES, LINES = "a" * 3_000_000, "," * 3_000_000, '"' * 3_000_000, "\n" * 1_000_000
