@@ -220,7 +220,8 @@ class Shared:
         if not listing.exists():
             assert not folder.exists(), f"the shared project {name} could not be built, see above"
             built = build(folder)
-            assert told_of_the_machine(folder) == []
+            told = told_of_the_machine(folder)
+            assert not told, told
             listing.write_text(json.dumps(built.files()))
         return Project(folder)
 

@@ -24,8 +24,9 @@ LIBRARIES = re.compile(rb"<script>[^<]{0,200}plotly\.js.*?</script>", re.DOTALL)
 
 def needles(project: Path) -> list[bytes]:
     """Paths and names that no result may hold; names of people are words of other texts too."""
-    places = [project, Path(__file__).resolve().parents[2], Path.home(), Path(sys.prefix)]
+    places = [project, Path(__file__).resolve().parents[2], Path(sys.prefix)]
     words = {str(place) for place in (*places, *(place.resolve() for place in places))} - {"/"}
+    words |= {f"{Path.home()}/"}
     user, machine = getpass.getuser(), platform.node()
     words |= {f"{tempfile.gettempdir()}/", f"/{user}/", f"{user}@", f"@{machine}"}
     return sorted(word.encode() for word in words)
@@ -45,34 +46,42 @@ def told_of_the_machine(project: Path) -> list[str]:
 
 
 def parts_of(content: bytes) -> Iterator[bytes]:
-    """The bytes of a file, and all that it holds in other form: columns, chunks, files in files."""
-    content = LIBRARIES.sub(b"", content)
-    yield content
+    """All that a file says: its bytes, or what is in it where they are packed.
+
+    In packed bytes a few letters in a row come by chance.
+    """
     if content.startswith(b"PAR1"):
         yield from _of_parquet(content)
-    if content.startswith(_PNG):
+    elif content.startswith(_PNG):
         yield from _of_picture(content)
-    if content.startswith(b"\x1f\x8b"):
+    elif content.startswith(b"\x1f\x8b"):
         yield from parts_of(gzip.decompress(content))
-    if b"PK\3\4" in content[:200]:  # behind the mark of a piece too
+    elif b"PK\3\4" in content[:200]:  # behind the mark of a piece too
         with zipfile.ZipFile(BytesIO(content)) as file:
             for name in file.namelist():
+                yield name.encode()
                 yield from parts_of(file.read(name))
-    for found in _EMBEDDED.findall(content):
-        yield from parts_of(base64.b64decode(found))
+    else:
+        content = LIBRARIES.sub(b"", content)
+        yield content
+        for found in _EMBEDDED.findall(content):
+            yield from parts_of(base64.b64decode(found))
 
 
 def _of_parquet(content: bytes) -> Iterator[bytes]:
-    rows = pq.read_table(pa.BufferReader(content))
-    for key, value in (rows.schema.metadata or {}).items():
-        yield key + value
-    for column in rows.columns:
+    file = pq.ParquetFile(pa.BufferReader(content))
+    yield str(file.metadata.created_by).encode()
+    for key, value in (file.metadata.metadata or {}).items():
+        yield key + b" " + value
+    rows = file.read()
+    for field, column in zip(rows.schema, rows.columns, strict=True):
+        yield f"{field.name} {field.metadata}".encode()
         if pa.types.is_string(column.type):
             yield "\n".join(set(column.drop_null().to_pylist())).encode()
 
 
 def _of_picture(content: bytes) -> Iterator[bytes]:
-    """Chunks of text, those that are packed too; the picture itself says nothing."""
+    """Chunks but those of the picture itself; texts that are packed are unpacked."""
     at = len(_PNG)
     while at < len(content):
         size, kind = int.from_bytes(content[at : at + 4]), content[at + 4 : at + 8]
@@ -81,4 +90,6 @@ def _of_picture(content: bytes) -> Iterator[bytes]:
             yield zlib.decompress(chunk[chunk.index(b"\0") + 2 :])
         elif kind == b"iTXt" and chunk[chunk.index(b"\0") + 1]:
             yield zlib.decompress(chunk.split(b"\0", 5)[-1])
+        elif kind != b"IDAT":
+            yield chunk
         at += 12 + size
