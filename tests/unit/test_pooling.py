@@ -19,6 +19,7 @@ from spinepipe.calibrate.hierarchy import (
     Hierarchy,
     LinearReadings,
     Spreads,
+    between,
     condensed,
     estimated,
     tellable,
@@ -563,3 +564,22 @@ def test_what_does_not_belong_together_is_refused() -> None:
         pool(problems, noise=np.zeros(6))
     with pytest.raises(ValueError, match="no specimen"):
         pool([])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_spreads_between_two_are_so_in_logarithms_and_dropped_ones_stay_dropped(
+    share: float,
+) -> None:
+    sizes = (np.array([0.1, 0.0]), np.array([0.2, 2.0]), np.array([0.3, 0.5]), 0.01)
+    others = (np.array([0.4, 0.0]), np.array([0.8, 0.5]), np.array([3.0, 0.0]), 0.04)
+    one, other = Spreads(*sizes), Spreads(*others)
+    found = between(one, other, share)
+    for name in ("level", "specimen", "rest"):
+        first, second = (getattr(spreads, name) for spreads in (one, other))
+        expected = np.zeros(2)
+        there = (first > 0.0) & (second > 0.0)
+        expected[there] = np.exp(
+            (1.0 - share) * np.log(first[there]) + share * np.log(second[there])
+        )
+        np.testing.assert_allclose(getattr(found, name), expected, rtol=1e-12)
+    assert found.scatter == pytest.approx(0.01 * 4.0**share, rel=1e-12)

@@ -13,6 +13,7 @@ from spinepipe.statistics import (
     bland_altman,
     chi_squared_normality,
     corrected,
+    f_test_nested,
     family_size,
     friedman,
     kendall,
@@ -212,6 +213,12 @@ def test_chi_squared_of_a_hand_worked_case() -> None:
     tail = math.erfc(math.sqrt(chi2 / 2)) + math.sqrt(2 * chi2 / math.pi) * math.exp(-chi2 / 2)
     assert found.p == pytest.approx(tail, rel=1e-9)
     assert found.message == "6 bins"
+
+
+def test_a_larger_model_beside_an_exact_smaller_one_explains_nothing() -> None:
+    found = f_test_nested(0.0, 5, 1.0, 4)
+    assert (found.statistic, found.p, found.effect) == (0.0, 1.0, 0.0)
+    assert "fits worse" in found.message
 
 
 def test_chi_squared_has_the_degrees_of_freedom_that_its_bins_leave() -> None:

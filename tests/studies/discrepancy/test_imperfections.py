@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from imperfect_cases import JOINTS, SPECIMENS, alike, grounds_of, off_centre
+from scipy import stats
 
 from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.imperfections import (
     Place,
     TakenUp,
+    _mean,
     in_common,
     labels_of,
     taken_up,
@@ -125,6 +127,39 @@ def test_random_errors_are_seldom_called_common():
         size = np.sqrt(told) * rng.standard_normal(len(places))
         alarms += any(one.certain for one in in_common(places, size, np.diag(1.0 - told)))
     assert alarms <= 20  # 1 % allowed for; 20 of 1000 have a probability of 0.3 % at 1 %
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mean_is_that_of_generalised_least_squares(seed: int) -> None:
+    """Sizes drawn towards zero as their covariance says, and correlated; by inverses."""
+    rng, count = np.random.default_rng(seed), 7
+    spread = rng.normal(size=(count, 2 * count)) / np.sqrt(count)
+    covariance = np.linalg.inv(np.eye(count) + spread @ spread.T)
+    told = np.eye(count) - covariance  # of a mean of one, and the covariance of random sizes
+    shift = 0.8 * (seed > 0)
+    size = told @ (shift + np.linalg.cholesky(np.linalg.inv(told)) @ rng.normal(size=count))
+    at = Place("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
+    ones = told @ np.ones(count)
+    weights = np.linalg.solve(told, ones) / (ones @ np.linalg.solve(told, ones))
+    mean = weights @ size
+    left = size - mean * ones
+    scatter = np.sqrt(left @ np.linalg.solve(told, left) / (count - 1))
+    sd = np.sqrt(weights @ told @ weights)
+    found = _mean(at, size, covariance)
+    assert found is not None
+    assert (found.at, found.count) == (at, count)
+    assert found.size == pytest.approx(mean, rel=1e-9)
+    assert found.sd == pytest.approx(scatter * sd, rel=1e-9)
+    by_scatter = 2.0 * stats.t.sf(abs(mean) / (scatter * sd), count - 1)
+    by_sd = 2.0 * stats.norm.sf(abs(mean) / sd)
+    assert found.chance == pytest.approx(min(1.0, 2.0 * min(by_scatter, by_sd)), rel=1e-6)
+
+
+def test_of_readings_that_say_too_little_there_is_no_mean() -> None:
+    at = Place("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
+    assert _mean(at, np.zeros(3), np.eye(3)) is None
+    assert _mean(at, np.zeros(3), np.diag([0.0, 1.0, 1.0])) is None
+    assert _mean(at, np.zeros(3), np.diag([0.0, 0.0, 1.0])) is not None
 
 
 def test_rows_and_words_say_what_was_taken_up(shifted):

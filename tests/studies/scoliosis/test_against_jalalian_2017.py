@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.claim import Claim, Run, judge, judged
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.jalalian_2017 import against, stands_for
 from spinepipe.studies.scoliosis.jalalian_2017.against import CLAIMS, facts
-from spinepipe.studies.scoliosis.jalalian_2017.paper import ERRORS, PHANTOM, TABLE_1
+from spinepipe.studies.scoliosis.jalalian_2017.paper import ERRORS, PHANTOM, TABLE_1, correlation
 from spinepipe.studies.scoliosis.kind import KIND, ScoliosisFiles
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables_of_errors import AGAINST_JALALIAN_2017
@@ -576,3 +577,12 @@ def test_the_shipped_phantom_has_the_patients_of_the_paper() -> None:
     ]
     assert len(built) == 18 * 4 + 7
     assert {judge(claim, run)["verdict"] for claim in built} == {"circular"}
+
+
+@pytest.mark.parametrize("n", [5, 12, 200])
+def test_the_interval_of_a_correlation_is_scipys(n: int) -> None:
+    one, other = np.random.default_rng(n).normal(size=(2, n))
+    peer = stats.pearsonr(one + other, one)
+    found = correlation(float(peer.statistic), n)
+    low, high = peer.confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((low, high), abs=1e-4)  # 1.96 is rounded

@@ -3,7 +3,11 @@
 import numpy as np
 
 from spinepipe.studies.scoliosis.population import (
+    END_FACTOR,
+    END_RAD,
     END_SPREAD,
+    LEVEL_END_SPREAD,
+    LEVEL_RATIO_SPREAD,
     PATIENT_SPREAD,
     RATIO_SPREAD,
     Known,
@@ -56,6 +60,27 @@ def test_patients_who_are_known_exactly_give_their_population_back() -> None:
     # ratios are told about their mean, which takes one of their freedoms
     assert abs(found.ratio_sd / (truth.ratio_sd * np.sqrt(1.0 - 1.0 / SEGMENTS)) - 1.0) < 0.03
     assert abs(found.end_sd / truth.end_sd - 1.0) < 0.03
+
+
+def test_few_patients_draw_levels_as_normal_priors_let_them() -> None:
+    """By precisions: of levels about their common mean, and of that about the usual end."""
+    before, count = made(), 3
+    rng = np.random.default_rng(7)
+    means = before.mean + rng.normal(0.0, 0.4, (count, 3 * SEGMENTS))
+    nothing = np.zeros((3 * SEGMENTS, 3 * SEGMENTS))
+    found = learned(before, [Known(mean, nothing) for mean in means]).mean
+
+    def between(prior: float, sd: float, seen: np.ndarray, variance: float) -> np.ndarray:
+        return (prior / sd**2 + seen / variance) / (1.0 / sd**2 + 1.0 / variance)
+
+    ratios, ends = means[:, :SEGMENTS], means[:, SEGMENTS:].mean(axis=0)
+    ratios = (ratios - ratios.mean(axis=1, keepdims=True)).mean(axis=0)
+    levels = between(0.0, LEVEL_RATIO_SPREAD, ratios, before.ratio_sd**2 / count)
+    np.testing.assert_allclose(found[:SEGMENTS], levels, rtol=1e-12, atol=1e-12)
+    variance = (PATIENT_SPREAD**2 + before.end_sd**2 / (2 * SEGMENTS)) / count
+    common = between(np.log(END_RAD), END_FACTOR, ends.mean(), variance)
+    own = between(0.0, LEVEL_END_SPREAD, ends - ends.mean(), before.end_sd**2 / count)
+    np.testing.assert_allclose(found[SEGMENTS:], common + own, rtol=1e-12, atol=1e-12)
 
 
 def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
