@@ -39,7 +39,9 @@ def lock_for_the_living():
 
 def locked_by_the_living(self):
     """Whether files of this run are locked; a run with -n asks this alone."""
-    return not run_lock.abandoned(self.path / "locks") and locked_of_snakemake.fget(self)
+    return not run_lock.abandoned(self.path / "locks") and locked_of_snakemake.fget(
+        self
+    )
 
 
 lock_of_snakemake, locked_of_snakemake = PersistenceBase.lock, PersistenceBase.locked
