@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.decomposition import eigh
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -87,7 +87,7 @@ def _given_frames(cohort: Cohort, specimen: str) -> dict[str, Pose]:
     return dict(zip(rows["joint"], poses, strict=True))
 
 
-@lru_cache(maxsize=256)
+@kept_with_cohort
 def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
     """Moving vertebrae; massless where the cohort lists no body, points without inertia.
 

@@ -1,7 +1,9 @@
 """The URDF of a model: parsed again it stands, weighs and moves like the model."""
 
+import tempfile
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -126,3 +128,13 @@ def test_pybullet_moves_points_and_weighs_as_the_model_says() -> None:
         # fourth-order differences of positions of 0.1 m, good to 1e-17, over 1e-3
         np.testing.assert_allclose(linear[column], slope(position, 1e-3), rtol=0, atol=1e-12)
         np.testing.assert_allclose(moments[column], slope(mass_moment, 1e-3), rtol=0, atol=1e-11)
+
+
+def test_a_model_that_was_loaded_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers end outright: what is there between two jobs would stay for good."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for joints in (1, 2):
+        Chain(spine(joints))
+        assert not list(tmp_path.iterdir())

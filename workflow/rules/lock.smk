@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 
 from snakemake.persistence import PersistenceBase
 
-from spinepipe.jobs.run_lock import abandoned, noted, one_at_a_time, take_off
+from spinepipe.jobs import run_lock
 
 
 @contextmanager
@@ -16,15 +16,15 @@ def lock_of_the_living(self):
     """
     locks = self.path / "locks"
     with ExitStack() as to_the_end:
-        with one_at_a_time(self.path):
-            for process in take_off(locks):
+        with run_lock.one_at_a_time(self.path):
+            for process in run_lock.take_off(locks):
                 print(
                     f"warn  the run of process {process} was killed: its lock is taken off, and this run "
                     "goes on where it stood",
                     file=sys.stderr,
                 )
             if workflow.local_exec:
-                to_the_end.enter_context(noted(locks))
+                to_the_end.enter_context(run_lock.noted(locks))
             to_the_end.enter_context(lock_of_snakemake(self))
         yield
 
@@ -39,7 +39,9 @@ def lock_for_the_living():
 
 def locked_by_the_living(self):
     """Whether files of this run are locked; a run with -n asks this alone."""
-    return not abandoned(self.path / "locks") and locked_of_snakemake.fget(self)
+    return not run_lock.abandoned(self.path / "locks") and locked_of_snakemake.fget(
+        self
+    )
 
 
 lock_of_snakemake, locked_of_snakemake = PersistenceBase.lock, PersistenceBase.locked

@@ -14,6 +14,7 @@ import numpy as np
 
 from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.cohort.load_tests import coupled_range
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen, measured_specimen
 from spinepipe.cohort.specimen import on_bushings
@@ -73,7 +74,7 @@ def specimen_tests(study: CohortStiffness, cohort: Cohort, specimen: str) -> Spe
     return _specimen_tests(cohort, specimen, tests_of(study, cohort), study.cycles)
 
 
-@lru_cache(maxsize=64)
+@kept_with_cohort
 def _specimen_tests(
     cohort: Cohort, specimen: str, tests: tuple[str, ...], cycles: str
 ) -> SpecimenTests:

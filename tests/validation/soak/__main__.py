@@ -68,7 +68,9 @@ def _kills() -> None:
             "command. A kill comes after a drawn number of further result files and a part of a "
             "second; three of five kill all processes at once, one Snakemake alone, one a worker. "
             "When a study comes to its end before all kills are spent, it begins anew "
-            "(rounds). Files that differ: from those of an undisturbed run, byte by byte. Finished "
+            "(rounds). Files that differ: from those of an undisturbed run, byte by byte, in all "
+            "rounds together; `fits` of tracking tells processor time (`cpu_s`), so ten of its "
+            "files differ from run to run, killed or not. Finished "
             "files made twice: those that were there at a kill and that Snakemake's record did not "
             "have as being made. In the system's temporary folder killed processes leave empty "
             "folders of Python and Snakemake.",
