@@ -202,7 +202,7 @@ def _plausibility() -> None:
     )
     _write("plausibility", head, plausibility.table(found))
     by_kind = plausibility.by_kind(found)
-    _write("plausibility_by_kind", "The same, mistake by mistake.", by_kind)
+    _write("plausibility_by_kind", "The same, mistake by mistake.", by_kind, "plausibility")
 
 
 def _index_coverage() -> None:
@@ -240,7 +240,7 @@ def _count(word: str, held: pd.Series) -> int:
     return int((held == word).sum())
 
 
-def _write(name: str, head: str, rows: pd.DataFrame) -> None:
+def _write(name: str, head: str, rows: pd.DataFrame, part: str | None = None) -> None:
     """The table as CSV, and as Markdown with the command and the date."""
     RESULTS.mkdir(exist_ok=True)
     shown = rows.map(lambda cell: f"{cell:.4g}" if isinstance(cell, float) else cell)
@@ -250,7 +250,7 @@ def _write(name: str, head: str, rows: pd.DataFrame) -> None:
         "",
         head,
         "",
-        f"`python -m tests.validation {name}`, {date.today().isoformat()}",
+        f"`python -m tests.validation {part or name}`, {date.today().isoformat()}",
         "",
         "| " + " | ".join(shown.columns) + " |",
         "|" + "---|" * len(shown.columns),
