@@ -203,7 +203,12 @@ def _plausibility() -> None:
     )
     _write("plausibility", head, plausibility.table(found))
     by_kind = plausibility.by_kind(found)
-    _write("plausibility_by_kind", "The same, mistake by mistake.", by_kind)
+    _write(
+        "plausibility_by_kind",
+        "The same, mistake by mistake.",
+        by_kind,
+        "python -m tests.validation plausibility",
+    )
 
 
 def _index_coverage() -> None:
