@@ -15,9 +15,6 @@ _IMPORT = re.compile(r"^\s*(?:import ([\w., ]+)|from ([\w.]+) import (\([^)]*\)|
 
 HELPERS = ROOT / "tests" / "cases"
 
-OF_ALL = ("tests/unit/test_frozen.py",)
-"""Tests that look at every file of the library without importing any, and are quick."""
-
 
 def nearest(path: str, count: int, beyond: int = 0) -> list[str]:
     """Test files near a file, the nearest first; of equally near ones those that import least.
@@ -39,8 +36,7 @@ def nearest(path: str, count: int, beyond: int = 0) -> list[str]:
         elif often := sum(_text(test).count(name) for name in called):
             far = 4 if "studies" in test.parts else 3  # these try many effects
             ranked.append((True, far, -often, _name(test)))
-    found = [name for *_, name in sorted(ranked)][beyond : beyond + count]
-    return [*found, *OF_ALL] if beyond else found
+    return [name for *_, name in sorted(ranked)][beyond : beyond + count]
 
 
 @cache
