@@ -89,7 +89,7 @@ def test_a_check_that_is_wrong_would_be_seen(stand_in: Verdict) -> None:
         ("10 000 unknown", "/small_rig.yaml"),
         ("10 000 unknown", "config.yaml"),
         ("10 000 unknown names", "/tasks.csv"),
-        ("10 000 unknown names", "/trials.csv"),
+        ("500 unknown names", "/trials.csv"),
         ("500 unknown names", "/subjects.csv"),
     ],
 )

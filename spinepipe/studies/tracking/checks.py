@@ -14,7 +14,7 @@ from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, Problem, Spelling, one_of
 from spinepipe.studies.places import at, unknown_names
-from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
+from spinepipe.studies.subjects import MASS_KG, SEXES, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.checks_of_trials import (
     recording_problems,
     row_problems,
@@ -164,8 +164,8 @@ def _bodies(cohort: Cohort) -> Iterator[Problem]:
     known = set(cohort.further[SUBJECTS.stem]["specimen"])
     for specimen in [name for name in cohort.specimen_names if name in known]:
         subject = subject_of(cohort, specimen)
-        if not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
-            continue
+        if subject.sex not in SEXES or not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
+            continue  # told in subjects.csv
         allowed = (
             f"{SLICES_SHARE[0]:.0%} to {SLICES_SHARE[1]:.0%} of {subject.mass_kg:g} kg: "
             "pelvis and slices of the trunk, without head and arms"
