@@ -9,6 +9,8 @@ from spinepipe.muscles.task import Task
 from spinepipe.status import Balanced
 
 LARGEST_TONE = 0.2
+"""Up to which tone is looked for: every muscle at a fifth of its strength, beside the task."""
+
 _FIRST, _HALVINGS = 0.00125, 6
 
 
@@ -52,8 +54,8 @@ def least_stable(person: Person, task: Task, how: How, gain: float) -> Toned | N
     low, high = 0.0, _FIRST
     best = toned(person, task, how, gain, high)
     while not best.stands:
-        low, high = high, 2.0 * high
-        if high > LARGEST_TONE or best.held.status is not Balanced.CONVERGED:
+        low, high = high, min(2.0 * high, LARGEST_TONE)
+        if low == LARGEST_TONE or best.held.status is not Balanced.CONVERGED:
             return None
         best = toned(person, task, how, gain, high)
     for _ in range(_HALVINGS):
