@@ -375,6 +375,21 @@ def test_what_is_recomputed_could_fail() -> None:
         assert not claim.range.holds(wrong)
 
 
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [
+        ("J4.bending.location_LOC", (0.825 / 0.455, 0.835 / 0.445)),
+        ("J4.neutral_traction.orientation_theta", (1.245 / 0.615, 1.255 / 0.605)),
+    ],
+)
+def test_what_a_figure_alone_shows_is_as_wide_as_rounding_leaves_it(
+    name: str, ends: tuple[float, float]
+) -> None:
+    """An error of 0.83, which is 55 % less: of 0.825 to 0.835 and of 54.5 to 55.5 %."""
+    found = claim_of(f"closed_form.{name}").range
+    assert (found.low, found.high) == pytest.approx(ends, rel=1e-12)
+
+
 def test_every_check_of_consistency_is_told() -> None:
     told = judged(CLAIMS, Run({}))
     for number in range(1, 13):
