@@ -68,6 +68,22 @@ def test_the_phantoms_of_the_coverage_are_counted() -> None:
     assert "fits each of six specimens" in README
 
 
+def test_spoilt_projects_and_kills_are_counted() -> None:
+    folder = ROOT / "tests/validation/results"
+    spoilt = pd.read_csv(folder / "wrong_inputs.csv")
+    (every,) = spoilt[spoilt["what is spoilt"] == "all"].to_dict("records")
+    assert numbers(r"of ([\d,]+\d) projects spoilt", README.replace(",", "")) == {every["cases"]}
+    assert numbers(r"took (\d+) as their doc", README.replace(",", "")) == {every["right"]}
+    assert every["hangs"] == 0
+    told = pd.read_csv(folder / "plausibility.csv").groupby("kinds")[["told", "mistakes"]].sum()
+    assert told.loc["last", "told"] / told.loc["last", "mistakes"] == pytest.approx(2 / 3, abs=0.05)
+    kills = pd.read_csv(folder / "soak_kills.csv")
+    assert set(kills["kills"]) == numbers(r"runs: (\d+) kills in each", README)
+    assert len(kills) == 7
+    assert "each of seven kinds" in README
+    assert not kills["finished_files_made_twice_or_lost"].any()
+
+
 def test_times_are_those_that_were_measured() -> None:
     (cold,) = [row for row in bench("whole_study")["study"] if "cold" in row["what"]]
     for page in (README, TUTORIAL):
