@@ -51,22 +51,27 @@ class BaseCheck:
             yield Problem(*at(document, KEY), name, allowed, "copy it to another folder")
         elif path.is_file():
             remade = f"; or delete the file, and study {maker} makes it anew" if maker else ""
-            for problem in self._of_file(path, name, cohort):
+            for problem in self._of_file(path, name, cohort, maker):
                 yield replace(problem, remedy=problem.remedy + remade)
         elif maker is None:
             allowed = "a model file, or a result of another study in config/studies"
             remedy = "correct the path (it begins at the folder of the Snakefile) or add the file"
             yield Problem(*at(document, KEY), f"no file '{name}'", allowed, remedy)
 
-    def _of_file(self, path: Path, name: str, cohort: Cohort) -> Iterator[Problem]:
-        """Problems of a file that is there, told under the name that the study gives it."""
+    def _of_file(
+        self, path: Path, name: str, cohort: Cohort, maker: str | None
+    ) -> Iterator[Problem]:
+        """Problems of a file that is there, told under the name that the study gives it.
+
+        A result of another study may be of another cohort: its name says whose it is.
+        """
         try:
             model = read_model(path)
             effects_for(model, "*", cohort.joint_names)
         except InputError as error:
             yield from (replace(problem, file=name) for problem in error.problems)
             return
-        if model.cohort != cohort.name:
+        if maker is None and model.cohort != cohort.name:
             found, allowed = f"'{model.cohort}'", f"the study's cohort, '{cohort.name}'"
             remedy = "take another file; or, where the model is meant for this cohort too, write so"
             yield Problem(name, None, "cohort", found, allowed, remedy)

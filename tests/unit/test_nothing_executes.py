@@ -49,11 +49,12 @@ PROGRAMS = {"cli/doctor.py": "starts this very Python, to see whether the engine
 
 BY_NAME = {
     "effects/__init__.py": "every file of its own folder",
+    "studies/doubts.py": "the doubts of a kind",
     "studies/registry.py": "folders of kinds, by a name that is one of them",
     "jobs/pool.py": "jobs, by names that the rules write",
     "jobs/report.py": "the page of a kind",
     "jobs/draw.py": "a figure that a kind declares",
-    "cli/check.py": "the doubts of a kind",
+    "cli/check.py": "what a kind says of a sound study besides",
     "cli/export.py": "what a kind declares",
     "cli/program.py": "commands, each a file of its folder",
     "studies/discrepancy/codec.py": "classes of data of spinepipe, see its tests",

@@ -56,7 +56,7 @@ class Case:
 # fmt: off
 ALONE = [
     Case("empty", STUDY, "", None, None, "an empty file"),
-    Case("broken YAML", "[flexion]", "[flexion", 6, None, "no YAML"),
+    Case("broken YAML", "[flexion]", "[flexion", 5, None, "no YAML"),
     Case("repeated key", None, "poses: 30", 9, "poses", "the same key twice"),
     Case("repeated inside", "right: 0}", "right: 0, right: 1}", 8, "calibration.weights.right", "twice"),
     Case("unknown key", "poses:", "posses:", 4, "posses", "did you mean 'poses'"),

@@ -2,14 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
-from spinepipe.anatomy.levels import SIZE_SPREAD, spacing_mm
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.doubtful_places import UNITS, unit_like
 from spinepipe.documents.yaml_text import Document
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
@@ -92,28 +89,7 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Probl
             yield from _tilts(place, film, cohort.vertebrae, shapes[position])
     yield from _bends(file, patient, shapes)
     if ERECT in shapes:
-        yield from _size(cohort, _Place(file, patient, ERECT), shapes[ERECT])
         yield from _cobb(cohort, patient, shapes[ERECT])
-
-
-def _size(cohort: Cohort, place: _Place, film: Film) -> Iterator[Problem]:
-    """Is the spine of a length that spines have, unless the cohort says that it is meant?"""
-    names = cohort.vertebrae
-    usual = [(spacing_mm(low), spacing_mm(high)) for low, high in pairwise(names)]
-    apart = np.hypot(np.diff(film.right), np.diff(film.up)) * MM_PER_M
-    told = [(mm, (a + b) / 2.0) for mm, (a, b) in zip(apart, usual, strict=True) if a and b]
-    if not told or "lengths" in cohort.i_mean_it:
-        return
-    ratio = sum(mm for mm, _ in told) / sum(mm for _, mm in told)
-    if not 1.0 / SIZE_SPREAD <= ratio <= SIZE_SPREAD:
-        found = f"vertebrae {ratio:.2g} times as far apart as those of their levels"
-        unit = None if ratio == 0.0 else unit_like(ratio)
-        words = "another unit" if unit is None else UNITS[unit]
-        remedy = (
-            f"suspected: {words}; write mm (if you mean it: i_mean_it: [lengths] in cohort.yaml)"
-        )
-        allowed = f"{1.0 / SIZE_SPREAD:.2g} to {SIZE_SPREAD:g} times"
-        yield place.problem(None, CENTRE[0], found, allowed, remedy)
 
 
 def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[Problem]:

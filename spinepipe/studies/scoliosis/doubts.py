@@ -30,24 +30,25 @@ _Fault = tuple[str, str, str, str, Group, bool]
 
 
 def doubts(cohort: Cohort) -> Iterator[Doubt]:
-    """Doubts about films and patients, one line for each fault."""
+    """Doubts about films and patients, one line for each fault; its size is that of the first."""
     films = cohort.further.get("films")
     if films is None:
         return
-    told: dict[_Fault, list[tuple[str, int]]] = defaultdict(list)
+    told: dict[tuple[str, str], list[tuple[str, int, _Fault]]] = defaultdict(list)
     seen: dict[bytes, str] = {}
     for patient, rows in films.groupby("specimen", sort=False):
-        for fault in _faults(cohort, rows):
-            told[fault].append((str(patient), int(rows.index[0])))
+        faults = list(_faults(cohort, rows))
         numbers = rows[list(CENTRE) if rows[list(CENTRE)].notna().any(axis=None) else list(CORNERS)]
         first = seen.setdefault(np.nan_to_num(numbers.to_numpy(float)).tobytes(), str(patient))
         if first != patient:
             found, remedy = f"the very films of {first}", "suspected: rows copied; put in its own"
-            fault = ("specimen", found, "films of its own", remedy, "motion", False)
-            told[fault].append((str(patient), int(rows.index[0])))
-    for (column, found, allowed, remedy, group, certain), places in told.items():
-        whose = of_specimens(dict.fromkeys(name for name, _ in places), cohort.specimen_names)
-        place = (f"{cohort.name}/films.csv", places[0][1], column)
+            faults.append(("specimen", found, "films of its own", remedy, "motion", False))
+        for fault in faults:
+            told[fault[0], fault[3]].append((str(patient), int(rows.index[0]), fault))
+    for places in told.values():
+        whose = of_specimens(dict.fromkeys(name for name, *_ in places), cohort.specimen_names)
+        _, line, (column, found, allowed, remedy, group, certain) = places[0]
+        place = (f"{cohort.name}/films.csv", line, column)
         yield Doubt(Problem(*place, f"{found} ({whose})", allowed, remedy), group, certain)
     yield from _cobb(cohort)
 

@@ -158,7 +158,6 @@ KIND = Kind(
     files=TrunkFiles,
     checks=(check_trunk,),
     checks_at_start=(check_source,),
-    told_by_check="doubts_of_tasks:told",
     tables=(
         *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS),
         SIMPLIFIED,

@@ -172,11 +172,11 @@ def _small_tables(landmarks: bool) -> dict[str, tuple[str, tuple[str, ...]]]:
         "motion": (
             "specimen,test,cycle,step,joint,extension_deg,anterior_mm,superior_mm",
             tuple(
-                f"{s},flexion,,{step},{joint},{-step * size},{0.1 * step * size:.2f},"
+                f"{s},flexion,,{step},{joint},{-step * size:g},{0.1 * step * size:.2f},"
                 f"{-0.08 * step * size:.3f}"
-                for s in "ab"
+                for s, joints in (("a", (1.0, 1.1)), ("b", (1.2, 1.3)))
                 for step in range(3)
-                for joint, size in (("L3L4", 1.0), ("L2L3", 1.1))
+                for joint, size in zip(("L3L4", "L2L3"), joints, strict=True)
             ),
         ),
     }

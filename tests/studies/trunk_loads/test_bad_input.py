@@ -210,7 +210,7 @@ EXERTION_CASES = [
     Case("pushed in the loins", task("applied_at", "L3", 5), TASK, 5, "applied_at", "unknown vertebra 'L3'", "thorax"),
     Case("pushed nowhere", task("applied_at", "", 5), TASK, 5, "applied_at", "push_extension_nm and no vertebra", "write the vertebra"),
     Case("force without moment", both(task("push_extension_nm", "", 5), task("push_anterior_n", "50", 5)), TASK, 5, "applied_as", "no moment", "write the moment"),
-    Case("negative pressure", task(PRESSURE, "-10", 5), TASK, 5, PRESSURE, "'-10'", "check its unit and its sign"),
+    Case("negative pressure", task(PRESSURE, "-10", 5), TASK, 5, PRESSURE, "'-10'", "check its unit, its sign"),
     Case("pressure in Pa", task(PRESSURE, "10000", 5), TASK, 5, PRESSURE, "'10000'", "check its unit"),
     Case("stress in N/cm2", task(STRESS, "60", 5), TASK, 5, STRESS, "60 MPa", "in N/cm2? write 0.6"),
     Case("no stress", task(STRESS, "0", 5), TASK, 5, STRESS, "0 MPa", "leave it empty for 0.6"),
@@ -230,8 +230,8 @@ MUSCLE_CASES = [
     Case("force 0", cell(MUSCLES, 4, "max_isometric_force_n", "0"), MUSCLES, 4, "max_isometric_force_n", "LTpT_T12_l has 0", "delete the muscle"),
     Case("no size", cell(MUSCLES, 2, "pcsa_mm2", ""), MUSCLES, 2, "pcsa_mm2", "neither of LD_r", "fill one"),
     Case("no side", cell(MUSCLES, 2, "side", "R"), MUSCLES, 2, "side", "'R'", "write right or left"),
-    Case("points alone", line(MUSCLES, 4, None), POINTS, 6, "muscle", "LTpT_T12_l is not in muscle_parameters.csv", "add it to muscle_parameters.csv"),
-    Case("parameters alone", add(MUSCLES, "psoas_r,psoas,right,100,"), MUSCLES, 5, "muscle", "psoas_r is not in muscles.csv", "add it to muscles.csv"),
+    Case("points alone", line(MUSCLES, 4, None), POINTS, 6, "muscle", "'LTpT_T12_l' is not in muscle_parameters.csv", "add it to muscle_parameters.csv"),
+    Case("parameters alone", add(MUSCLES, "psoas_r,psoas,right,100,"), MUSCLES, 5, "muscle", "'psoas_r' is not in muscles.csv", "add it to muscles.csv"),
     Case("unknown level", cell(SCALING, 2, "level", "L4L3"), SCALING, 2, "level", "unknown level 'L4L3'", "did you mean"),
 ]
 # fmt: on
@@ -348,7 +348,8 @@ def test_geometry_of_the_cohort_must_be_there(tmp_path: Path) -> None:
 
 def test_a_table_of_regressions_is_read(tmp_path: Path) -> None:
     (absent,) = told(tmp_path, regressions="mine.csv")
-    assert absent.file == f"{NAME}/mine.csv"
+    assert (absent.file, absent.column) == ("s.yaml", "regressions")
+    assert "no file of" in absent.found
     (tmp_path / "bad").mkdir()
     bad = told(tmp_path / "bad", text("mine.csv", "sex,age\n"), regressions="mine.csv")
     assert {(problem.file, problem.row) for problem in bad} == {(f"{NAME}/mine.csv", 1)}
