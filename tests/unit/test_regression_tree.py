@@ -183,6 +183,7 @@ def test_a_constant_output_has_no_tree() -> None:
         ({"names": "ab"}, "shapes"),
         ({"y": np.ones(29)}, "shapes"),
         ({"groups": np.ones(29, int)}, "shapes"),
+        ({"groups": np.ones(31, int)}, "shapes"),
         ({"y": np.full(30, np.nan)}, "finite"),
         ({"folds": 1}, "folds"),
         ({"complexity": 0.0}, "complexity"),

@@ -36,6 +36,7 @@ def test_without_time_a_loop_may_be_creep(name: str) -> None:
     assert excluded(name, case()) == ()
     assert excluded(name, case(NONE)) == ("creep",)
     assert excluded(name, case((5.0,) * 5)) == ("creep",)  # a clock that stands
+    assert excluded(name, case((0.0, 30.0, 30.0, 30.0, 30.0))) == ()  # it went, if only once
     assert excluded(name, case(), case(NONE)) == ("creep",)  # time is known of a part only
     assert excluded(name, case((0.0, 30.0, None, 90.0, 120.0))) == ("creep",)
 
