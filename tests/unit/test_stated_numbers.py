@@ -84,6 +84,13 @@ def test_spoilt_projects_and_kills_are_counted() -> None:
     assert not kills["finished_files_made_twice_or_lost"].any()
 
 
+def test_mutants_are_counted() -> None:
+    row = re.search(r"\| all \| (\d+) \| (\d+) \|", (ROOT / "docs/mutants.md").read_text())
+    assert row is not None
+    assert numbers(r"of (\d+) small faults", README) == {float(row[1])}
+    assert numbers(r"nearest to them see \[(\d+)\]", README) == {float(row[2])}
+
+
 def test_times_are_those_that_were_measured() -> None:
     (cold,) = [row for row in bench("whole_study")["study"] if "cold" in row["what"]]
     for page in (README, TUTORIAL):
