@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
+HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
+"""Name of this machine, as files that are gone with a process are called by it."""
+
 _TEMPORARY = re.compile(r"\..+\.[a-z]+\.(\d+)(?:@([A-Za-z0-9-]+))?")
 """Name of a temporary file: what it will be called, the process that writes it and its machine."""
 
@@ -28,7 +30,7 @@ def appearing(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}@{_HOST}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}@{HOST}")
     try:
         yield temporary
         os.replace(temporary, path)
@@ -61,7 +63,7 @@ def sweep(folder: str | Path) -> int:
 def _is_abandoned(path: str, name: str) -> bool:
     found = _TEMPORARY.fullmatch(name)
     assert found is not None
-    if found[2] not in (None, _HOST):
+    if found[2] not in (None, HOST):
         return time.time() - os.lstat(path).st_mtime > _DAY_S
     try:
         os.kill(int(found[1]), 0)

@@ -15,7 +15,6 @@ import re
 from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import log, sqrt
 
 import numpy as np
@@ -113,12 +112,10 @@ class _Told:
         return self.answer.specimen, self.answer.test, self.answer.coordinate
 
 
-@lru_cache(maxsize=8)
 def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
     """All that looks wrong, one for each column and what is behind it.
 
-    Kept per cohort object: doubts and refusals are asked one after the other. What explains a
-    reading keeps quiet what would be said of it besides.
+    What explains a reading keeps quiet what would be said of it besides.
     """
     geometry = tuple(_geometry(cohort) if cohort.has_frames else ())
     readings = (*doubtful_readings(cohort), *doubtful_series(cohort))

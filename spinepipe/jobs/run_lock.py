@@ -8,14 +8,14 @@ ends, also when another process has got its number since.
 
 import fcntl
 import os
-import platform
 import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
+from spinepipe.files import HOST
+
 _NOTE = re.compile(r"(\d+)@([A-Za-z0-9-]+)\.run")
 """Name of a note: the process that runs and its machine."""
 
@@ -40,7 +40,7 @@ def one_at_a_time(record: Path) -> Iterator[None]:
 def noted(locks: Path) -> Iterator[None]:
     """A note of this process among the locks, held until the end."""
     locks.mkdir(parents=True, exist_ok=True)
-    note = locks / f"{os.getpid()}@{_HOST}.run"
+    note = locks / f"{os.getpid()}@{HOST}.run"
     with note.open("a") as held:
         try:
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -76,7 +76,7 @@ def _files(locks: Path) -> list[Path]:
 
 
 def _is_over(locks: Path, note: re.Match[str]) -> bool:
-    if note[2] != _HOST:
+    if note[2] != HOST:
         return False
     try:
         with (locks / note[0]).open() as file:

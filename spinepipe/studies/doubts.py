@@ -3,19 +3,19 @@
 Each kind judges its own files (`Kind.doubts`), whatever study is asked for.
 """
 
-from functools import lru_cache
 from importlib import import_module
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.doubt import Doubt
 from spinepipe.cohort.doubts import suspicions as of_cohort
+from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.problems import Problem
 from spinepipe.studies.registry import PACKAGE, every_kind
 
 
-@lru_cache(maxsize=8)
+@kept_with_cohort
 def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
-    """All that looks wrong; kept per cohort object."""
+    """All that looks wrong; kept, as doubts and refusals are asked one after the other."""
     found = list(of_cohort(cohort))
     for name, kind in every_kind().items():
         if kind.doubts is not None and any(form.stem in cohort.further for form in kind.forms):

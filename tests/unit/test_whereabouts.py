@@ -83,7 +83,7 @@ def test_only_temporary_files_and_notes_of_runs_are_called_by_the_machine() -> N
         for path in (ROOT / folder).rglob("*")
         if path.suffix in (".py", ".smk") and ASKING.search(path.read_text(encoding="utf-8"))
     }
-    assert asking == {"spinepipe/files.py", "spinepipe/jobs/run_lock.py"}
+    assert asking == {"spinepipe/files.py"}
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
