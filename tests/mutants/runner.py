@@ -9,10 +9,14 @@ import os
 import resource
 import signal
 import sys
-from collections.abc import Sequence
+import time
+from collections import defaultdict
+from collections.abc import Generator, Sequence
 from importlib import import_module
+from pathlib import Path
 
 import pytest
+from coverage import Coverage
 
 LOADED = (
     *("numpy", "scipy.linalg", "scipy.optimize", "scipy.spatial", "scipy.stats", "numba"),
@@ -27,12 +31,20 @@ WAITING = 20
 TIME = "time"
 """Said of a run that was stopped."""
 
+SHARED = ""
+"""What no test does alone: fixtures of a whole file, and loading it."""
+
 
 class First:
-    """Tells what fails, into an open file."""
+    """Tells what fails, into an open file; runs tests in the order in which they are named."""
 
-    def __init__(self, told: int) -> None:
+    def __init__(self, told: int, tests: Sequence[str]) -> None:
         self.told = told
+        self.place = {name: at for at, name in enumerate(tests)}
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Whole files, which are named without a test, stay as they are."""
+        items.sort(key=lambda item: self.place.get(item.nodeid, len(self.place)))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Of one test."""
@@ -45,13 +57,64 @@ class First:
             os.write(self.told, f"{report.nodeid}\n".encode())
 
 
-def failed(tests: Sequence[str], marks: str, most_s: int) -> str:
-    """The first test that fails, `TIME` for a run of more processor time; empty where all pass."""
+class Followed:
+    """Keeps which lines of the library each test runs, and its processor time in seconds."""
+
+    def __init__(self, kept: Path) -> None:
+        self.kept = kept
+        self.cpu_s: dict[str, float] = defaultdict(float)
+        self.cover = Coverage(str(kept), config_file=False, source=["spinepipe"], messages=False)
+        self.cover.set_option("run:relative_files", True)
+        self.cover.start()
+        self._now = SHARED
+
+    def _follow(self, name: str) -> None:
+        self._now = name
+        self.cover.switch_context(name)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        """From the first fixture of a test to the last."""
+        began = time.process_time()
+        self._follow(item.nodeid)
+        try:
+            return (yield)
+        finally:
+            self._follow(SHARED)
+            self.cpu_s[item.nodeid] += time.process_time() - began
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(
+        self, fixturedef: pytest.FixtureDef[object]
+    ) -> Generator[None, object, object]:
+        """What several tests share is nobody's own."""
+        before = self._now
+        if fixturedef.scope != "function":
+            self._follow(SHARED)
+        try:
+            return (yield)
+        finally:
+            self._follow(before)
+
+    def save(self) -> None:
+        """Write both beside one another."""
+        self.cover.stop()
+        self.cover.save()
+        self.kept.with_suffix(".json").write_text(json.dumps(self.cpu_s))
+
+
+def failed(tests: Sequence[str], most_s: int, kept: str = "") -> str:
+    """The first test that fails, `TIME` for a run of more processor time; empty where all pass.
+
+    Parameters
+    ----------
+    kept : where to keep what each test runs; all tests are run then, also behind one that fails.
+    """
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(reading)
-        os._exit(_run(tests, marks, most_s, writing))
+        os._exit(_run(tests, most_s, writing, kept))
     os.close(writing)
     with os.fdopen(reading) as told:
         named = told.read().split("\n")[0]
@@ -62,7 +125,7 @@ def failed(tests: Sequence[str], marks: str, most_s: int) -> str:
     return "" if ended in (0, NOTHING_THERE) else named or f"pytest ended with {ended}"
 
 
-def _run(tests: Sequence[str], marks: str, most_s: int, told: int) -> int:
+def _run(tests: Sequence[str], most_s: int, told: int, kept: str) -> int:
     """In the fork: silent, within its time."""
     resource.setrlimit(resource.RLIMIT_CPU, (most_s, most_s))
     signal.alarm(WAITING * most_s)
@@ -70,7 +133,13 @@ def _run(tests: Sequence[str], marks: str, most_s: int, told: int) -> int:
     os.dup2(silent, 1)
     os.dup2(silent, 2)
     try:
-        return int(pytest.main(["-x", "-q", "-m", marks, *tests], plugins=[First(told)]))
+        first = First(told, tests)
+        if not kept:
+            return int(pytest.main(["-x", "-q", *tests], plugins=[first]))
+        followed = Followed(Path(kept))
+        ended = int(pytest.main(["-q", *tests], plugins=[first, followed]))
+        followed.save()
+        return ended
     except BaseException as broken:
         os.write(told, f"{type(broken).__name__}\n".encode())
         return 1
@@ -81,9 +150,7 @@ def main() -> None:
     for name in LOADED:
         import_module(name)
     for line in sys.stdin:
-        asked = json.loads(line)
-        answer = failed(asked["tests"], asked["marks"], asked["most_s"])
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(failed(**json.loads(line))), flush=True)
 
 
 if __name__ == "__main__":

@@ -3,14 +3,15 @@
 import ast
 import csv
 import json
-import os
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
-from tests.mutants.nearest import nearest
+from tests.mutants.lines import mentions, statement
+from tests.mutants.reach import Reach
 from tests.mutants.sample import AREAS, ROOT, Mutant, drawn
 from tests.mutants.table import EQUAL, Ended, table
 
@@ -34,16 +35,53 @@ def test_a_mutant_is_code_that_differs_in_one_place(mutant: Mutant) -> None:
     assert differ == [mutant.change()]
 
 
-def test_the_file_named_like_a_module_is_nearest_and_rings_follow_one_another(
-    monkeypatch: pytest.MonkeyPatch,
+def line_of(path: str, start: str) -> int:
+    """Number of the first line that starts so."""
+    lines = (ROOT / path).read_text().splitlines()
+    return 1 + next(at for at, line in enumerate(lines) if line.startswith(start))
+
+
+def test_a_statement_is_known_by_its_lines_and_by_what_it_defines() -> None:
+    path = "tests/mutants/lines.py"
+    constant = statement(path, line_of(path, "_COMPOUND"))
+    assert (constant.names, constant.inside, len(constant.lines)) == ({"_COMPOUND"}, False, 4)
+    assert statement(path, line_of(path, "_COMPOUND") + 2) == constant
+    head = statement(path, line_of(path, "def statement"))
+    assert (head.names, head.inside) == ({"statement"}, False)
+    inner = statement(path, line_of(path, "        if line in one.lines"))
+    assert (inner.names, inner.inside, len(inner.lines)) == ({"statement"}, True, 1)
+    with pytest.raises(ValueError, match="nothing stands here"):
+        statement(path, 10_000)
+
+
+def test_a_name_is_mentioned_where_it_is_used() -> None:
+    places = mentions("ferguson_by")
+    assert places
+    for path, line in places:
+        text = (ROOT / path).read_text().splitlines()[line - 1]
+        assert "ferguson_by" in text
+        assert not text.strip().startswith(("def ", "from ", "import "))
+
+
+def test_tests_are_near_the_lines_that_they_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    some = tuple(ROOT / f"tests/unit/test_{name}.py" for name in ("frames", "screw", "loops"))
-    monkeypatch.setattr("tests.mutants.nearest._tests", lambda: some)
-    path = "spinepipe/experiment/screw.py"
-    assert nearest(path, 1) == ["tests/unit/test_screw.py"]
-    assert nearest("spinepipe/frames.py", 1) == ["tests/unit/test_frames.py"]
-    assert nearest(path, 1) + nearest(path, 2, beyond=1) == nearest(path, 3)
-    assert nearest("spinepipe/motion/slices.py", 3) == []
+    """Of a test file that is followed, each line that a test runs leads back to that test."""
+    tests, path = "tests/unit/test_screw.py", "spinepipe/experiment/screw.py"
+    monkeypatch.setattr("tests.mutants.reach.files_of_tests", lambda: [tests])
+    reach = Reach(tmp_path)
+    assert reach.missing() == [tests]
+    assert answers([{"tests": [tests], "most_s": 300, "kept": str(reach.kept(tests))}]) == [""]
+    reach.vouch(tests)
+    assert reach.missing() == []
+    quick, files = Reach(tmp_path).near(path, line_of(path, "    return Screw("))
+    assert files == [tests]
+    assert quick
+    assert all(name.startswith(f"{tests}::test_") for name in quick)
+    changed = json.loads((tmp_path / "tests-unit-test_screw.code").read_text())
+    assert {tests, path} <= set(changed)
+    (tmp_path / "tests-unit-test_screw.code").write_text(json.dumps({**changed, path: "other"}))
+    assert reach.missing() == [tests]
 
 
 RUNS = """\
@@ -51,10 +89,8 @@ import pytest
 
 def test_passes(): pass
 
-@pytest.mark.slow
 def test_fails(): assert False
 
-@pytest.mark.hangs
 def test_hangs():
     while True: pass
 """
@@ -64,26 +100,30 @@ def test_a_run_tells_the_first_that_fails_and_ends_what_hangs(tmp_path: Path) ->
     """Of files of their own, by a process that loads nothing beforehand."""
     (tmp_path / "test_it.py").write_text(RUNS)
     (tmp_path / "test_broken.py").write_text("import nothing_of_that_name\n")
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  slow\n  hangs\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
     asked = [
-        ("test_it.py", "not slow and not hangs", ""),
-        ("test_it.py", "slow", "test_it.py::test_fails"),
-        ("test_it.py", "hangs", "time"),
-        ("test_broken.py", "not slow", "test_broken.py"),
+        (("test_it.py::test_passes",), ""),
+        (("test_it.py",), "test_it.py::test_fails"),
+        (("test_it.py::test_hangs", "test_it.py::test_fails"), "time"),
+        (("test_broken.py",), "test_broken.py"),
     ]
-    lines = [json.dumps({"tests": [name], "marks": m, "most_s": 2}) for name, m, _ in asked]
+    told = answers([{"tests": tests, "most_s": 2} for tests, _ in asked], tmp_path)
+    assert told == [first for _, first in asked]
+
+
+def answers(asked: Sequence[Mapping[str, object]], folder: Path = ROOT) -> list[str]:
+    """What a process that runs tests in a folder says, with nothing loaded beforehand."""
     code = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
     code += "from tests.mutants import runner\nrunner.LOADED = ()\nrunner.main()\n"
     done = subprocess.run(
         [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-        input="\n".join(lines) + "\n",
+        cwd=folder,
+        input="".join(json.dumps(one) + "\n" for one in asked),
         capture_output=True,
         text=True,
         check=True,
     )
-    assert [json.loads(line) for line in done.stdout.splitlines()] == [told for *_, told in asked]
+    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
 def test_equal_ones_are_counted_apart() -> None:
