@@ -1,0 +1,103 @@
+"""Pages of results in Chromium: nobody's name runs, nothing is fetched, no script fails.
+
+Skipped where no Chromium is installed.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from hostile import PAYLOAD, renamed
+from made_results import MAKERS, Made, made
+
+from spinepipe.report.page.document import Picture, Results
+from spinepipe.studies.registry import PACKAGE, kind_of
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+QUIET = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"),
+)
+RUNS = re.sub(r"alert\((\d)\)", r"document.documentElement.dataset.ran=\1", PAYLOAD)
+"""The payload, so that the page itself tells when a part of it ran."""
+
+FAR = "http://example.org/x.png"
+BROWSER = "not an origin"
+"""Said of requests that no page makes: the clock, updates."""
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed here"),
+    pytest.mark.filterwarnings("ignore:constrained_layout not applied:UserWarning"),
+]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a browser made of a page: its elements, its addresses asked for, what scripts said."""
+
+    elements: str
+    asked_for: tuple[str, ...]
+    said: tuple[str, ...]
+
+    @property
+    def ran(self) -> bool:
+        """Whether a part of the payload ran."""
+        head = re.search(r"<html[^>]*>", self.elements)
+        return head is not None and "data-ran" in head.group()
+
+
+def seen(page: str, folder: Path) -> Seen:
+    """Open a page as somebody would who double-clicks it."""
+    file, log = folder / "page.html", folder / "net.json"
+    file.write_text(page, encoding="utf-8")
+    own = (f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}")
+    done = subprocess.run(
+        [CHROMIUM, *QUIET, *own, file.as_uri()], capture_output=True, text=True, check=True
+    )
+    said = tuple(re.findall(r"CONSOLE.*", done.stderr))
+    return Seen(done.stdout, tuple(_addresses(log)), said)
+
+
+def _addresses(log: Path) -> list[str]:
+    """What the page asked the network for; what the browser asks for itself has no origin."""
+    told = [event.get("params", {}) for event in json.loads(log.read_text())["events"]]
+    urls = {one["url"] for one in told if one.get("initiator", BROWSER) != BROWSER}
+    return sorted(url for url in urls if not url.startswith(("file:", "data:", "blob:")))
+
+
+def page_of(found: Made) -> str:
+    """The whole page of a study, drawing library included; its figures are empty."""
+    metadata = {name: {"seed": "7", "study": found.study.study} for name in found.tables}
+    titles = {one.name: one.title for one in kind_of(found.study.kind).figures}
+    pictures = {name: Picture.of(name, title, SVG, "Words.") for name, title in titles.items()}
+    write = import_module(f"{PACKAGE}.{found.study.kind}.page").document
+    shown = write(found.study, found.cohort, Results(found.tables, metadata, pictures))
+    text: str = shown.html(found.study, found.cohort)
+    return text
+
+
+def test_what_runs_and_what_is_fetched_would_be_seen(tmp_path: Path) -> None:
+    page = f"<img src='{FAR}'><script>nothing.there()</script><p>{RUNS}</p>"
+    told = seen(page, tmp_path)
+    assert told.ran
+    assert told.asked_for == (FAR,)
+    assert any("nothing is not defined" in line for line in told.said)
+
+
+@pytest.mark.parametrize("kind", sorted(MAKERS))
+def test_names_do_not_run_and_the_page_needs_no_network(kind: str, tmp_path: Path) -> None:
+    found = renamed(made(kind, tmp_path), RUNS, tmp_path)
+    told = seen(page_of(found), tmp_path)
+    assert told.elements.count("&lt;script&gt;document") > 10, "they do stand in the page"
+    assert not told.ran
+    assert told.asked_for == ()
+    assert [line for line in told.said if "Error" in line or "Uncaught" in line] == []
