@@ -181,6 +181,10 @@ def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
 
 def copy_project(folder: Path) -> Project:
     """The project without results and with nothing selected but a study `small`."""
+    # Not above: it brings most of the library along, which few tests need.
+    from machine_code import of_joints
+
+    of_joints()
     folder.mkdir(parents=True)
     for part in _PARTS:
         source = _ROOT / part

@@ -9,6 +9,7 @@ import stiffening_chains
 import straight_chains
 import tracked_cohort
 from lever import lever
+from machine_code import of_muscles
 from small_project import Project, copy_project
 
 from tests.generators import ais_films
@@ -77,6 +78,7 @@ def tracking(folder: Path) -> Project:
 
 
 def trunk_loads(folder: Path) -> Project:
+    of_muscles()
     project = copy_project(folder)
     cohort = "config/cohorts/trunk_volunteers"
     shutil.copytree(ROOT / cohort, project.path(cohort))

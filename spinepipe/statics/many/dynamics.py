@@ -123,7 +123,9 @@ def _weigh(every_axes: Array, inertias: Array, mass: Array) -> None:
         axes = every_axes[n]
         carried[:] = 0.0
         for j in range(len(axes) - 1, -1, -1):
-            carried += inertias[n, j]
+            for r in range(6):
+                for c in range(6):
+                    carried[r, c] += inertias[n, j, r, c]
             for k in range(6):
                 for r in range(6):
                     momentum[r] = 0.0
@@ -214,7 +216,8 @@ def _whirl(axes: Array, inertias: Array, rates: Array, found: Array) -> None:
             _add_cross(twist[:3], momentum[3:], 1.0, wrenches[j, 3:])
         beyond[:] = 0.0
         for j in range(joints - 1, -1, -1):
-            beyond += wrenches[j]
+            for r in range(6):
+                beyond[r] += wrenches[j, r]
             for k in range(6):
                 found[n, j, k] = 0.0
                 for r in range(6):

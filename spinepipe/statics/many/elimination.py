@@ -133,6 +133,14 @@ def _add_product(matrix: Array, vectors: Array, out: Array) -> None:
 
 
 @compiled
+def _add(values: Array, out: Array) -> None:
+    """Add values (r, m) to out (r, m)."""
+    for r in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            out[r, c] += values[r, c]
+
+
+@compiled
 def _hold(fixed: Flags, matrix: Array, right: Array) -> None:
     """Make rows of fixed coordinates (6,) say that these do not move, and others not ask."""
     for k in range(6):
@@ -165,11 +173,13 @@ def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indic
                     if j + 1 < joints:
                         slope[r, i] -= slopes[j + 1, r, i]
             if pushed:
-                passed += pushes[lane, j]
+                _add(pushes[lane, j], passed)
             if displaced:
                 _add_product(slope, upper[lane, j], passed)
             _below(axes[j], rows[lane, j], blocks[lane, j], slope, matrix, right)
-            right[:, 6:] = sources[lane, j]
+            for k in range(6):
+                for c in range(m):
+                    right[k, 6 + c] = sources[lane, j, k, c]
             _add_product(axes[j], passed, right[:, 6:])
             if held:
                 _hold(fixed[lane, j], matrix, right)
@@ -186,14 +196,14 @@ def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indic
         twist[:] = 0.0
         for j in range(joints):
             if displaced:
-                twist += lower[lane, j]
+                _add(lower[lane, j], twist)
             for k in range(6):
                 for c in range(m):
                     rates[lane, j, k, c] = gains[j, k, 6 + c]
             _add_product(gains[j, :, :6], twist, rates[lane, j])
             _add_product(axes[j].T, rates[lane, j], twist)
             if displaced:
-                twist += upper[lane, j]
+                _add(upper[lane, j], twist)
 
 
 def missing(seen: Survey, rates: Array, pushes: Array = NONE) -> Array:

@@ -29,7 +29,11 @@ Flags = NDArray[np.bool_]
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
-    """The function as machine code, kept beside this file; division by zero is no exception."""
+    """The function as machine code, kept beside this file; division by zero is no exception.
+
+    Entries are copied and added one by one in loops: for `a[:] = b` or `a += b` of arrays a message
+    about shapes is compiled each time, which takes longer than all the rest.
+    """
     result: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
     return result
 
@@ -153,8 +157,10 @@ def move(
             for r in range(3):
                 turned_into(turned[j - 1], rotations[j, :, r], below[:, r])
         else:
-            below[:] = rotations[j]
-            pivot[:] = origins[j]
+            for r in range(3):
+                pivot[r] = origins[j, r]
+                for c in range(3):
+                    below[r, c] = rotations[j, r, c]
         turned_into(below, q[j, :3], slid)
         for r in range(3):
             pivot[r] += slid[r] + (shifted[j - 1, r] if j else 0.0)
