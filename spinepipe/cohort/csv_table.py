@@ -8,7 +8,9 @@ from difflib import SequenceMatcher
 from math import isfinite, nan
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from spinepipe.cohort.columns import Column, TableForm
 from spinepipe.documents.names import ALLOWED, LONGEST_NAME, name_fault
@@ -16,10 +18,10 @@ from spinepipe.documents.text import (
     LONGEST_CELL,
     MOST_CSV_BYTES,
     NUMBER,
-    longest_word,
+    has_long_word,
     read_text,
 )
-from spinepipe.problems import MOST_MADE, Problem, Spelling, first_of
+from spinepipe.problems import Problem, Spelling, first_of
 
 MOST_ROWS = 150_000
 
@@ -132,16 +134,28 @@ def _converted(
         )
     if column.kind == "text":
         return _text_series(cells, rows.lines)
-    numbers = [float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells]
-    wrong: list[Problem] = []
-    for index, (number, cell) in enumerate(zip(numbers, cells, strict=True)):
-        if cell and (fault := _number_fault(cell, number, column)):
-            numbers[index] = nan
-            if len(wrong) <= MOST_MADE:
-                place = (rows.file, rows.lines[index], column.name)
-                wrong.append(Problem(*place, f"'{cell}'", *fault))
-    problems += first_of(wrong)
+    numbers = np.array([float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells])
+    wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
+    problems += first_of(
+        Problem(
+            *(rows.file, rows.lines[index], column.name, f"'{cells[index]}'"),
+            *_number_fault(cells[index], float(numbers[index]), column),
+        )
+        for index in wrong
+    )
+    numbers[wrong] = nan
     return pd.Series(numbers, index=rows.lines, dtype="float64")
+
+
+def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]:
+    """Which numbers of a column it may not have; also what is none."""
+    with np.errstate(invalid="ignore"):
+        wrong = ~np.isfinite(numbers)
+        if column.kind == "integer":
+            wrong |= numbers != np.trunc(numbers)
+        wrong |= numbers <= column.low if column.open_low else numbers < column.low
+        wrong |= numbers >= column.high if column.open_high else numbers > column.high
+    return wrong
 
 
 def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
@@ -164,19 +178,15 @@ def _remedy(number: float, column: Column) -> str:
     return "correct it; check its unit, its sign, and for a slip of the decimal point"
 
 
-def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:
-    """What is allowed and what to do, when a number is wrong."""
+def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str]:
+    """What is allowed and what to do about a number that is wrong."""
     if not isfinite(number):
         remedy = "correct it" if column.required else "leave the cell empty if not measured"
         remedy = "write a decimal point" if "," in cell else remedy
         return "a finite number with a decimal point", remedy
     if column.kind == "integer" and number != int(number):
         return "a whole number", "correct it"
-    low_bad = number <= column.low if column.open_low else number < column.low
-    high_bad = number >= column.high if column.open_high else number > column.high
-    if low_bad or high_bad:
-        return f"{column.meaning}: {column.range_text}", _remedy(number, column)
-    return None
+    return f"{column.meaning}: {column.range_text}", _remedy(number, column)
 
 
 def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
@@ -255,7 +265,7 @@ def _long_cells(file: str, records: Records) -> Iterator[Problem]:
 
 def _is_too_long(cell: str) -> bool:
     """Remarks may be longer than names and numbers; they are told by their blanks."""
-    return len(cell) > LONGEST_REMARK or longest_word(cell) > LONGEST_CELL
+    return len(cell) > LONGEST_REMARK or has_long_word(cell)
 
 
 def _header_problems(file: str, header: list[str]) -> list[Problem]:
