@@ -21,7 +21,7 @@ from spinepipe.cohort.checks import (
 from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
-from spinepipe.cohort.draft import Draft, applied_loads, number_of_applied_loads
+from spinepipe.cohort.draft import Draft, number_of_applied_loads
 from spinepipe.cohort.misnamed import misnamed
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.documents.inside import outside
@@ -183,15 +183,14 @@ def _without(draft: Draft, *stems: str) -> Draft:
 
 
 def _checks(draft: Draft) -> Iterator[Problem]:
-    applied = list(applied_loads(draft))
     for found in (
         check_names(draft),
         check_keys(draft),
         check_geometry(draft),
         check_bodies(draft),
-        check_loads(draft, applied),
-        check_steps(draft, applied),
-        check_motion(draft, applied),
+        check_loads(draft, draft.applied),
+        check_steps(draft, draft.applied),
+        check_motion(draft, draft.applied),
     ):
         yield from first_of(found)
 
