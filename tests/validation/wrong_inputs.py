@@ -7,7 +7,6 @@ in `results/validation/wrong_inputs`, as long as library, documentation and case
 run that was cut off goes on.
 """
 
-import hashlib
 import json
 import os
 import resource
@@ -26,6 +25,7 @@ from tests.cases.spoilt_cases import Seen, Verdict, asked, look, verdict
 from tests.generators.spoilt.case import Case, removed
 from tests.generators.spoilt.catalogue import cases, sample
 from tests.generators.spoilt.projects import projects, write
+from tests.validation.kept import Kept
 
 DRAWN = 3000
 
@@ -36,8 +36,6 @@ MOST_BYTES = 6_000_000_000
 
 CORES = 2
 
-ROOT = Path(__file__).resolve().parents[2]
-PLACE = ROOT / "results/validation/wrong_inputs"
 HANGS_ON = (
     *("spinepipe/**/*.py", "docs/**/*.md", "config/**/*.*", "tests/generators/spoilt/*.py"),
     *("tests/cases/spoilt_cases.py", "tests/validation/wrong_inputs.py"),
@@ -59,36 +57,19 @@ _held: list[Case] = []
 
 def judged(some: Sequence[Case], workers: int = CORES) -> Iterator[Judged]:
     """Cases as they are done, those first that an earlier run has looked at."""
-    file = _kept_in()
-    before = _kept(file)
+    kept = Kept("wrong_inputs", HANGS_ON)
     for case in some:
-        if case.name in before:
-            what, code, printed = before[case.name]
+        if case.name in kept.known:
+            what, code, printed = kept.known[case.name]
             yield Judged(case, Verdict(what), Seen(code, printed))
-    _held[:] = [case for case in some if case.name not in before]
+    _held[:] = [case for case in some if case.name not in kept.known]
     if not _held:
         return
     _warm()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with file.open("a", encoding="utf-8") as out, get_context("fork").Pool(workers) as pool:
+    with get_context("fork").Pool(workers) as pool:
         for number, what, code, printed in pool.imap_unordered(_one, range(len(_held))):
-            out.write(json.dumps([_held[number].name, what, code, printed]) + "\n")
-            out.flush()
+            kept.add(_held[number].name, [what, code, printed])
             yield Judged(_held[number], Verdict(what), Seen(code, printed))
-
-
-def _kept_in() -> Path:
-    """The file of what was seen by this code with this documentation."""
-    found = hashlib.sha256()
-    for path in sorted(path for pattern in HANGS_ON for path in ROOT.glob(pattern)):
-        found.update(path.read_bytes())
-    return PLACE / f"{found.hexdigest()[:12]}.jsonl"
-
-
-def _kept(file: Path) -> dict[str, tuple[str, int, str]]:
-    """Verdict, exit code and words of cases by name; a last line that was cut off counts not."""
-    lines = file.read_text(encoding="utf-8").split("\n")[:-1] if file.exists() else []
-    return {name: (what, code, printed) for name, what, code, printed in map(json.loads, lines)}
 
 
 def _one(number: int) -> tuple[int, str, int, str]:

@@ -6,8 +6,6 @@ What was measured by this code is kept, kind by kind and part by part: started a
 goes on with what is missing. The tables are written after each piece.
 """
 
-import hashlib
-import json
 import signal
 import sys
 import tempfile
@@ -18,11 +16,10 @@ from typing import Any
 import pandas as pd
 from small_studies import SMALL
 
+from tests.validation.kept import Kept
 from tests.validation.soak import kills, memory, targets
 from tests.validation.written import write, written
 
-ROOT = Path(__file__).resolve().parents[3]
-PLACE = ROOT / "results/validation/soak"
 HANGS_ON = (
     *("Snakefile", "workflow/rules/*.smk", "profiles/default/*", "spinepipe/jobs/*.py"),
     *("spinepipe/files.py", "spinepipe/marks.py", "spinepipe/world.py"),
@@ -64,17 +61,12 @@ def main() -> None:
 
 
 def kept(name: str, measure: Callable[[Path], Iterable[dict[str, Any]]]) -> Rows:
-    """Rows of a piece: from its file, or measured in a temporary folder."""
-    found = hashlib.sha256()
-    for path in sorted(path for pattern in HANGS_ON for path in ROOT.glob(pattern)):
-        found.update(path.read_bytes())
-    file = PLACE / found.hexdigest()[:12] / f"{name}.json"
-    if not file.exists():
+    """Rows of a piece: as they were kept, or measured in a temporary folder."""
+    pieces = Kept("soak", HANGS_ON)
+    if name not in pieces.known:
         with tempfile.TemporaryDirectory(prefix="spinepipe-soak-") as folder:
-            rows = list(measure(Path(folder)))
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(rows, indent=1))
-    rows = json.loads(file.read_text())
+            pieces.add(name, list(measure(Path(folder))))
+    rows: Rows = pieces.known[name]
     return rows
 
 
