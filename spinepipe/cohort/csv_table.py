@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
+from functools import cached_property
 from math import isfinite, nan
 from pathlib import Path
 
@@ -53,6 +54,11 @@ class Rows:
     cells: list[list[str]]
     ragged: frozenset[int]
 
+    @cached_property
+    def index(self) -> "pd.Index[int]":
+        """Lines as all columns of the table have them."""
+        return pd.Index(self.lines)
+
 
 def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | None, list[Problem]]:
     """Read and convert one CSV file.
@@ -82,7 +88,7 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
         cells = texts.pop(column.name, [""] * len(rows.lines))
         data[column.name] = _converted(cells, column, rows, problems)
     if form.carries:
-        data |= {name: _text_series(cells, rows.lines) for name, cells in texts.items()}
+        data |= {name: _text_series(cells, rows.index) for name, cells in texts.items()}
     return pd.DataFrame(data), problems
 
 
@@ -133,8 +139,9 @@ def _converted(
             if not cell and line not in rows.ragged
         )
     if column.kind == "text":
-        return _text_series(cells, rows.lines)
-    numbers = np.array([float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells])
+        return _text_series(cells, rows.index)
+    known = {cell: float(cell) if NUMBER.fullmatch(cell) else nan for cell in set(cells)}
+    numbers = np.array([known[cell] for cell in cells])
     wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
     problems += first_of(
         Problem(
@@ -144,7 +151,7 @@ def _converted(
         for index in wrong
     )
     numbers[wrong] = nan
-    return pd.Series(numbers, index=rows.lines, dtype="float64")
+    return pd.Series(numbers, index=rows.index, dtype="float64")
 
 
 def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]:
@@ -158,7 +165,7 @@ def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]
     return wrong
 
 
-def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
+def _text_series(cells: list[str], lines: "pd.Index[int]") -> "pd.Series":
     return pd.Series([cell or None for cell in cells], index=lines, dtype="str")
 
 
