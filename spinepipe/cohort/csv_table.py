@@ -140,7 +140,7 @@ def _converted(
         )
     if column.kind == "text":
         return _text_series(cells, rows.index)
-    known = {cell: float(cell) if NUMBER.fullmatch(cell) else nan for cell in set(cells)}
+    known = {cell: _number(cell) for cell in set(cells)}
     numbers = np.array([known[cell] for cell in cells])
     wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
     problems += first_of(
@@ -152,6 +152,11 @@ def _converted(
     )
     numbers[wrong] = nan
     return pd.Series(numbers, index=rows.index, dtype="float64")
+
+
+def _number(cell: str) -> float:
+    """The number that a cell is; NaN where it is none."""
+    return float(cell) if cell[:1] in "+-.0123456789" and NUMBER.fullmatch(cell) else nan
 
 
 def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]:
