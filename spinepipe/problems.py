@@ -107,7 +107,7 @@ class InputError(Exception):
         return "\n".join([f"{head}:", *(f"  {problem}" for problem in self.problems)])
 
 
-MOST_MADE = 5000
+MOST_MADE = 2000
 """Faults that one check of one input tells apart; a file with more is none of this kind."""
 
 

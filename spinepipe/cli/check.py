@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from spinepipe import cohort as cohorts
 from spinepipe.cli.find import cohort_names, study_names, unknown
-from spinepipe.cohort import Cohort
+from spinepipe.cohort import Cohort, Reader
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.free import unmeasured
+from spinepipe.studies.read import ReadCohort
 from spinepipe.studies.registry import PACKAGE, every_form, kind_of
 from spinepipe.studies.study import COHORTS, Study
 
@@ -68,6 +68,7 @@ Task = tuple[str, Look]
 def _tasks(root: Path, names: list[str]) -> list[Task]:
     """What is looked at: its title, and what looks at it."""
     known_studies, known_cohorts = study_names(root), cohort_names(root)
+    read = Reader().read
     if not known_studies and not known_cohorts:
         allowed = "a folder with config/studies and config/cohorts"
         remedy = "go there or pass --root"
@@ -76,22 +77,22 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
         )
     if not names:
         tasks: list[Task] = [("config/config.yaml", lambda: Seen(_selection(root)))]
-        tasks += [_study_task(root, name) for name in known_studies]
-        return tasks + [_cohort_task(root, name) for name in known_cohorts]
+        tasks += [_study_task(root, name, read) for name in known_studies]
+        return tasks + [_cohort_task(root, name, read) for name in known_cohorts]
     tasks = []
     for name in names:
         if name in known_studies:
-            tasks.append(_study_task(root, name))
+            tasks.append(_study_task(root, name, read))
         elif name in known_cohorts:
-            tasks.append(_cohort_task(root, name))
+            tasks.append(_cohort_task(root, name, read))
         else:
             raise InputError([unknown("study", name, [*known_studies, *known_cohorts])])
     return tasks
 
 
-def _study_task(root: Path, name: str) -> Task:
+def _study_task(root: Path, name: str, read: ReadCohort) -> Task:
     def look() -> Seen:
-        study, cohort = _checked(root, name)
+        study, cohort = _checked(root, name, read)
         words, warnings = _told_by_kind(study, cohort, root)
         told = f"{study.kind} on cohort {cohort.name}"
         warnings = warnings or unmeasured(root, study, cohort)
@@ -100,21 +101,21 @@ def _study_task(root: Path, name: str) -> Task:
     return f"study {name}", look
 
 
-def _checked(root: Path, name: str) -> tuple[Study, Cohort]:
+def _checked(root: Path, name: str, read: ReadCohort) -> tuple[Study, Cohort]:
     """A sound study and its cohort.
 
     What cannot be right in a cohort is told first where the two do not fit: lengths in cm, or loads
     that are all zero, are behind many misfits.
     """
     try:
-        return studies.check(root, name)
+        return studies.check(root, name, read_cohort=read)
     except studies.Misfit as error:
         raise InputError([*refusals(error.cohort), *error.problems]) from error
 
 
-def _cohort_task(root: Path, name: str) -> Task:
+def _cohort_task(root: Path, name: str, read: ReadCohort) -> Task:
     def look() -> Seen:
-        cohort = cohorts.read(root / COHORTS / name, every_form())
+        cohort = read(root / COHORTS / name, every_form())
         return Seen(_described(cohort), cohort=cohort)
 
     return f"cohort {name}", look

@@ -12,6 +12,7 @@ import numpy as np
 
 from spinepipe.cohort.draft import Draft
 from spinepipe.cohort.exchanged_landmarks import Suspect, suspect
+from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose
 from spinepipe.problems import Problem
@@ -162,6 +163,9 @@ def _origin_spacing(draft: Draft) -> Iterator[Problem]:
 
 INERTIA = tuple(f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
 
+SYMMETRIC = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+"""Where in `INERTIA` the entries of the matrix stand."""
+
 ROUNDING = 1e-3
 """Inertias in files are rounded to a few digits; a flat body sits exactly on the limit."""
 
@@ -178,10 +182,7 @@ LARGEST_GYRATION_M = 1.0
 
 def check_bodies(draft: Draft) -> Iterator[Problem]:
     """Problems of ``bodies.csv`` beyond its cells and names."""
-    for line, (mass, *inertia) in draft.rows("bodies", "mass_kg", *INERTIA):
-        if all(map(isnan, inertia)):
-            continue
-        yield from _inertia_problems(draft.file("bodies"), line, mass, np.array(inertia))
+    yield from _inertias(draft)
     yield from _exchanged(draft)
     yield from _missing(draft)
     yield from _spacing(draft)
@@ -198,25 +199,40 @@ def _exchanged(draft: Draft) -> Iterator[Problem]:
         yield Problem(*place, found, "mass_kg in kg and com_x_mm in mm", remedy)
 
 
-def _inertia_problems(file: str, line: int, mass: float, six: Array) -> Iterator[Problem]:
+def _inertias(draft: Draft) -> Iterator[Problem]:
+    """Inertias that no body has; all of a file are looked at together."""
+    rows = list(draft.rows("bodies", "mass_kg", *INERTIA))
+    six = np.array([cells[1:] for _, cells in rows]).reshape(len(rows), len(INERTIA))
     empty = np.isnan(six)
-    if empty.any():
-        column = INERTIA[int(np.argmax(empty))]
+    moments = np.zeros((len(rows), 3))
+    whole = ~empty.any(axis=1)
+    moments[whole] = eigh(six[whole][:, SYMMETRIC])[0]
+    file = draft.file("bodies")
+    for index in np.flatnonzero(~empty.all(axis=1)).tolist():
+        line, (mass, *_) = rows[index]
+        if whole[index]:
+            yield from _moment_problems(file, line, mass, moments[index])
+            continue
+        column = INERTIA[int(np.argmax(empty[index]))]
         remedy = "fill the row up, with 0 where a product is zero, or empty all six"
         yield Problem(file, line, column, "an incomplete inertia", "all six or none", remedy)
-        return
-    xx, yy, zz, xy, xz, yz = six
-    moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    slack = ROUNDING * float(np.abs(moments).max())
-    found = f"principal moments {', '.join(f'{m:.4g}' for m in moments)} kg m2"
-    remedy = "check signs, units (kg m2) and that the inertia is about the centre of mass"
+
+
+def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Iterator[Problem]:
+    """What is wrong with principal moments of inertia, kg m2, smallest first."""
+    moments: list[float] = of_body.tolist()
+    slack = ROUNDING * max(map(abs, moments))
+    allowed = None
     if moments[0] < -slack:
-        yield Problem(file, line, INERTIA[0], found, "no negative principal moment", remedy)
+        allowed = "no negative principal moment"
     elif moments[0] + moments[1] < moments[2] - slack:
         allowed = "no principal moment larger than the sum of the other two"
+    if allowed is not None:
+        found = f"principal moments {', '.join(f'{m:.4g}' for m in moments)} kg m2"
+        remedy = "check signs, units (kg m2) and that the inertia is about the centre of mass"
         yield Problem(file, line, INERTIA[0], found, allowed, remedy)
     if moments[2] > mass * LARGEST_GYRATION_M**2:
-        gyration = np.sqrt(moments[2] / mass)
+        gyration = sqrt(moments[2] / mass)
         found = f"a radius of gyration of {gyration:.3g} m"
         allowed = f"at most {LARGEST_GYRATION_M:g} m"
         remedy = "give kg m2, not kg mm2 or kg cm2"

@@ -1,13 +1,14 @@
 """Does ``supports.csv`` say of a rig what can be done? Names, states, values to be prescribed."""
 
 from collections.abc import Iterator
+from functools import cache
 from math import isnan
 
 from spinepipe.cohort.cohort import EVERYONE
-from spinepipe.cohort.draft import Draft, applied_loads
-from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Fixed, fixed
+from spinepipe.cohort.draft import Draft
+from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Rig
 from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import Problem, Spelling, first_of
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 WORDS = {"coordinate": COORDINATES, "state": STATES, "reaction": REACTIONS}
@@ -18,11 +19,14 @@ def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]
     """Problems of ``supports.csv`` beyond its cells and keys; ``document`` is ``cohort.yaml``."""
     if "supports" not in draft.tables:
         return
-    yield from _places(draft)
-    yield from _words(draft)
-    yield from _tests(draft)
-    yield from _without_values(draft)
-    yield from _without_sd(draft, document)
+    for found in (
+        _places(draft),
+        _words(draft),
+        _tests(draft),
+        _without_values(draft),
+        _without_sd(draft, document),
+    ):
+        yield from first_of(found)
 
 
 def _places(draft: Draft) -> Iterator[Problem]:
@@ -53,7 +57,7 @@ def _words(draft: Draft) -> Iterator[Problem]:
 
 
 def _tests(draft: Draft) -> Iterator[Problem]:
-    tests = dict.fromkeys((EVERYONE, *(load.test for load in applied_loads(draft))))
+    tests = dict.fromkeys((EVERYONE, *(load.test for load in draft.applied)))
     known = Spelling(tests, "add its loads, zeros where nothing acts")
     if "loads" not in draft.tables and "loads" not in draft.absent:
         return
@@ -68,12 +72,18 @@ def _without_values(draft: Draft) -> Iterator[Problem]:
     """A prescribed coordinate needs a reading at every step; said once per test and coordinate."""
     if "motion" not in draft.tables and "motion" not in draft.absent:
         return
-    motion = _measured(draft)
-    reported = set()
-    for load in applied_loads(draft):
+    if not any(state == PRESCRIBED for _, (state,) in draft.rows("supports", "state")):
+        return
+    rig, motion, reported = (
+        Rig(draft.tables["supports"], draft.joint_names),
+        _measured(draft),
+        set(),
+    )
+    fixed = cache(rig.fixed)
+    for load in draft.applied:
         if load.step is None:
             continue
-        for one in _fixed(draft, load.specimen, load.test):
+        for one in fixed(load.specimen, load.test):
             joint, column = draft.joint_names[one.joint], COORDINATE_COLUMNS[one.coordinate]
             key = (load.specimen, load.test, load.cycle, load.step, joint, column)
             if one.state != PRESCRIBED or key in motion or (*key[:3], *key[4:]) in reported:
@@ -100,10 +110,6 @@ def _measured(draft: Draft) -> set[tuple[object, ...]]:
         named = zip(COORDINATE_COLUMNS, values, strict=True)
         found |= {(*place, column) for column, value in named if not isnan(value)}
     return found
-
-
-def _fixed(draft: Draft, specimen: str, test: str) -> tuple[Fixed, ...]:
-    return fixed(draft.tables["supports"], specimen, test, draft.joint_names)
 
 
 def _without_sd(draft: Draft, document: Document | None) -> Iterator[Problem]:

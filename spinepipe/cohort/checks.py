@@ -7,7 +7,7 @@ was caused by a load that is given.
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isnan
 
@@ -102,7 +102,7 @@ POINT = ("px_mm", "py_mm", "pz_mm")
 FORCE = ("fx_n", "fy_n", "fz_n")
 
 
-def check_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def check_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     """Problems of ``loads.csv`` beyond its cells and names."""
     yield from _repeated_loads(draft, applied)
     for stem in ("loads", "preload"):
@@ -114,7 +114,7 @@ def check_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
     yield from _followers(draft)
 
 
-def _repeated_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def _repeated_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     seen: dict[tuple[object, ...], int] = {}
     reported = set()
     for load in applied:
@@ -130,7 +130,7 @@ def _repeated_loads(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Proble
             yield Problem(draft.file("loads"), load.line, None, found, allowed, remedy)
 
 
-def _preload(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def _preload(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     """A preload belongs to a test, and to a point of a vertebra if it is a force."""
     if "loads" not in draft.tables and "loads" not in draft.absent:
         return
@@ -165,7 +165,7 @@ def _partial_points(draft: Draft, stem: str) -> Iterator[Problem]:
             yield Problem(*place, "an incomplete point", "all of px, py, pz or none", remedy)
 
 
-def _without_a_point(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def _without_a_point(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     """A force without a point acts at the centre of mass, which must then be known."""
     rows = draft.rows("loads", *POINT, *FORCE)
     pointless = {line for line, cells in rows if _pulls_without_a_point(cells)}
@@ -228,7 +228,7 @@ def _followers(draft: Draft) -> Iterator[Problem]:
             yield Problem(file, line, "follower_n", found, allowed, remedy)
 
 
-def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def check_motion(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     """Motion without loads; said once per test, cycle or step of a specimen."""
     if "motion" in draft.absent or not ("loads" in draft.tables or "loads" in draft.absent):
         return
@@ -253,7 +253,7 @@ def check_motion(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
             yield _problem(file, line, missing, tests)
 
 
-def _prefixes(applied: list[AppliedLoad]) -> set[tuple[object, ...]]:
+def _prefixes(applied: Sequence[AppliedLoad]) -> set[tuple[object, ...]]:
     """(specimen, test), with cycle, and with cycle and step, of every load."""
     known: set[tuple[object, ...]] = set()
     for load in applied:
@@ -336,7 +336,7 @@ def _quoted(name: str) -> str:
     return f"'{name}'"
 
 
-def check_steps(draft: Draft, applied: list[AppliedLoad]) -> Iterator[Problem]:
+def check_steps(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
     """Gaps in ``loads.csv`` and, joint by joint, in ``motion.csv``."""
     loads = (((a.specimen, a.test, a.cycle), a.step, a.line) for a in applied)
     remedy = "add the row, with zeros where nothing acts"

@@ -5,10 +5,13 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
+from functools import cached_property
 from math import isfinite, nan
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from spinepipe.cohort.columns import Column, TableForm
 from spinepipe.documents.names import ALLOWED, LONGEST_NAME, name_fault
@@ -16,10 +19,10 @@ from spinepipe.documents.text import (
     LONGEST_CELL,
     MOST_CSV_BYTES,
     NUMBER,
-    longest_word,
+    has_long_word,
     read_text,
 )
-from spinepipe.problems import MOST_MADE, Problem, Spelling, first_of
+from spinepipe.problems import Problem, Spelling, first_of
 
 MOST_ROWS = 150_000
 
@@ -51,6 +54,11 @@ class Rows:
     cells: list[list[str]]
     ragged: frozenset[int]
 
+    @cached_property
+    def index(self) -> "pd.Index[int]":
+        """Lines as all columns of the table have them."""
+        return pd.Index(self.lines)
+
 
 def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | None, list[Problem]]:
     """Read and convert one CSV file.
@@ -80,7 +88,7 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
         cells = texts.pop(column.name, [""] * len(rows.lines))
         data[column.name] = _converted(cells, column, rows, problems)
     if form.carries:
-        data |= {name: _text_series(cells, rows.lines) for name, cells in texts.items()}
+        data |= {name: _text_series(cells, rows.index) for name, cells in texts.items()}
     return pd.DataFrame(data), problems
 
 
@@ -131,20 +139,38 @@ def _converted(
             if not cell and line not in rows.ragged
         )
     if column.kind == "text":
-        return _text_series(cells, rows.lines)
-    numbers = [float(cell) if NUMBER.fullmatch(cell) else nan for cell in cells]
-    wrong: list[Problem] = []
-    for index, (number, cell) in enumerate(zip(numbers, cells, strict=True)):
-        if cell and (fault := _number_fault(cell, number, column)):
-            numbers[index] = nan
-            if len(wrong) <= MOST_MADE:
-                place = (rows.file, rows.lines[index], column.name)
-                wrong.append(Problem(*place, f"'{cell}'", *fault))
-    problems += first_of(wrong)
-    return pd.Series(numbers, index=rows.lines, dtype="float64")
+        return _text_series(cells, rows.index)
+    known = {cell: _number(cell) for cell in set(cells)}
+    numbers = np.array([known[cell] for cell in cells])
+    wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
+    problems += first_of(
+        Problem(
+            *(rows.file, rows.lines[index], column.name, f"'{cells[index]}'"),
+            *_number_fault(cells[index], float(numbers[index]), column),
+        )
+        for index in wrong
+    )
+    numbers[wrong] = nan
+    return pd.Series(numbers, index=rows.index, dtype="float64")
 
 
-def _text_series(cells: list[str], lines: list[int]) -> "pd.Series":
+def _number(cell: str) -> float:
+    """The number that a cell is; NaN where it is none."""
+    return float(cell) if cell[:1] in "+-.0123456789" and NUMBER.fullmatch(cell) else nan
+
+
+def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]:
+    """Which numbers of a column it may not have; also what is none."""
+    with np.errstate(invalid="ignore"):
+        wrong = ~np.isfinite(numbers)
+        if column.kind == "integer":
+            wrong |= numbers != np.trunc(numbers)
+        wrong |= numbers <= column.low if column.open_low else numbers < column.low
+        wrong |= numbers >= column.high if column.open_high else numbers > column.high
+    return wrong
+
+
+def _text_series(cells: list[str], lines: "pd.Index[int]") -> "pd.Series":
     return pd.Series([cell or None for cell in cells], index=lines, dtype="str")
 
 
@@ -164,19 +190,15 @@ def _remedy(number: float, column: Column) -> str:
     return "correct it; check its unit, its sign, and for a slip of the decimal point"
 
 
-def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str] | None:
-    """What is allowed and what to do, when a number is wrong."""
+def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str]:
+    """What is allowed and what to do about a number that is wrong."""
     if not isfinite(number):
         remedy = "correct it" if column.required else "leave the cell empty if not measured"
         remedy = "write a decimal point" if "," in cell else remedy
         return "a finite number with a decimal point", remedy
     if column.kind == "integer" and number != int(number):
         return "a whole number", "correct it"
-    low_bad = number <= column.low if column.open_low else number < column.low
-    high_bad = number >= column.high if column.open_high else number > column.high
-    if low_bad or high_bad:
-        return f"{column.meaning}: {column.range_text}", _remedy(number, column)
-    return None
+    return f"{column.meaning}: {column.range_text}", _remedy(number, column)
 
 
 def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
@@ -255,7 +277,7 @@ def _long_cells(file: str, records: Records) -> Iterator[Problem]:
 
 def _is_too_long(cell: str) -> bool:
     """Remarks may be longer than names and numbers; they are told by their blanks."""
-    return len(cell) > LONGEST_REMARK or longest_word(cell) > LONGEST_CELL
+    return len(cell) > LONGEST_REMARK or has_long_word(cell)
 
 
 def _header_problems(file: str, header: list[str]) -> list[Problem]:

@@ -41,6 +41,11 @@ class Draft:
         table = self.tables.get("specimens")
         return () if table is None else tuple(dict.fromkeys(table["specimen"].dropna()))
 
+    @cached_property
+    def applied(self) -> tuple["AppliedLoad", ...]:
+        """Every load on every specimen in every cycle, as `applied_loads` gives them."""
+        return tuple(applied_loads(self))
+
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Joints, caudal to cranial."""

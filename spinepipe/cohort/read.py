@@ -1,8 +1,9 @@
 """Read a cohort folder, or say everything that is wrong with it."""
 
+import gc
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from spinepipe.cohort.checks import (
 from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.cohort.csv_table import read_table
-from spinepipe.cohort.draft import Draft, applied_loads, number_of_applied_loads
+from spinepipe.cohort.draft import Draft, number_of_applied_loads
 from spinepipe.cohort.misnamed import misnamed
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.documents.inside import outside
@@ -30,34 +31,90 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem, first_of
 
-__all__ = ["read"]
+__all__ = ["Reader", "read"]
 
 MOST_SPECIMENS = 1000
+
+MOST_KEPT = 32
+"""Cohorts that a reader keeps."""
 
 MOST_APPLIED = 150_000
 """Rows of loads.csv with * and empty cycles written out: specimens x cycles x steps."""
 
 
 def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
-    """Read and validate one cohort folder.
+    """Read and validate one cohort folder, as `Reader.read` does."""
+    return Reader().read(folder, further)
 
-    Parameters
-    ----------
-    folder : ``config/cohorts/<cohort>``, or any other folder of the same form.
-    further : files that are read besides those of every cohort, where they are there.
 
-    Raises
-    ------
-    InputError
-        With every problem of every file of the folder.
+@dataclass
+class Reader:
+    """Reads folders that do not change while it lives, the last `MOST_KEPT` of them once.
+
+    `spinepipe check` asks for the cohort of each study, and for each cohort.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        found, allowed = "no such folder", "a folder with cohort.yaml and specimens.csv"
-        raise InputError([Problem(str(folder), None, None, found, allowed, "check the name")])
-    name = folder.resolve().name
+
+    _known: dict[tuple[Path, tuple[TableForm, ...]], "_Outcome"] = field(default_factory=dict)
+
+    def read(self, folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
+        """Read and validate one cohort folder.
+
+        Parameters
+        ----------
+        folder : ``config/cohorts/<cohort>``, or any other folder of the same form.
+        further : files that are read besides those of every cohort, where they are there.
+
+        Raises
+        ------
+        InputError
+            With every problem of every file of the folder.
+        """
+        folder = Path(folder)
+        if not folder.is_dir():
+            found, allowed = "no such folder", "a folder with cohort.yaml and specimens.csv"
+            raise InputError([Problem(str(folder), None, None, found, allowed, "check the name")])
+        forms = TABLES | {form.stem: form for form in further}
+        there = tuple(form for form in forms.values() if _is_there(folder / form.file))
+        place = folder.resolve()
+        known = self._known.pop((place, there), None) or _outcome(folder, place.name, forms)
+        self._known[place, there] = known
+        if len(self._known) > MOST_KEPT:
+            del self._known[next(iter(self._known))]
+        absent = [form.file for form in forms.values() if form not in there]
+        problems = [*misnamed(folder, place.name, absent), *known.problems]
+        if problems or known.cohort is None:
+            raise InputError(problems)
+        return known.cohort
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What reading came to: a cohort, or problems."""
+
+    cohort: Cohort | None
+    problems: Sequence[Problem]
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Python does not look for circles among millions of cells, of which there are none.
+
+    It would do so again and again while they grow in number: a third of the time that a file of
+    4 million cells takes.
+    """
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+@_uncollected()
+def _outcome(folder: Path, name: str, forms: Mapping[str, TableForm]) -> _Outcome:
+    """Read and validate, whatever other files may be called."""
     document, header, problems = _read_header(folder, name)
-    forms = TABLES | {form.stem: form for form in further}
     tables, absent = _read_tables(folder, name, forms, problems)
     draft = _within_bounds(
         Draft(
@@ -74,8 +131,8 @@ def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
     problems += check_supports(draft, document)
     problems += check_zeroing(draft, document)
     if problems or header is None:
-        raise InputError(problems)
-    return _cohort(folder, header, tables, forms)
+        return _Outcome(None, tuple(InputError(problems).problems))
+    return _Outcome(_cohort(folder, header, tables, forms), ())
 
 
 def _read_header(
@@ -105,42 +162,21 @@ def _read_tables(
     """Tables by stem and the stems without a file; what is wrong is added to ``problems``."""
     tables: dict[str, pd.DataFrame] = {}
     absent = {stem for stem, form in forms.items() if not _is_there(folder / form.file)}
-    problems += misnamed(folder, name, [f"{stem}.csv" for stem in absent])
     if "specimens" in absent:
         problems.append(_missing(f"{name}/{TABLES['specimens'].file}"))
     for stem, form in forms.items():
-        if stem not in absent:
-            table, faults = _read_one(folder / form.file, form, f"{name}/{form.file}")
-            problems += faults
-            if table is not None:
-                tables[stem] = table
+        if stem in absent:
+            continue
+        file = f"{name}/{form.file}"
+        led_out = outside(folder / form.file, folder, (file, None, None), form.file)
+        if led_out is not None:
+            problems.append(led_out)
+            continue
+        table, faults = read_table(folder / form.file, form, file)
+        problems += faults
+        if table is not None:
+            tables[stem] = table
     return tables, frozenset(absent)
-
-
-def _read_one(
-    path: Path, form: TableForm, file: str
-) -> tuple[pd.DataFrame | None, Sequence[Problem]]:
-    """A table of the folder; a link that leads out of it is not followed."""
-    led_out = outside(path, path.parent, (file, None, None), form.file)
-    return _table(path, form, file, _state(path)) if led_out is None else (None, [led_out])
-
-
-def _state(path: Path) -> tuple[int, ...]:
-    """What changes with a file, even if only a digit of it does."""
-    try:
-        status = path.stat()
-    except OSError:
-        return ()
-    return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
-
-
-@lru_cache(maxsize=32)
-def _table(
-    path: Path, form: TableForm, file: str, state: tuple[int, ...]
-) -> tuple[pd.DataFrame | None, tuple[Problem, ...]]:
-    """A table as it was read when the file was in this state: `check` asks for it again."""
-    table, problems = read_table(path, form, file)
-    return table, tuple(problems)
 
 
 def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:
@@ -166,15 +202,14 @@ def _without(draft: Draft, *stems: str) -> Draft:
 
 
 def _checks(draft: Draft) -> Iterator[Problem]:
-    applied = list(applied_loads(draft))
     for found in (
         check_names(draft),
         check_keys(draft),
         check_geometry(draft),
         check_bodies(draft),
-        check_loads(draft, applied),
-        check_steps(draft, applied),
-        check_motion(draft, applied),
+        check_loads(draft, draft.applied),
+        check_steps(draft, draft.applied),
+        check_motion(draft, draft.applied),
     ):
         yield from first_of(found)
 

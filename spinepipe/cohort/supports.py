@@ -6,7 +6,7 @@ reading then. Where the rig's load was measured, `loads.csv` lists it: what the 
 is read as zero, in the SD of that load.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -33,36 +33,47 @@ class Fixed(NamedTuple):
     measured: bool
 
 
-def fixed(
-    supports: pd.DataFrame | None, specimen: str, test: str, joints: Sequence[str]
-) -> tuple[Fixed, ...]:
-    """Coordinates fixed in a test, in the order of a model; of rows that fit the last counts."""
-    found: dict[tuple[int, int], Fixed] = {}
-    for joint, coordinate, state, reaction in _rows(supports, specimen, test):
-        for number, name in enumerate(joints):
-            if joint in (EVERYONE, name):
+class Rig:
+    """What `supports.csv` says, by specimen and test, so that many can be asked for.
+
+    Rows that are bad, or of a joint that there is not, say nothing.
+    """
+
+    def __init__(self, supports: pd.DataFrame | None, joints: Sequence[str]) -> None:
+        """``supports`` : the table; ``joints`` : names in the order of a model."""
+        self._rows: dict[tuple[str, str], dict[tuple[int, int], tuple[int, Fixed]]] = {}
+        if supports is None:
+            return
+        numbers: dict[str, tuple[int, ...]] = {
+            name: (number,) for number, name in enumerate(joints)
+        }
+        numbers[EVERYONE] = tuple(range(len(joints)))
+        columns = ("specimen", "test", "joint", "coordinate", "state", "reaction")
+        cells = (supports[name].tolist() for name in columns)
+        for row, (who, what, joint, coordinate, state, reaction) in enumerate(
+            zip(*cells, strict=True)
+        ):
+            if joint not in numbers or coordinate not in COORDINATES or state not in STATES:
+                continue
+            known = self._rows.setdefault((who, what), {})
+            for number in numbers[joint]:
                 place = number, COORDINATES.index(coordinate)
-                found[place] = Fixed(*place, state, reaction == MEASURED)
-    return tuple(found[place] for place in sorted(found) if found[place].state != FREE)
+                known[place] = row, Fixed(*place, state, reaction == MEASURED)
 
-
-def _rows(
-    supports: pd.DataFrame | None, specimen: str, test: str
-) -> Iterator[tuple[str, str, str, object]]:
-    """Joint, coordinate, state and reaction of rows for a test of a specimen."""
-    if supports is None:
-        return
-    names = ("specimen", "test", "joint", "coordinate", "state", "reaction")
-    for who, what, *cells in zip(*(supports[name] for name in names), strict=True):
-        joint, coordinate, state, reaction = cells
-        sound = isinstance(joint, str) and coordinate in COORDINATES and state in STATES
-        if sound and who in (EVERYONE, specimen) and what in (EVERYONE, test):
-            yield joint, coordinate, state, reaction
+    def fixed(self, specimen: str, test: str) -> tuple[Fixed, ...]:
+        """Coordinates fixed in a test, in the order of a model; the last row that fits counts."""
+        found: dict[tuple[int, int], tuple[int, Fixed]] = {}
+        for who in dict.fromkeys((EVERYONE, specimen)):
+            for what in dict.fromkeys((EVERYONE, test)):
+                for place, (row, one) in self._rows.get((who, what), {}).items():
+                    if place not in found or found[place][0] < row:
+                        found[place] = row, one
+        return tuple(found[place][1] for place in sorted(found) if found[place][1].state != FREE)
 
 
 def supported(cohort: Cohort, specimen: str, case: LoadCase, motion: Array) -> LoadCase:
     """The case with what its rig fixes; ``motion`` (T, J, 6) m and rad as measured."""
-    found = fixed(cohort.supports, specimen, case.test, cohort.joint_names)
+    found = Rig(cohort.supports, cohort.joint_names).fixed(specimen, case.test)
     if not found:
         return case
     read_as = _read_as(cohort.measurement_sd)
@@ -110,8 +121,9 @@ def motion_read(cohort: Cohort) -> pd.DataFrame:
         return cohort.motion
     table = cohort.motion.copy()
     joints = cohort.joint_names
+    rig = Rig(cohort.supports, joints)
     for (specimen, test), rows in table.groupby(["specimen", "test"], sort=False):
-        for one in fixed(cohort.supports, str(specimen), str(test), joints):
+        for one in rig.fixed(str(specimen), str(test)):
             there = rows.index[rows["joint"] == joints[one.joint]]
             table.loc[there, COORDINATE_COLUMNS[one.coordinate]] = 0.0 if one.measured else np.nan
     return table

@@ -30,6 +30,18 @@ def longest_word(text: str) -> int:
     return max(map(len, text.split()), default=0) if len(text) > LONGEST_CELL else 0
 
 
+def has_long_word(text: str) -> bool:
+    """Whether a run without blanks is longer than `LONGEST_CELL`.
+
+    Such a run fills a piece of half that length from end to end: where each has a blank is none.
+    """
+    half = LONGEST_CELL // 2
+    starts = range(0, len(text) - half + 1, half)
+    if len(text) <= LONGEST_CELL or all(" " in text[at : at + half] for at in starts):
+        return False
+    return longest_word(text) > LONGEST_CELL
+
+
 def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem]]:
     """Text of a UTF-8 file; a byte-order mark is allowed.
 

@@ -31,6 +31,21 @@ READERS: dict[str, Callable[[Path, str], Recorded]] = {
 ON_TIME_S = 1e-6
 """What times of frames are rounded by."""
 
+
+class NoFrameError(InputError):
+    """No frame lies from the start to the end that are asked for.
+
+    Attributes
+    ----------
+    late : whether the start is behind the last frame; else the end is before the first, or both
+        lie between two frames.
+    """
+
+    def __init__(self, problem: Problem, late: bool) -> None:
+        super().__init__([problem])
+        self.late = late
+
+
 Axes = NDArray[np.float64]
 """(3, 3): ground axes in rows, axes of the file in columns."""
 
@@ -73,7 +88,7 @@ def read_motion(
     Raises
     ------
     InputError
-        With the place of what cannot be read.
+        With the place of what cannot be read; `NoFrameError` where nothing is kept.
     ValueError
         Of axes that are none.
     """
@@ -92,7 +107,8 @@ def read_motion(
     if not kept.any():
         found = f"no frame from {_told(start_s)} to {_told(end_s)}"
         allowed = f"times from {raw.time_s[0]:g} to {raw.time_s[-1]:g} s"
-        raise InputError([Problem(name, None, None, found, allowed, "correct start_s and end_s")])
+        problem = Problem(name, None, None, found, allowed, "correct start_s and end_s")
+        raise NoFrameError(problem, late=start_s is not None and start_s > raw.time_s[-1])
     names, renamed = _names(raw.names, name)
     return Recorded(
         names,

@@ -3,7 +3,7 @@
 Whatever is wrong is told at once, with file, line, what was found, what is allowed and what to do.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -102,7 +102,13 @@ class Misfit(InputError):
         self.cohort = cohort
 
 
-def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Cohort]:
+ReadCohort = Callable[[Path, Sequence[TableForm]], Cohort]
+"""Reads a cohort folder with files of these forms besides, as `cohort.read` does."""
+
+
+def check(
+    root: Path, study_name: str, starting: bool = True, read_cohort: ReadCohort = cohorts.read
+) -> tuple[Study, Cohort]:
     """Read a study and its cohort and hold them against each other.
 
     Parameters
@@ -111,6 +117,7 @@ def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Co
     study_name : name of a file in ``config/studies``, without ``.yaml``.
     starting : whether the study is yet to start, so that the machine must have room for it; a
         job of a study that runs has its own share in what is short.
+    read_cohort : reads its cohort; a `Reader` keeps it for whoever asks again.
 
     Raises
     ------
@@ -119,7 +126,7 @@ def check(root: Path, study_name: str, starting: bool = True) -> tuple[Study, Co
         every way in which they do not fit.
     """
     document, study, problems = load(root / STUDIES / f"{study_name}.yaml", root)
-    cohort, faults = _cohort(document, root)
+    cohort, faults = _cohort(document, root, read_cohort)
     problems += faults
     if document and study and cohort:
         study = _settled(study, cohort)
@@ -163,7 +170,9 @@ def _held(document: Document, study: Study, cohort: Cohort) -> Problem:
     return Problem(*place, found, allowed, remedy)
 
 
-def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[Problem]]:
+def _cohort(
+    document: Document | None, root: Path, read_cohort: ReadCohort
+) -> tuple[Cohort | None, list[Problem]]:
     """The cohort a study file names, though the rest of the file may be unsound."""
     name = document.data.get("cohort") if document else None
     if document is None or not isinstance(name, str) or not name:
@@ -176,7 +185,7 @@ def _cohort(document: Document | None, root: Path) -> tuple[Cohort | None, list[
         place = (document.file, document.line_of("cohort"), "cohort")
         return None, [Problem(*place, f"unknown cohort '{name}'", allowed, remedy)]
     try:
-        return cohorts.read(folder, _further(document)), []
+        return read_cohort(folder, _further(document)), []
     except InputError as error:
         return None, list(error.problems)
 

@@ -12,10 +12,19 @@ from hypothesis import strategies as st
 from spinepipe import cohort, problems
 from spinepipe.cohort import csv_table
 from spinepipe.documents.names import folder_fault, name_fault
-from spinepipe.documents.text import MOST_CSV_BYTES, MOST_YAML_BYTES
+from spinepipe.documents.text import (
+    LONGEST_CELL,
+    MOST_CSV_BYTES,
+    MOST_YAML_BYTES,
+    has_long_word,
+    longest_word,
+)
 from spinepipe.model.file import read_model
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
+from spinepipe.studies.registry import every_form
+
+read_module = import_module("spinepipe.cohort.read")
 
 YAML, SPECIMENS, LOADS, MOTION = "cohort.yaml", "specimens.csv", "loads.csv", "motion.csv"
 MOTION_HEADER = "specimen,test,cycle,step,joint,extension_deg\n"
@@ -360,3 +369,48 @@ def test_the_cohort_that_is_spoilt_is_sound(tmp_path) -> None:
     assert cohort.read(write(tmp_path / NAME)).name == NAME
     assert told(tmp_path / "b", without(SPECIMENS))
     assert told(tmp_path / "c", swap(YAML, "small", "smal"))
+
+
+def test_a_reader_reads_each_folder_once_whoever_asks(tmp_path, monkeypatch) -> None:
+    read = []
+    whole = read_module.read_table
+
+    def counted(path, form, file):
+        read.append(file)
+        return whole(path, form, file)
+
+    monkeypatch.setattr(read_module, "read_table", counted)
+    folder = write(tmp_path / NAME)
+    reader = cohort.Reader()
+    first = reader.read(folder)
+    assert reader.read(folder, every_form()) is first  # no file of another kind is there
+    assert len(read) == len(set(read)) == len(list(folder.glob("*.csv")))
+    assert cohort.read(folder) is not first
+    cell(MOTION, 2, "extension_deg", "words")(files := valid_files())
+    (folder / MOTION).write_text(str(files[MOTION]))
+    with pytest.raises(InputError):
+        cohort.Reader().read(folder)
+
+
+def test_a_reader_tells_misspelt_files_of_those_forms_alone_that_are_asked_for(tmp_path) -> None:
+    folder = write(tmp_path / NAME)
+    (folder / "film.csv").write_text("a\n1\n")
+    reader = cohort.Reader()
+    reader.read(folder)
+    with pytest.raises(InputError, match=r"film\.csv"):
+        reader.read(folder, every_form())
+
+
+def test_a_reader_keeps_the_last_cohorts_alone(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(read_module, "MOST_KEPT", 2)
+    folders = [write(tmp_path / part / NAME) for part in "abc"]
+    reader = cohort.Reader()
+    first, second, _ = map(reader.read, folders)
+    assert reader.read(folders[1]) is second
+    assert reader.read(folders[0]) is not first
+
+
+@given(st.lists(st.tuples(st.sampled_from("ab \t\n"), st.integers(1, 250)), max_size=8))
+def test_long_words_are_seen_wherever_they_stand(runs) -> None:
+    text_of = "".join(letter * number for letter, number in runs)
+    assert has_long_word(text_of) is (longest_word(text_of) > LONGEST_CELL)

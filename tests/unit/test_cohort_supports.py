@@ -1,17 +1,23 @@
 """``supports.csv``: what a rig fixes, as the engine gets it, as it is read, and what is refused."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from cohort_cases import Change, Files, both, swap, text, write
+from hypothesis import given
+from hypothesis import strategies as st
 
 from spinepipe import cohort as cohorts
-from spinepipe.cohort import Cohort
+from spinepipe import problems
+from spinepipe.cohort import Cohort, check_supports
 from spinepipe.cohort.measured import MeasuredCycle, measured_specimen
-from spinepipe.cohort.supports import motion_read
+from spinepipe.cohort.supports import STATES, Rig, motion_read
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies.places import readings
+from spinepipe.units import COORDINATES
 
 HEADER = "specimen,test,joint,coordinate,state,reaction\n"
 NO_FACTOR = None
@@ -67,6 +73,52 @@ def test_of_rows_that_fit_the_last_counts(tmp_path: Path) -> None:
     cohort = read(tmp_path, rig("*,*,*,extension,held,", "a,flexion,L3L4,extension,free,"))
     assert flexion(cohort, "a").case.fixed == [6 + EXTENSION]
     assert flexion(cohort, "b").case.fixed == [EXTENSION, 6 + EXTENSION]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["*", "a", "b"]),
+            st.sampled_from(["*", "flexion", "bending"]),
+            st.sampled_from(["*", "L3L4", "L2L3", "L9L9", None]),
+            st.sampled_from(["extension", "anterior", "bad", None]),
+            st.sampled_from([*STATES, "bad", None]),
+            st.sampled_from(["measured", "unknown", None]),
+        ),
+        max_size=12,
+    )
+)
+def test_a_rig_looked_up_is_the_rig_read_row_by_row(rows) -> None:
+    names = ["specimen", "test", "joint", "coordinate", "state", "reaction"]
+    table, joints = pd.DataFrame(rows, columns=names, dtype="object"), ("L3L4", "L2L3")
+    index = Rig(table, joints)
+    for specimen, test in product("ab", ("flexion", "bending")):
+        found: dict[tuple[int, int], tuple[str, bool]] = {}
+        for who, what, joint, coordinate, state, reaction in rows:
+            fits = who in ("*", specimen) and what in ("*", test)
+            if fits and coordinate in COORDINATES and state in STATES:
+                for number, name in enumerate(joints):
+                    if joint in ("*", name):
+                        place = number, COORDINATES.index(coordinate)
+                        found[place] = state, reaction == "measured"
+        wanted = [(*place, *found[place]) for place in sorted(found) if found[place][0] != "free"]
+        assert [tuple(one) for one in index.fixed(specimen, test)] == wanted
+
+
+def test_a_table_of_many_rows_is_gone_through_once(tmp_path, monkeypatch) -> None:
+    """Else 150,000 tests times 150,000 rows of a rig hold a check up for good."""
+    made = []
+    monkeypatch.setattr(check_supports, "Rig", lambda *given: made.append(given) or Rig(*given))
+    read(tmp_path, rig("*,*,*,extension,held,"))
+    assert not made
+    read(tmp_path / "prescribed", rig("*,*,*,extension,prescribed,"))
+    assert len(made) == 1
+
+
+def test_faults_of_a_rig_are_bounded(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(problems, "MOST_MADE", 50)
+    found = refused(tmp_path, rig(*(f"*,q{n},L2L3,extension,hold{n}," for n in range(400))))
+    assert 2 <= sum(1 + one.others for one in found) <= 2 * 51
 
 
 def test_a_measured_load_is_read_as_no_reaction(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -28,3 +29,11 @@ def write(name: str, head: str, rows: pd.DataFrame, command: str = "") -> None:
     ]
     (RESULTS / f"{name}.md").write_text("\n".join(lines), encoding="utf-8")
     print("\n".join(lines), flush=True)
+
+
+def written(name: str) -> list[dict[str, Any]]:
+    """Rows of a table as it was written last, cells as texts; none where there is no such table."""
+    file = RESULTS / f"{name}.csv"
+    if not file.exists():
+        return []
+    return pd.read_csv(file, dtype=str, keep_default_na=False).to_dict("records")

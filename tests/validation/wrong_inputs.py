@@ -2,7 +2,9 @@
 
 `python -m tests.validation wrong_inputs` looks at `DRAWN` of them, drawn from all by a seed;
 `python -m tests.validation.wrong_inputs all` at every one. Each is looked at in a process of its
-own, which the system ends after ten seconds of processor time.
+own, which the system ends after ten seconds of processor time. What was seen is kept, case by case,
+in `results/validation/wrong_inputs`, as long as library, documentation and cases stay the same: a
+run that was cut off goes on.
 """
 
 import json
@@ -23,6 +25,7 @@ from tests.cases.spoilt_cases import Seen, Verdict, asked, look, verdict
 from tests.generators.spoilt.case import Case, removed
 from tests.generators.spoilt.catalogue import cases, sample
 from tests.generators.spoilt.projects import projects, write
+from tests.validation.kept import Kept
 
 DRAWN = 3000
 
@@ -32,6 +35,11 @@ MOST_BYTES = 6_000_000_000
 """Addresses that a process may use; what a check needs is a tenth of it."""
 
 CORES = 2
+
+HANGS_ON = (
+    *("spinepipe/**/*.py", "docs/**/*.md", "config/**/*.*", "tests/generators/spoilt/*.py"),
+    *("tests/cases/spoilt_cases.py", "tests/validation/wrong_inputs.py"),
+)
 
 
 @dataclass(frozen=True)
@@ -48,11 +56,19 @@ _held: list[Case] = []
 
 
 def judged(some: Sequence[Case], workers: int = CORES) -> Iterator[Judged]:
-    """Cases as they are done."""
+    """Cases as they are done, those first that an earlier run has looked at."""
+    kept = Kept("wrong_inputs", HANGS_ON)
+    for case in some:
+        if case.name in kept.known:
+            what, code, printed = kept.known[case.name]
+            yield Judged(case, Verdict(what), Seen(code, printed))
+    _held[:] = [case for case in some if case.name not in kept.known]
+    if not _held:
+        return
     _warm()
-    _held[:] = some
     with get_context("fork").Pool(workers) as pool:
         for number, what, code, printed in pool.imap_unordered(_one, range(len(_held))):
+            kept.add(_held[number].name, [what, code, printed])
             yield Judged(_held[number], Verdict(what), Seen(code, printed))
 
 

@@ -26,7 +26,7 @@ from spinepipe.motion.hanging import ARMS, hung
 from spinepipe.motion.joint_tables import GIVEN
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.ratios import RatioSet
-from spinepipe.motion.reading import DEFAULT_AXES, read_motion
+from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
 from spinepipe.motion.recorded import Recorded
 from spinepipe.motion.scaling import by_body, scaled
 from spinepipe.motion.skeleton import (
@@ -41,8 +41,9 @@ from spinepipe.motion.skeleton import (
 from spinepipe.motion.slices import slice_inertias
 from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
+from spinepipe.problems import InputError, Problem
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE
+from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE, TRIALS
 from spinepipe.studies.tracking.settings import Scaling
 from spinepipe.studies.tracking.sizes import Sized, sized_by
 from spinepipe.units import MM_PER_M
@@ -191,14 +192,20 @@ def recording(row: Row, cohort: str, folder: Path) -> Recorded:
     Raises
     ------
     InputError
-        Of a file that cannot be read.
+        Of a file that cannot be read, or a row that leaves no frame of it.
     ValueError
         Of axes that are none.
     """
     name, axes = str(row["file"]), row["axes"]
     start, end = (float(str(row[key])) for key in ("start_s", "end_s"))
     text = axes if isinstance(axes, str) else DEFAULT_AXES
-    return read_motion(folder / name, text, start, end, f"{cohort}/{name}")
+    try:
+        return read_motion(folder / name, text, start, end, f"{cohort}/{name}")
+    except NoFrameError as error:
+        (problem,) = error.problems
+        found = f"{problem.found} in {name}"
+        at = (f"{cohort}/{TRIALS.file}", row["line"], "start_s" if error.late else "end_s")
+        raise InputError([Problem(*at, found, problem.allowed, problem.remedy)]) from error
 
 
 def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> Trial:

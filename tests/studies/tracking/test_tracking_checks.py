@@ -344,9 +344,16 @@ def test_bending_that_is_called_flexion_is_named(tmp_path: Path) -> None:
 
 def test_a_missing_file_and_a_crop_without_frames_are_named(tmp_path: Path) -> None:
     problems = told(tmp_path, trial("file", "no.trc"), trial("start_s", "50", BENDING))
-    found = {(p.file, p.found) for p in problems}
-    assert (f"{NAME}/no.trc", "no such file") in found
-    assert (f"{NAME}/lateral_bending.trc", "no frame from 50 s to an end") in found
+    found = {(p.file, p.column, p.found) for p in problems}
+    assert (f"{NAME}/no.trc", None, "no such file") in found
+    crop = "no frame from 50 s to an end in lateral_bending.trc"
+    assert (f"{NAME}/trials.csv", "start_s", crop) in found
+
+
+@pytest.mark.parametrize(("column", "value"), [("start_s", "1e6"), ("end_s", "-1e6")])
+def test_a_crop_without_frames_is_told_at_its_cell(column: str, value: str, tmp_path: Path) -> None:
+    (problem,) = told(tmp_path, trial(column, value, BENDING))
+    assert (problem.file, problem.row, problem.column) == (f"{NAME}/trials.csv", BENDING, column)
 
 
 def test_several_faults_are_told_at_once(tmp_path: Path) -> None:

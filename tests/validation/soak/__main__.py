@@ -1,25 +1,25 @@
 """`python -m tests.validation.soak [PART ...]`: kills, targets, memory; all of them unless told.
 
+`python -m tests.validation.soak kills KIND ...` kills studies of these kinds alone.
+
 What was measured by this code is kept, kind by kind and part by part: started again, the program
 goes on with what is missing. The tables are written after each piece.
 """
 
-import hashlib
-import json
+import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from small_studies import SMALL
 
+from tests.validation.kept import Kept
 from tests.validation.soak import kills, memory, targets
-from tests.validation.written import write
+from tests.validation.written import write, written
 
-ROOT = Path(__file__).resolve().parents[3]
-PLACE = ROOT / "results/validation/soak"
 HANGS_ON = (
     *("Snakefile", "workflow/rules/*.smk", "profiles/default/*", "spinepipe/jobs/*.py"),
     *("spinepipe/files.py", "spinepipe/marks.py", "spinepipe/world.py"),
@@ -29,11 +29,28 @@ HANGS_ON = (
 
 Rows = list[dict[str, Any]]
 
+KILLS_HEAD = (
+    f"A small study of each kind, killed {kills.KILLS} times and started again by the same "
+    "command. A kill comes after a drawn number of further result files and a part of a "
+    "second; three of five kill all processes at once, one Snakemake alone, one a worker. "
+    "When a study comes to its end before all kills are spent, it begins anew "
+    "(rounds). Files that differ: from those of an undisturbed run, byte by byte, in all "
+    f"rounds together; tables that tell processor time (`{kills.TELLS_TIME}`) are compared without "
+    "it, row by row. Finished files made twice: those that were there at a kill and that "
+    "Snakemake's record did not have as being made. The command fails where a verdict is not "
+    f'"{kills.SOUND}". In the system\'s temporary folder killed processes leave empty '
+    "folders of Python and Snakemake."
+)
+
 
 def main() -> None:
-    """Run the parts that are asked for, or all."""
+    """Run the parts that are asked for, or all; `kills` for the kinds behind it, or all."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends its runs too
+    if sys.argv[1:2] == ["kills"]:
+        _kills(sys.argv[2:])
+        return
     parts: dict[str, Callable[[], None]] = {
-        "kills": _kills,
+        "kills": lambda: _kills(()),
         "targets": _targets,
         "memory": _memory,
     }
@@ -44,38 +61,32 @@ def main() -> None:
 
 
 def kept(name: str, measure: Callable[[Path], Iterable[dict[str, Any]]]) -> Rows:
-    """Rows of a piece: from its file, or measured in a temporary folder."""
-    found = hashlib.sha256()
-    for path in sorted(path for pattern in HANGS_ON for path in ROOT.glob(pattern)):
-        found.update(path.read_bytes())
-    file = PLACE / found.hexdigest()[:12] / f"{name}.json"
-    if not file.exists():
+    """Rows of a piece: as they were kept, or measured in a temporary folder."""
+    pieces = Kept("soak", HANGS_ON)
+    if name not in pieces.known:
         with tempfile.TemporaryDirectory(prefix="spinepipe-soak-") as folder:
-            rows = list(measure(Path(folder)))
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(rows, indent=1))
-    rows = json.loads(file.read_text())
+            pieces.add(name, list(measure(Path(folder))))
+    rows: Rows = pieces.known[name]
     return rows
 
 
-def _kills() -> None:
-    rows: Rows = []
-    for kind in SMALL:
-        rows += kept(f"kills-{kind}", lambda folder, kind=kind: [kills.row(kind, folder)])  # type: ignore[misc]
-        _write(
-            "kills",
-            f"A small study of each kind, killed {kills.KILLS} times and started again by the same "
-            "command. A kill comes after a drawn number of further result files and a part of a "
-            "second; three of five kill all processes at once, one Snakemake alone, one a worker. "
-            "When a study comes to its end before all kills are spent, it begins anew "
-            "(rounds). Files that differ: from those of an undisturbed run, byte by byte, in all "
-            "rounds together; `fits` of tracking tells processor time (`cpu_s`), so ten of its "
-            "files differ from run to run, killed or not. Finished "
-            "files made twice: those that were there at a kill and that Snakemake's record did not "
-            "have as being made. In the system's temporary folder killed processes leave empty "
-            "folders of Python and Snakemake.",
-            rows,
-        )
+def _kills(kinds: Sequence[str]) -> None:
+    """Kill studies of these kinds; ends with an error where a kill did harm.
+
+    Rows of other kinds stay in the table as they were measured, each with its date.
+    """
+    unknown = set(kinds) - set(SMALL)
+    if unknown:
+        sys.exit(f"no kind {', '.join(sorted(unknown))}: {', '.join(SMALL)}")
+    rows = {row["kind"]: row for row in written("soak_kills")}
+    for kind in kinds or SMALL:
+        found = kept(f"kills-{kind}", lambda folder, kind=kind: [kills.row(kind, folder)])  # type: ignore[misc]
+        rows |= {row["kind"]: row for row in found}
+        in_order = [rows[one] for one in SMALL if one in rows]
+        _write("kills", KILLS_HEAD, in_order)
+    harmed = [f"{kind}: {row['verdict']}" for kind, row in rows.items() if not kills.is_sound(row)]
+    if harmed:
+        sys.exit("soak kills: " + "; ".join(harmed))
 
 
 def _targets() -> None:

@@ -14,21 +14,35 @@ import time
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psutil
+import pyarrow.parquet as pq
 from small_project import Project
 from small_studies import SMALL
 
 from spinepipe.files import is_temporary
+from spinepipe.marks import CONTENT
 from tests.validation.soak.started import Seen, Started, ended, looks, seen, start, timed
 
 KILLS = 20
 ALL, SNAKEMAKE, WORKER = "all processes", "snakemake alone", "one worker"
 WAYS = (ALL, ALL, SNAKEMAKE, ALL, WORKER)
 """Who is killed, in turn."""
+
+AMISS = (
+    *("files that differ", "finished files made twice or lost"),
+    *("temporary files left", "processes left"),
+)
+"""None of these may happen."""
+
+SOUND = "nothing lost, nothing twice, same bytes"
+
+TELLS_TIME = "cpu_s"
+"""A column of processor time, which no two runs share: files are compared without it."""
 
 MOST_DELAY_S = 1.0
 STARTING_S = 10.0
@@ -152,21 +166,25 @@ def row(kind: str, folder: Path, kills: int = KILLS, seed: int = 0) -> Row:
             disturbed.finish(wanted)
             clear(disturbed.project)
     disturbed.finish(wanted)
-    amiss = (
-        *("files that differ", "finished files made twice or lost"),
-        *("temporary files left", "processes left"),
-    )
     told = disturbed.told
+    amiss = [f"{told[name]} {name}" for name in AMISS if told[name]]
     return {
         "kind": kind,
         "result_files": len(wanted),
         "kills": killed,
         **{f"kills of {way}".replace(" ", "_"): told[way] for way in (ALL, SNAKEMAKE, WORKER)},
         "rounds": told["rounds"],
-        **{name.replace(" ", "_"): told[name] for name in amiss},
+        **{name.replace(" ", "_"): told[name] for name in AMISS},
         "left_in_the_temporary_folder": told["left in the temporary folder"],
         "undisturbed_s": round(whole.wall_s, 1),
+        "measured": date.today().isoformat(),
+        "verdict": "; ".join(amiss) or SOUND,
     }
+
+
+def is_sound(row: Row) -> bool:
+    """Whether no kill did harm."""
+    return not any(int(row[name.replace(" ", "_")]) for name in AMISS)
 
 
 def fresh(project: Project, folder: Path) -> Project:
@@ -183,11 +201,17 @@ def clear(project: Project) -> None:
 
 
 def digests(project: Project) -> dict[str, str]:
-    """sha256 of each result file."""
-    return {
-        name: hashlib.sha256(project.path(f"results/{name}").read_bytes()).hexdigest()
-        for name in project.files()
-    }
+    """sha256 of each result file; of tables that tell processor time, of all but that."""
+    return {name: _digest(project.path(f"results/{name}")) for name in project.files()}
+
+
+def _digest(path: Path) -> str:
+    data = path.read_bytes()
+    if path.suffix == ".parquet" and TELLS_TIME in (table := pq.read_table(path)).column_names:
+        told = {k: v for k, v in table.schema.metadata.items() if k != CONTENT.encode()}
+        rest = table.drop_columns([TELLS_TIME]).replace_schema_metadata(None)
+        data = repr((sorted(told.items()), rest.schema.to_string(), rest.to_pylist())).encode()
+    return hashlib.sha256(data).hexdigest()
 
 
 def incomplete(project: Project) -> set[str]:
