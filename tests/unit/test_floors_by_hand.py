@@ -1,4 +1,4 @@
-"""Floors and limits of indices where they can be worked out: closed forms, single numbers, edges."""
+"""Floors and limits of indices where they can be worked out: closed forms, numbers, edges."""
 
 from dataclasses import replace
 
@@ -61,7 +61,7 @@ def test_what_is_negligible_ends_below_one_per_cent() -> None:
 
 
 def test_the_floor_of_effects_is_what_a_solver_leaves_open_over_a_step() -> None:
-    """Off by u within +-r over a step h of the levels: |u| / h has mean r / 2 h, SD r / sqrt 3 h."""
+    """Off by u within +-r over a step h: |u| / h has mean r / 2 h, u / h an SD of r / sqrt 3 h."""
     design = draw("morris", ALONE, 400, 20020, dummy=True, levels=6)
     r, h = 1e-3, 6.0 / (2.0 * 5.0)
     floors = floors_of(design, design.unit[:, :1], r)
@@ -204,6 +204,6 @@ def test_a_design_too_small_for_indices_is_one_stage_that_says_so() -> None:
     (stage,) = convergence(design, np.exp(design.unit[:, :1]), settings=QUICK)
     assert (stage.samples, stage.runs) == (30, 30)
     assert {index.status for index in stage.indices} == {(Known.TOO_FEW,)}
-    assert {index.index for index in stage.indices} == set(
-        ("S1_RBD", "PAWN", "KS_low", "KS_high", "delta")
-    )
+    assert {index.index for index in stage.indices} == {
+        *("S1_RBD", "PAWN", "KS_low", "KS_high", "delta")
+    }

@@ -53,7 +53,7 @@ def test_shares_and_intervals_by_the_long_way() -> None:
     whole = components(grid) / components(grid).sum()
     left_out = np.array([components(np.delete(grid, at, 0)) for at in range(5)])
     left_out /= left_out.sum(axis=1, keepdims=True)
-    assert 0.0 < left_out.min()
+    assert left_out.min() > 0.0
     assert left_out.max() < 1.0
     pseudo = 5 * logit(whole) - 4 * logit(left_out)
     half = t.ppf(0.975, 4) * pseudo.std(axis=0, ddof=1) / np.sqrt(5)
