@@ -1,6 +1,7 @@
 """Resamples as weights are resamples as repeated rows; intervals by hand; delta's classes."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -111,7 +112,7 @@ def test_pawn_of_weights_is_that_of_repeated_rows_in_the_same_slices() -> None:
         edges = np.quantile(unit[:, d], [0.0, 0.25, 0.5, 0.75, 1.0])
         for r, rows in enumerate(repeated(weights)):
             x, y = unit[rows, d], output[rows]
-            parts = [(x >= a) & (x < b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+            parts = [(x >= a) & (x < b) for a, b in pairwise(edges)]
             expected = np.median([ks_2samp(y[part], y).statistic for part in parts])
             assert found[r, d] == pytest.approx(expected, abs=1e-12)
 
