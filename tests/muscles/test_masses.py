@@ -117,6 +117,17 @@ def test_centres_of_parts_go_with_the_vertebrae() -> None:
         assert checks[part] - straight[part] == pytest.approx(100.0 * (moved / kg - level))
 
 
+def test_centres_stand_beside_those_that_pearsall_prints() -> None:
+    """Abstract of Pearsall 1996: cm ahead of T7T8 and L3L4, where its upper and middle parts end
+    nearest; its parts are 18.5 and 12.2 % of body mass. Of the whole trunk at L1L2."""
+    printed = {c.part: (c.level, c.published_cm) for c in centre_checks(made_up_trunk())}
+    assert printed == {
+        "upper trunk": ("T7T8", 4.0),
+        "middle trunk": ("L3L4", 1.0),
+        "trunk, T1 to L5": ("L1L2", 2.0),
+    }
+
+
 def test_arms_that_hang_pull_straight_down_from_the_shoulders() -> None:
     loads = arm_loads(REFERENCE, SHOULDERS, Hands(kg=10.0), arm_length=0.65)
     assert sum(load.force[1] for load in loads) == pytest.approx(-G * (0.0988 * 75.1 + 10.0))
@@ -183,6 +194,12 @@ def test_empty_hands_go_where_they_are_put() -> None:
     loads = {load.name: load for load in arm_loads(REFERENCE, SHOULDERS, Hands(at=at), 0.65)}
     np.testing.assert_allclose(loads["right_hand"].at, at + np.array([0, 0, 0.15]))
     assert "right_hand_load" not in loads
+
+
+def test_a_hand_at_full_reach_is_within_it() -> None:
+    hands = Hands(kg=5.0, at=np.array([0.65, 0.45, 0.18]), holding="right")
+    loads = {load.name: load for load in arm_loads(REFERENCE, SHOULDERS, hands, arm_length=0.65)}
+    np.testing.assert_array_equal(loads["right_hand_load"].at, hands.at)
 
 
 def test_a_hand_out_of_reach_is_told_with_its_distance() -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import erf, erfinv
 from scipy.stats import spearmanr
 
-from spinepipe.sensitivity.global_indices.design import DUMMY, design_problems, draw, run_count
+from spinepipe.sensitivity.global_indices.design import DUMMY, design_problems, draw
 from spinepipe.sensitivity.global_indices.spread import (
     LogNormal,
     LogUniform,
@@ -26,12 +26,23 @@ def test_the_same_seed_gives_the_same_design_and_another_another(method: str) ->
     assert not np.array_equal(first.unit, other.unit)
 
 
+BLOCKS = {"sobol": 2 * 4 + 2, "latin_hypercube": 1, "morris": 4 + 1, "fast": 193}
+"""Runs that stand or fall together, of four factors."""
+
+
+@pytest.mark.parametrize("method", SIZES)
+def test_as_many_runs_as_the_methods_need(method: str) -> None:
+    design = draw(method, FACTORS, SIZES[method], 3)
+    assert design.block == BLOCKS[method]
+    assert design.n == BLOCKS[method] * (4 if method == "fast" else SIZES[method])
+    assert design.factors == design.inputs == FACTORS
+
+
 @pytest.mark.parametrize("method", SIZES)
 @pytest.mark.parametrize("dummy", [False, True])
-def test_runs_are_counted_before_they_are_drawn(method: str, dummy: bool) -> None:
+def test_a_dummy_is_a_factor_like_others(method: str, dummy: bool) -> None:
     samples = 257 if method == "fast" else SIZES[method]
     design = draw(method, FACTORS, samples, 3, dummy=dummy)
-    assert design.n == run_count(method, 4 + dummy, samples)
     assert design.unit.shape == (design.n, 4 + dummy)
     assert (design.factors[-1] == DUMMY) == dummy
     assert design.unit.min() >= 0.0
@@ -42,7 +53,7 @@ def test_runs_are_counted_before_they_are_drawn(method: str, dummy: bool) -> Non
 def test_a_sobol_block_exchanges_one_group_at_a_time(second_order: bool, runs: int) -> None:
     design = draw("sobol", FACTORS, 8, 3, groups=GROUPS, second_order=second_order)
     assert design.inputs == ("left", "b", "d")
-    assert design.n == runs == run_count("sobol", 3, 8, second_order)
+    assert design.n == runs
     blocks = design.unit.reshape(8, design.block, 4)
     a, b = blocks[:, 0], blocks[:, -1]
     assert (a != b).all()
@@ -107,7 +118,51 @@ def test_all_problems_are_told_at_once() -> None:
     with pytest.raises(ValueError, match="same name: dummy"):
         draw("sobol", ("a", DUMMY), 8, 3, dummy=True)
     with pytest.raises(ValueError, match="'best' is not a valid Method"):
-        run_count("best", 3, 8)
+        draw("best", FACTORS, 8, 3)
+
+
+@pytest.mark.parametrize(
+    ("method", "factors", "least"),
+    [
+        ("sobol", 4, 2),
+        ("latin_hypercube", 4, 2),
+        ("morris", 4, 2),
+        ("fast", 1, 4 * 4**2 + 1),
+        ("fast", 2, 4 * 4**2 + 1),
+        ("fast", 4, 3 * 4 * 4**2 + 1),
+    ],
+)
+def test_the_fewest_samples_of_a_method(method: str, factors: int, least: int) -> None:
+    """Of FAST: Saltelli et al. 1999, doi:10.1080/00401706.1999.10485594, and a frequency each."""
+    names, alone = FACTORS[:factors], (None,) * factors
+    assert design_problems(method, names, alone, least) == []
+    assert len(design_problems(method, names, alone, least - 1)) == 1
+    drawn = draw(method, names, least, 3)
+    assert len(np.unique(drawn.unit.round(9), axis=0)) > 1
+
+
+@pytest.mark.parametrize(("levels", "wrong"), [(0, 1), (1, 1), (2, 0), (3, 1), (4, 0), (7, 1)])
+def test_levels_of_morris_are_even(levels: int, wrong: int) -> None:
+    assert len(design_problems("morris", FACTORS, (None,) * 4, 10, levels=levels)) == wrong
+
+
+@pytest.mark.parametrize(("harmonics", "least"), [(1, 13), (6, 433)])
+def test_more_harmonics_need_more_samples(harmonics: int, least: int) -> None:
+    for samples, wrong in ((least, 0), (least - 1, 1)):
+        found = design_problems("fast", FACTORS, (None,) * 4, samples, harmonics=harmonics)
+        assert len(found) == wrong
+    assert len(design_problems("fast", FACTORS, (None,) * 4, 1000, harmonics=0)) == 1
+
+
+def test_harmonics_and_levels_that_nobody_names_are_four() -> None:
+    lowest = draw("fast", ("a", "b"), 65, 3)
+    np.testing.assert_array_equal(lowest.unit, draw("fast", ("a", "b"), 65, 3, harmonics=4).unit)
+    assert lowest.harmonics == 4
+    assert len(np.unique(draw("morris", ("a", "b"), 20, 3).unit.round(9))) == 4
+
+
+def test_a_design_without_factors_is_none() -> None:
+    assert design_problems("sobol", (), (), 8) == ["a design needs at least one factor"]
 
 
 def test_a_part_is_the_first_blocks() -> None:
@@ -115,8 +170,13 @@ def test_a_part_is_the_first_blocks() -> None:
     part = design.first(4)
     np.testing.assert_array_equal(part.unit, design.unit[:40])
     assert (part.samples, part.block) == (4, design.block)
-    with pytest.raises(ValueError, match="1 to 16"):
-        design.first(17)
+    for samples in (0, 17):
+        with pytest.raises(ValueError, match="1 to 16"):
+            design.first(samples)
+    np.testing.assert_array_equal(design.first(16).unit, design.unit)
+    np.testing.assert_array_equal(design.first(1).unit, design.unit[:10])
+    curves = draw("fast", FACTORS, 193, 3)
+    np.testing.assert_array_equal(curves.first(193).unit, curves.unit)
     with pytest.raises(ValueError, match="no curve"):
         draw("fast", FACTORS, 193, 3).first(100)
 

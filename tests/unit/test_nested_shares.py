@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import expit, logit
+from scipy.stats import t
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
@@ -43,6 +45,24 @@ def test_components_follow_from_statsmodels_mean_squares() -> None:
         (both - error) / p + error,
     ]
     np.testing.assert_allclose(components(grid), expected, rtol=1e-9)
+
+
+def test_shares_and_intervals_by_the_long_way() -> None:
+    """A jackknife over five specimens: pseudo-values on the logit scale, t with four degrees."""
+    grid = normal_grid(np.random.default_rng(20060), (5, 8, 6), (1.0, 0.7, 1.0, 0.1, 0.3))
+    whole = components(grid) / components(grid).sum()
+    left_out = np.array([components(np.delete(grid, at, 0)) for at in range(5)])
+    left_out /= left_out.sum(axis=1, keepdims=True)
+    assert left_out.min() > 0.0
+    assert left_out.max() < 1.0
+    pseudo = 5 * logit(whole) - 4 * logit(left_out)
+    half = t.ppf(0.975, 4) * pseudo.std(axis=0, ddof=1) / np.sqrt(5)
+    found = nested_shares(grid)
+    shares = [getattr(found, part) for part in PARTS]
+    np.testing.assert_allclose([share.estimate for share in shares], whole)
+    np.testing.assert_allclose([share.low for share in shares], expit(logit(whole) - half))
+    np.testing.assert_allclose([share.high for share in shares], expit(logit(whole) + half))
+    assert (found.status, found.message) == (Ended.DONE, "")
 
 
 def test_the_truth_is_found_in_a_large_grid() -> None:
@@ -101,4 +121,16 @@ def test_a_negative_component_is_told_and_set_to_zero() -> None:
     found = nested_shares(grid)
     assert found.specimen is not None
     assert found.specimen.estimate == 0.0
-    assert "negative specimen component set to 0" in found.message
+    assert found.message == "negative specimen component set to 0"
+    shares = [getattr(found, part) for part in PARTS]
+    assert sum(share.estimate for share in shares) == pytest.approx(1.0)
+    assert all(share.low <= share.estimate <= share.high for share in shares)
+
+
+def test_several_negative_components_are_told_by_name() -> None:
+    """Scatter that balances within each draw, and within each treatment."""
+    grid = np.random.default_rng(20061).normal(size=(4, 5, 6))
+    grid -= grid.mean(axis=2, keepdims=True)
+    grid -= grid.mean(axis=(0, 1), keepdims=True)
+    assert (components(grid) < 0.0).tolist() == [False, True, True, False]
+    assert nested_shares(grid).message == "negative draw and treatment component set to 0"

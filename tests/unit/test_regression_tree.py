@@ -88,6 +88,7 @@ def test_importance_is_the_share_of_the_variance_taken() -> None:
     assert found.r2_training == pytest.approx(1.0, abs=1e-9)
     assert found.r2_cross_validated == pytest.approx(1.0, abs=1e-9)
     assert found.names == ("second", "none", "first")
+    assert (found.complexity, found.message) == (0.01, "")
 
 
 def test_noise_is_left_one_leaf() -> None:
@@ -167,8 +168,38 @@ def test_one_row_that_differs_makes_no_tree() -> None:
 def test_too_few_rows_or_groups(n: int, groups, status: Ended) -> None:
     x, y = data(n, 3, seed=10)
     found = regression_tree(x, y, "abc", 1, groups=groups)
-    assert (found.status, found.leaves) == (status, 1)
+    assert (found.status, found.leaves, found.depth) == (status, 1, 0)
     assert (found.r2_cross_validated, found.r2_training) == (None, None)
+
+
+@pytest.mark.parametrize(("rows", "leaves"), [(19, 1), (20, 2)])
+def test_twenty_rows_are_split_into_leaves_of_seven_at_least(rows: int, leaves: int) -> None:
+    """``minsplit`` and ``minbucket`` of ``rpart.control``. The first six rows are alike."""
+    x, y = np.arange(float(rows))[:, None], (np.arange(rows) < 6).astype(float)
+    tree = _growth(complexity=0.01, seed=0).fit(x, (y - y.mean()) / y.std()).tree_
+    assert tree.n_leaves == leaves
+    assert tree.threshold[0] == (6.5 if leaves == 2 else -2.0)
+
+
+def test_twenty_rows_in_two_groups_are_enough_for_a_tree() -> None:
+    x, y = data(20, 3, seed=20040)
+    assert regression_tree(x, y, "abc", 1, groups=np.arange(20) % 2).status is Ended.DONE
+
+
+@pytest.mark.parametrize(("folds", "same"), [(10, True), (9, False), (11, False)])
+def test_ten_folds_where_none_are_named(folds: int, same: bool) -> None:
+    x, y = data(60, 3, seed=20041)
+    one, other = regression_tree(x, y, "abc", 1), regression_tree(x, y, "abc", 1, folds=folds)
+    assert (one.r2_cross_validated == other.r2_cross_validated) is same
+
+
+@pytest.mark.parametrize("folds", [2, 3])
+def test_a_step_is_one_split_however_few_folds(folds: int) -> None:
+    """It saves all of the variance: the cost of a leaf that would undo it is 1."""
+    found = regression_tree(np.arange(60)[:, None], np.arange(60) < 25, "x", 1, folds)
+    assert (found.leaves, found.depth, found.complexity) == (2, 1, 0.01)
+    assert found.r2_training == pytest.approx(1.0, abs=1e-9)
+    assert found.importance.tolist() == [1.0]
 
 
 def test_a_constant_output_has_no_tree() -> None:
@@ -181,12 +212,18 @@ def test_a_constant_output_has_no_tree() -> None:
     ("change", "message"),
     [
         ({"names": "ab"}, "shapes"),
+        ({"names": "abcd"}, "shapes"),
         ({"y": np.ones(29)}, "shapes"),
+        ({"y": np.ones(31)}, "shapes"),
+        ({"x": np.ones(30), "names": ""}, "shapes"),
+        ({"x": np.ones((30, 3, 1))}, "shapes"),
+        ({"groups": np.ones((30, 1), int)}, "shapes"),
         ({"groups": np.ones(29, int)}, "shapes"),
         ({"groups": np.ones(31, int)}, "shapes"),
         ({"y": np.full(30, np.nan)}, "finite"),
         ({"folds": 1}, "folds"),
         ({"complexity": 0.0}, "complexity"),
+        ({"complexity": 1.0}, "complexity"),
     ],
 )
 def test_what_cannot_be_grown_is_refused(change, message) -> None:

@@ -8,7 +8,7 @@ from scipy.stats import t
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
-from spinepipe.sensitivity.shares import mean_squares, variance_shares
+from spinepipe.sensitivity.shares import mean_squares, share_intervals, variance_shares
 from spinepipe.statistics import Ended
 
 PARTS = ("row", "column", "interaction", "total_row", "total_column")
@@ -78,6 +78,28 @@ def test_shares_and_intervals_by_the_long_way() -> None:
     np.testing.assert_allclose(ends(found)[:, 1], expit(logit(whole) + half), rtol=1e-8)
 
 
+@pytest.mark.parametrize("edge", [0.0, 1.0])
+def test_a_share_that_comes_to_an_end_has_a_plain_interval(edge: float) -> None:
+    """Three rows, SD 0.01, and columns that say nothing: variance (3 - 1)^2 / 3 x 0.01^2, freedom
+    3 - 1. The other share stays on the logit scale."""
+    rows = np.array([[0.0, 0.4], [0.01, 0.5], [0.02, 0.6]])
+    rows[:, 0] = np.abs(edge - rows[:, 0])
+    columns = np.full((5, 2), 0.5)
+    low, high = share_intervals(np.array([0.5, 0.5]), rows, columns)
+    half = t.ppf(0.975, 2) * 0.01 * np.sqrt(4.0 / 3.0)
+    np.testing.assert_allclose([low[0], high[0]], [0.5 - half, 0.5 + half])
+    reach = t.ppf(0.975, 2) * logit(0.6) * np.sqrt(4.0 / 3.0)
+    np.testing.assert_allclose([low[1], high[1]], [expit(-reach), expit(reach)])
+
+
+def test_what_does_not_vary_has_no_width_and_none_lies_outside() -> None:
+    still = np.full((4, 3), [0.2, 0.0, 1.0])
+    low, high = share_intervals(np.array([0.2, 0.0, 1.0]), still, still)
+    np.testing.assert_allclose([low, high], [[0.2, 0.0, 1.0]] * 2)
+    wide = share_intervals(np.array([0.5]), np.array([[-1.0], [0.5], [2.0]]), np.full((4, 1), 0.5))
+    np.testing.assert_array_equal(wide, [[0.0], [1.0]])
+
+
 def test_known_shares_are_found_without_bias() -> None:
     rng, truth = np.random.default_rng(3), (0.5, 0.2, 0.3)
     found = [estimates(variance_shares(normal_grid(rng, 300, 40, truth))) for _ in range(60)]
@@ -131,7 +153,7 @@ def test_a_transposed_grid_exchanges_rows_and_columns() -> None:
     np.testing.assert_allclose(ends(other), ends(one)[swap], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e150, 0.0), (1e-3, 5.0)])
+@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e150, 0.0), (1e-3, 5.0), (1.0, 1e6)])
 def test_unit_and_zero_do_not_matter(scale: float, shift: float) -> None:
     grid = normal_grid(np.random.default_rng(6), 20, 8, (0.3, 0.3, 0.4))
     one, other = variance_shares(grid), variance_shares(scale * grid + shift)
@@ -176,6 +198,13 @@ def test_variance_in_one_row_or_column_only_cannot_be_shared(where) -> None:
 def test_two_rows_or_columns_are_too_few(shape) -> None:
     found = variance_shares(np.random.default_rng(8).normal(size=shape))
     assert (found.status, found.interaction) == (Ended.TOO_FEW, None)
+    assert (found.n_rows, found.n_columns) == shape
+    assert found.message.startswith(f"grid of {shape[0]} x {shape[1]};")
+
+
+def test_three_by_three_are_enough() -> None:
+    grid = np.random.default_rng(20050).normal(size=(3, 3))
+    assert variance_shares(grid).status is Ended.DONE
 
 
 @pytest.mark.parametrize("grid", [np.ones(5), np.full((4, 4), np.nan)])

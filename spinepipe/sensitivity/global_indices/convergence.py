@@ -33,7 +33,8 @@ def convergence(
     Parameters
     ----------
     outputs, ok, settings, resolution : as for `indices`.
-    sizes : at most so many parts, each twice the one before; fewer where they would be too small.
+    sizes : at most so many parts (1 or more), each twice the one before; fewer where they would be
+        too small.
 
     Parts of a Sobol design are its first base samples, powers of two, each of them as well spread
     as a design of its own; of Morris the first trajectories. The first points of a Latin hypercube
@@ -61,6 +62,6 @@ def _sizes(design: Design, sizes: int) -> list[int]:
     """Halves of halves of the samples, smallest first."""
     if design.method is Method.FAST:
         return [design.samples]
-    halves = {design.samples >> step for step in range(max(1, sizes))}
+    halves = {design.samples >> step for step in range(sizes)}
     least = FEWEST[design.method]
     return sorted(size for size in halves if size >= least or size == design.samples)

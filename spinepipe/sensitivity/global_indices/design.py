@@ -53,9 +53,9 @@ class Design:
     unit: Array
     samples: int
     seed: int
-    second_order: bool = True
-    levels: int = 4
-    harmonics: int = 4
+    second_order: bool
+    levels: int
+    harmonics: int
 
     @property
     def n(self) -> int:
@@ -82,24 +82,6 @@ class Design:
             raise ValueError(f"samples must be 1 to {self.samples}, found {samples}")
         rows = self.n if self.method is Method.FAST else samples * self.block
         return replace(self, unit=self.unit[:rows], samples=samples)
-
-
-def run_count(method: str, inputs: int, samples: int, second_order: bool = True) -> int:
-    """Number of runs of a design.
-
-    Parameters
-    ----------
-    inputs : number of groups, a factor without one counting as a group, the dummy included.
-    samples : see `Design`.
-    second_order : of Sobol only.
-    """
-    per_sample = {
-        Method.SOBOL: (2 if second_order else 1) * inputs + 2,
-        Method.LATIN_HYPERCUBE: 1,
-        Method.MORRIS: inputs + 1,
-        Method.FAST: inputs,
-    }
-    return samples * per_sample[Method(method)]
 
 
 def design_problems(

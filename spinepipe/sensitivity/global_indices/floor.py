@@ -150,9 +150,8 @@ def _floor(name: str, drawn: Array, known: NDArray[np.bool_], confidence: float)
 def _of_pairs(found: Sequence[Index]) -> Floor:
     """From the lowest to the highest end of the dummy's pairs."""
     pairs = [i for i in found if i.index == "S2" and DUMMY in (i.factor, i.other)]
-    low, high = pairs[0].low, pairs[0].high
-    for pair in pairs[1:]:
-        low, high = np.ma.minimum(low, pair.low), np.ma.maximum(high, pair.high)
+    low = np.ma.stack([pair.low for pair in pairs]).min(axis=0)
+    high = np.ma.stack([pair.high for pair in pairs]).max(axis=0)
     return Floor(low, high, len(pairs))
 
 

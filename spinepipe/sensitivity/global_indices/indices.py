@@ -165,7 +165,7 @@ def _has(design: Design, index: str, name: str) -> bool:
     return not (signed and design.groups.count(name) > 1)
 
 
-FEWEST = {Method.SOBOL: 8, Method.LATIN_HYPERCUBE: 50, Method.MORRIS: 4, Method.FAST: 0}
+FEWEST = {Method.SOBOL: 8, Method.LATIN_HYPERCUBE: 50, Method.MORRIS: 4}
 """Whole base samples, points or trajectories below which no index is given."""
 
 ROUNDING = 1e-12

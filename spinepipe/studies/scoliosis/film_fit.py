@@ -46,7 +46,6 @@ TOPS = 6
 
 READINGS_OF_A_CHANGE = 2
 """On the film and on the erect one."""
-"""On the film and on the erect one."""
 
 NO_POSE = "in no first guess does a stable pose have the uppermost vertebra where the films have it"
 

@@ -1,0 +1,253 @@
+"""Films and angles of a few vertebrae, worked by hand; how models miss them, and reading noise."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spinepipe import cohort as cohorts
+from spinepipe.status import Ended
+from spinepipe.studies.scoliosis import reading_noise as noise_of
+from spinepipe.studies.scoliosis.curve_angles import Curve, curves, lumbar_apex
+from spinepipe.studies.scoliosis.films import (
+    CORNERS,
+    FILMS,
+    PATIENTS,
+    Film,
+    Read,
+    height,
+    placed,
+    read_films,
+)
+from spinepipe.studies.scoliosis.misses import miss_of
+from spinepipe.studies.scoliosis.reading_noise import reading_noise
+from spinepipe.studies.scoliosis.settings import Scoliosis
+
+STUDY = {"study": "s", "kind": "scoliosis", "cohort": "ais"}
+
+
+def film(*rows: tuple[float, float, float]) -> Film:
+    """Right, up and tilt (deg) of each vertebra."""
+    right, up, tilt = np.array(rows).T
+    return Film(right, up, np.deg2rad(tilt))
+
+
+ROOF = film((0, 0, 40), (1, 1, 10), (1.5, 2, -5), (0, 2, -30))
+
+
+def test_ferguson_s_angle_is_that_of_the_lines_to_the_apex() -> None:
+    """From (0, 0) to (1, 1) the line leans 45 deg to the right, from there to (0, 2) 45 back."""
+    curve = Curve(lower=0, upper=3, apex=1, side=1)
+    assert np.rad2deg(curve.ferguson(ROOF)) == pytest.approx(90.0)
+    assert np.rad2deg(curve.cobb(ROOF)) == pytest.approx(70.0)
+    left = Curve(0, 3, 1, -1)
+    assert left.ferguson(ROOF) == -curve.ferguson(ROOF)
+    assert left.cobb(ROOF) == -curve.cobb(ROOF)
+
+
+def test_the_apex_is_farthest_from_the_line_between_the_ends() -> None:
+    """Of the line from (0, 0) to (0, 2): 1 and 1.5 away, whichever is higher."""
+    assert curves(ROOF) == (Curve(0, 3, 2, 1),)
+    lower_bulge = film((0, 0, 40), (1.5, 1, 10), (1.0, 2, -5), (0, 2, -30))
+    assert curves(lower_bulge) == (Curve(0, 3, 1, 1),)
+    slanting = film((0, 0, 40), (0.2, 3, 10), (3, 3.5, -5), (4, 4, -30))  # the line at 45 deg
+    assert curves(slanting) == (Curve(0, 3, 1, 1),)
+
+
+def tilted(*tilts: float) -> Film:
+    """A spine of these tilts, deg."""
+    tilt = np.deg2rad(tilts)
+    right = np.concatenate([[0.0], np.cumsum(np.sin((tilt[1:] + tilt[:-1]) / 2.0))])
+    up = np.concatenate([[0.0], np.cumsum(np.cos((tilt[1:] + tilt[:-1]) / 2.0))])
+    return Film(right, up, tilt)
+
+
+@pytest.mark.parametrize(
+    ("tilts", "ends"),
+    [
+        ((0, 6, 12, 6, 0), [(0, 2), (2, 4)]),
+        ((0, 6, 12, 8, 13), [(0, 4)]),  # a wave of 4 deg is none
+        ((0, 6, 12, 6, 13), [(0, 2)]),  # of 6 deg it is one, if ends apart by one are no curve
+        ((0, 4, 0, -4, 0, 0), [(0, 5)]),  # all of it a wave: one curve from end to end
+        ((0, 4, 6, 10, 3), [(0, 3)]),
+        ((0, -6, -12, -5, 2), [(0, 2), (2, 4)]),
+        ((0, 8, 8, 8, 0), [(0, 3)]),  # as far tilted: the upper one
+        ((10, 0, 0), [(0, 2)]),
+    ],
+)
+def test_ends_lie_where_the_tilt_turns_back_by_more_than_five_degrees(
+    tilts: tuple[float, ...], ends: list[tuple[int, int]]
+) -> None:
+    assert [(one.lower, one.upper) for one in curves(tilted(*tilts))] == ends
+
+
+def test_a_spine_of_two_vertebrae_has_no_curve() -> None:
+    assert curves(tilted(0, 20)) == ()
+    assert lumbar_apex(tilted(0, 20), ("L5", "L4")) == 0
+
+
+def test_a_curve_at_the_sacrum_or_high_up_is_no_lumbar_one() -> None:
+    """The upper curve has its apex at L1, the lower one at T10 by its names here."""
+    zigzag = tilted(0, 10, 20, 10, 0)
+    assert [one.apex for one in curves(zigzag)] == [1, 3]
+    assert lumbar_apex(zigzag, ("S1", "T10", "x", "L1", "T12")) == 3
+    assert lumbar_apex(zigzag, ("S1", "T12", "x", "L1", "T12")) == 1
+    assert lumbar_apex(zigzag, ("S1", "T10", "x", "T9", "T8")) == 1
+
+
+def test_joints_lie_on_the_way_to_the_vertebra_above() -> None:
+    np.testing.assert_allclose(
+        ROOF.joints(0.25), [[0.25, 0.25], [1.125, 1.25], [1.125, 2.0]], atol=1e-15
+    )
+
+
+def test_a_film_in_every_dress() -> None:
+    np.testing.assert_allclose(np.rad2deg(ROOF.turned), [-30, -15, -25])
+    np.testing.assert_allclose(ROOF.top, [0.0, 2.0, np.deg2rad(-30)])
+    np.testing.assert_allclose(ROOF.rows, [ROOF.right, ROOF.up, ROOF.tilt])
+    large = ROOF.scaled(3.0)
+    np.testing.assert_allclose(large.rows, [3.0 * ROOF.right, 3.0 * ROOF.up, ROOF.tilt])
+    np.testing.assert_allclose(ROOF.mirrored().rows, [-ROOF.right, ROOF.up, -ROOF.tilt])
+
+
+def test_from_its_lowest_vertebra_a_film_is_turned_back_by_its_tilt() -> None:
+    """The lowest leans 90 deg to the right: what is right of it is below, what is up is left."""
+    seen = film((1, 2, 90), (4, 2, 60), (1, 4, 0)).seen_from_below()
+    np.testing.assert_allclose(seen.right, [0, 0, -2], atol=1e-15)
+    np.testing.assert_allclose(seen.up, [0, 3, 0], atol=1e-15)
+    np.testing.assert_allclose(np.rad2deg(seen.tilt), [0, -30, -90])
+
+
+def cornered(**corners: tuple[float, float]) -> pd.DataFrame:
+    """A film of one vertebra, y to the left and z up, mm."""
+    cells = {
+        f"{name}_{axis}_mm": at
+        for name, place in corners.items()
+        for axis, at in zip("yz", place, strict=True)
+    }
+    return pd.DataFrame([{"vertebra": "L4", **dict.fromkeys(CORNERS), **cells}])
+
+
+def test_the_centre_of_a_wedge_is_where_its_diagonals_cross() -> None:
+    """20 mm above a base of 60 mm lies a top of 20 mm: the diagonals cross at 3 / 4 of it."""
+    rows = cornered(
+        lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20), upper_right=(-10, 20)
+    )
+    found = placed(rows, ("L4",))
+    np.testing.assert_allclose([found.right[0], found.up[0]], [0.0, 0.015], atol=1e-15)
+    assert found.tilt[0] == 0.0
+    assert height(rows) == pytest.approx(0.020)
+
+
+def test_a_vertebra_leans_with_the_line_through_its_endplates() -> None:
+    """Upper endplate 15 mm to the right of the lower one and 20 above: atan(3 / 4), 25 mm high."""
+    rows = cornered(
+        lower_left=(30, 0), lower_right=(-10, 0), upper_left=(15, 20), upper_right=(-25, 20)
+    )
+    found = placed(rows, ("L4",))
+    assert np.tan(found.tilt[0]) == pytest.approx(0.75)
+    assert found.right[0] == pytest.approx(-0.0025)
+    assert height(rows) == pytest.approx(0.025)
+
+
+def test_one_corner_short_the_centre_is_taken() -> None:
+    rows = cornered(lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20))
+    rows = rows.assign(y_mm=-3.0, z_mm=7.0, orientation_deg=-8.0)
+    found = placed(rows, ("L4",))
+    np.testing.assert_allclose(found.rows[:, 0], [0.003, 0.007, np.deg2rad(8.0)])
+    assert height(rows) is None
+
+
+HEADER = "cohort: c\ntitle: t\nsource: made\nvertebrae: [L4, L3, L2]\ngravity: false\n"
+
+
+def test_scatter_of_readings_is_pooled_by_how_many_there_are(tmp_path: Path) -> None:
+    """Tilts of L3 and L2 read 1 deg apart twice on one film, and 3 deg apart two by two on one:
+    variances 1/2 and 3, of means a half and a quarter; freedoms 1 and 3."""
+    tilts = {"erect": [0.0, 1.0], "right_bending": [3.0, 6.0, 3.0, 6.0], "left_bending": [-4.0]}
+    rows = [
+        {
+            "specimen": "p1",
+            "position": position,
+            "vertebra": name,
+            "observer": "a",
+            "repeat": 1 + repeat,
+            "y_mm": 0.0,
+            "z_mm": 30.0 * at,
+            "orientation_deg": tilt if at else 0.0,
+        }
+        for position, each in tilts.items()
+        for repeat, tilt in enumerate(each)
+        for at, name in enumerate(("L4", "L3", "L2"))
+    ]
+    folder = tmp_path / "c"
+    folder.mkdir()
+    (folder / "cohort.yaml").write_text(HEADER, encoding="utf-8")
+    (folder / "specimens.csv").write_text("specimen\np1\n", encoding="utf-8")
+    pd.DataFrame(rows).to_csv(folder / "films.csv", index=False)
+    read = read_films(cohorts.read(folder, (FILMS, PATIENTS)), "p1")
+    assert read.readings == {"erect": 2, "right_bending": 4, "left_bending": 1}
+    expected = np.sqrt((1 * 0.5 / 2 + 3 * 3.0 / 4) / 4)
+    np.testing.assert_allclose(np.rad2deg(read.sd[2]), expected)
+    np.testing.assert_allclose(read.sd[:2], 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.rad2deg(read.films["right_bending"].tilt), [0.0, -4.5, -4.5])
+
+
+def test_what_no_film_shows_is_refused_by_the_reader() -> None:
+    """Places within 2 m, tilts within a right angle, a thousand repeats; ages, Cobb angles."""
+    limits = {c.name: (c.low, c.high) for form in (FILMS, PATIENTS) for c in form.columns}
+    assert {limits[name] for name in ("y_mm", "z_mm", *CORNERS)} == {(-2000.0, 2000.0)}
+    assert limits["orientation_deg"] == (-90.0, 90.0)
+    assert (limits["repeat"], limits["age_years"]) == ((1, 1000), (0, 130))
+    assert limits["cobb_deg"] == (0, 180)
+    assert FILMS.places
+    required = {c.name for form in (FILMS, PATIENTS) for c in form.columns if c.required}
+    assert required == {"specimen", "position", "vertebra"}
+
+
+def posed(status: Ended, shown: Film, r: list[float]) -> Any:
+    return SimpleNamespace(held=SimpleNamespace(status=status), film=shown, r=np.deg2rad(r))
+
+
+@pytest.mark.parametrize("status", [Ended.CONVERGED, Ended.UNREACHABLE, Ended.UNSTABLE])
+def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(status: Ended) -> None:
+    """Two vertebrae above the lowest: places off by 5 mm and nothing, tilts by 3 and 4 deg; both
+    segments turn by 1 and 7 deg less than on the film."""
+    read = film((0, 0, 0), (0.1, 1, 2), (0.2, 2, 4))
+    erect = film((0, 0, 0), (0, 1, 0), (0, 2, 0))
+    shown = film((9, 9, 9), (0.103, 1.004, 5), (0.2, 2, 0))
+    nothing: dict[str, Any] = {}
+    whole = Read({"erect": erect, "neutral": read}, nothing, nothing, np.full(3, np.nan), nothing)
+    found = miss_of(SimpleNamespace(read=whole), "neutral", posed(status, shown, [1.0, -5.0]))
+    if status is Ended.UNSTABLE:
+        assert set(found.values()) == {None}
+        return
+    assert found["place_rmse_mm"] == pytest.approx(5.0 / np.sqrt(2.0))
+    assert found["tilt_rmse_deg"] == pytest.approx(np.sqrt(12.5))
+    assert found["rotation_rmse_deg"] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("sds", "stated", "expected"),
+    [
+        ([(3e-3, 4e-3, 0.02), (3e-3, 4e-3, 0.04)], {}, (np.sqrt(12.5), np.rad2deg(np.sqrt(1e-3)))),
+        ([(np.nan,) * 3, (3e-3, 4e-3, 0.02)], {}, (np.sqrt(12.5), np.rad2deg(0.02))),
+        ([(np.nan,) * 3], {"place_sd_mm": 0.4, "tilt_sd_deg": 0.9}, (0.4, 0.9)),
+        ([(np.nan,) * 3], {"tilt_sd_deg": 0.9}, (np.nan, 0.9)),
+    ],
+)
+def test_readings_tell_how_films_are_read_and_else_the_study(
+    sds: list[tuple[float, ...]],
+    stated: dict[str, float],
+    expected: tuple[float, float],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Repetitions before what is stated; places each way, as up and right are read alike."""
+    told = {f"p{number}": np.array(sd) for number, sd in enumerate(sds)}
+    monkeypatch.setattr(noise_of, "read_films", lambda _, name: SimpleNamespace(sd=told[name]))
+    study = Scoliosis.model_validate(STUDY | stated)
+    cohort: Any = SimpleNamespace(specimen_names=tuple(told))
+    np.testing.assert_allclose(reading_noise(study, cohort), expected)
