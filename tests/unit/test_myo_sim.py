@@ -172,8 +172,8 @@ def test_head_and_arms_are_where_the_file_s_offsets_have_them(trunk) -> None:
     """Added by hand. The skull's ellipsoid ends 0.5 + 0.075 + 0.1 m above where the head is joined;
     its centre of mass lies midway from there to the joint above T1."""
     torso = np.array([-0.006, 0.0402, 0.0])
-    neck = torso + [-0.005 - 0.01134, 0.395, 0.0]
-    vertex = torso + [-0.005, -0.01 + 0.5 + 0.075 + 0.1, 0.0]
+    neck = torso + np.array([-0.005 - 0.01134, 0.395, 0.0])
+    vertex = torso + np.array([-0.005, -0.01 + 0.5 + 0.075 + 0.1, 0.0])
     np.testing.assert_allclose(trunk.head, (neck + vertex) / 2.0, atol=1e-12)
     clavicle = [0.022335, 0.41713, 0.025465]
     shoulder = np.add(clavicle, [-0.01433 - 0.00955, 0.02007 - 0.034, 0.1355 + 0.009])
