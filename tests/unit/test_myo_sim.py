@@ -168,6 +168,22 @@ def test_what_the_slices_the_head_and_the_arms_hang_on(trunk) -> None:
     assert 0.55 < trunk.arm_length < 0.70
 
 
+def test_head_and_arms_are_where_the_file_s_offsets_have_them(trunk) -> None:
+    """Added by hand. The skull's ellipsoid ends 0.5 + 0.075 + 0.1 m above where the head is joined;
+    its centre of mass lies midway from there to the joint above T1."""
+    torso = np.array([-0.006, 0.0402, 0.0])
+    neck = torso + np.array([-0.005 - 0.01134, 0.395, 0.0])
+    vertex = torso + np.array([-0.005, -0.01 + 0.5 + 0.075 + 0.1, 0.0])
+    np.testing.assert_allclose(trunk.head, (neck + vertex) / 2.0, atol=1e-12)
+    clavicle = [0.022335, 0.41713, 0.025465]
+    shoulder = np.add(clavicle, [-0.01433 - 0.00955, 0.02007 - 0.034, 0.1355 + 0.009])
+    np.testing.assert_allclose(trunk.shoulders[0], shoulder, atol=1e-12)
+    upper = np.linalg.norm([0.0061, -0.2904, -0.0123])
+    lower = np.linalg.norm([0.0004 + 0.018, -0.0115 - 0.242, 0.02 + 0.025])
+    palm = np.linalg.norm([0.003992 + 0.000477, -0.015054 - 0.039239, 0.002327 + 0.007377])
+    assert trunk.arm_length == pytest.approx(upper + lower + palm, rel=1e-9)
+
+
 def test_the_mark_holds_the_digest_of_the_files() -> None:
     origin = origin_of_myo_sim()
     assert (origin.name, origin.version) == ("myo-sim", "0.2.4")
