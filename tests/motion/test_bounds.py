@@ -83,6 +83,40 @@ def own(**changed: object) -> pd.DataFrame:
     return pd.DataFrame([row | changed], index=[2])
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, 8.0), (-20.0, 0.0)])
+def test_a_range_may_end_at_zero(low: float, high: float) -> None:
+    """A joint that goes one way alone."""
+    at = JOINTS.index("L4L5"), COORDINATES.index("extension")
+    np.testing.assert_allclose(
+        DEG_PER_RAD * bounds(own(low=low, high=high)).limits[at], [low, high], rtol=1e-14
+    )
+
+
+def test_faults_are_told_at_their_place() -> None:
+    with pytest.raises(InputError) as caught:
+        bounds(own(low=2.0), "mine.csv")
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.row, problem.column) == ("mine.csv", 2, "low")
+    assert problem.found == "2 to 8"
+
+
+def test_a_row_keeps_the_status_that_it_tells() -> None:
+    at = JOINTS.index("L4L5"), COORDINATES.index("extension")
+    assert bounds(own(status="derived")).status[at] == "derived"
+
+
+def test_lines_are_counted_as_an_editor_shows_them() -> None:
+    """The header is the first."""
+    rows = packaged_rows(FILE, NUMBERS)
+    assert (rows.index[0], rows.index[-1]) == (2, 1 + 17 * 6)
+
+
+def test_what_comes_along_cannot_be_written_over() -> None:
+    found = bounds()
+    for array in (found.limits, found.source, found.status):
+        assert not array.flags.writeable
+
+
 def test_a_cohort_s_own_rows_take_the_place_of_those_that_come_along() -> None:
     found, shipped = bounds(own()), bounds()
     at = JOINTS.index("L4L5"), COORDINATES.index("extension")

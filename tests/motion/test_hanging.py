@@ -8,7 +8,7 @@ import pytest
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.motion.hanging import ARMS, T1, carried_parts, elbow_between, hung
+from spinepipe.motion.hanging import ARMS, T1, Arms, carried_parts, elbow_between, hung
 from spinepipe.motion.rigid import Part, joined, seen_from
 from spinepipe.motion.skeleton import Masses, Skeleton, body_poses, skeleton_of
 from spinepipe.muscles.subject import Subject
@@ -204,6 +204,27 @@ def test_hands_are_where_the_task_has_them() -> None:
     assert crossed["right_upper_arm"][1] < ANYWHERE[1]
 
 
+def test_elbows_point_where_the_task_has_them() -> None:
+    """Outwards and a little ahead and up, or down and a little ahead and outwards.
+
+    The hand rests ahead of the other shoulder, 60 mm, and 30 mm below it.
+    """
+    shoulder = ANYWHERE + 1.741 / 1.730 * np.array([0.0325, -0.012, 0.17])
+    points: dict[Arms, list[float]] = {"behind_head": [0.3, 0.3, 1.0], "crossed": [0.3, -1.0, 0.3]}
+    for arms, towards in points.items():
+        parts = {part.name: part.com for part in carried_parts(arms, MAN, ANYWHERE)}
+        elbow = shoulder + (parts["right_upper_arm"] - shoulder) / 0.5772
+        line = parts["right_hand"] - shoulder
+        across = np.cross(line, towards)
+        assert abs((elbow - shoulder) @ across) < 1e-14
+        off = (elbow - shoulder) - ((elbow - shoulder) @ line) / (line @ line) * line
+        assert off @ towards > 0.0
+    other = shoulder * [1.0, 1.0, -1.0]
+    np.testing.assert_allclose(
+        parts["right_hand"], other + 1.741 / 1.730 * np.array([0.06, -0.03, 0.0]), atol=1e-14
+    )
+
+
 def test_raised_arms_raise_the_centre_and_hanging_ones_lower_it() -> None:
     centres = [joined("all", carried_parts(arms, MAN, ANYWHERE)).com[1] for arms in ARMS]
     hanging, behind, crossed = centres
@@ -237,6 +258,14 @@ def test_the_elbow_is_at_both_lengths_on_the_side_asked_for() -> None:
 def test_an_arm_that_does_not_reach_is_refused() -> None:
     with pytest.raises(ValueError, match="900 mm apart"):
         elbow_between(np.zeros(3), np.array([0.9, 0.0, 0.0]), 0.3, 0.3, np.ones(3))
+
+
+@pytest.mark.parametrize("apart", [0.25, 0.75, 0.05, 0.8])
+def test_an_arm_that_is_quite_stretched_or_folded_has_no_side_to_bend_to(apart: float) -> None:
+    with pytest.raises(ValueError, match=f"no arm of 500 and 250 mm .* {1e3 * apart:.0f} mm apart"):
+        elbow_between(np.zeros(3), np.array([apart, 0.0, 0.0]), 0.5, 0.25, np.ones(3))
+    for near in (0.2501, 0.7499):
+        elbow_between(np.zeros(3), np.array([near, 0.0, 0.0]), 0.5, 0.25, np.ones(3))
 
 
 def test_unknown_arms_are_refused() -> None:

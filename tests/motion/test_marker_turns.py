@@ -1,6 +1,7 @@
 """Turns of groups of markers against scipy's; groups that tell none."""
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from spinepipe.motion.marker_turns import angles, turns
@@ -33,6 +34,26 @@ def test_too_few_markers_and_markers_in_a_line_tell_no_turn() -> None:
         found, told = turns(model, model[None], seen)
         assert not told.any()
         np.testing.assert_array_equal(found, np.eye(3)[None])
+
+
+@pytest.mark.parametrize("size_m", [1e-7, 1e-4, 0.03, 40.0])
+def test_a_group_tells_its_turn_by_its_shape_whatever_its_size(size_m: float) -> None:
+    """A rectangle, a thousand times as long as wide: extents are squares, so a millionth."""
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.9])
+    seen = np.ones((1, 4), dtype=bool)
+    for square, tells in ((1.1e-6, True), (0.9e-6, False)):
+        wide = np.sqrt(square)
+        group = size_m * np.array([[1, wide, 0], [1, -wide, 0], [-1, wide, 0], [-1, -wide, 0]])
+        found, told = turns(group, turn.apply(group)[None], seen)
+        assert told[0] == tells
+        wanted = turn.as_matrix() if tells else np.eye(3)
+        np.testing.assert_allclose(found[0], wanted, atol=1e-6)
+
+
+def test_markers_all_at_one_place_tell_no_turn() -> None:
+    found, told = turns(np.zeros((3, 3)), np.zeros((1, 3, 3)), np.ones((1, 3), dtype=bool))
+    assert not told.any()
+    np.testing.assert_array_equal(found[0], np.eye(3))
 
 
 def test_a_mirrored_group_is_met_by_a_rotation() -> None:

@@ -41,6 +41,23 @@ def test_frames_that_do_not_see_all_do_not_count() -> None:
     assert (few.variability_m, few.variability_percent, few.frames) == (None, None, 2)
 
 
+def test_a_marker_by_itself_has_no_rigidity() -> None:
+    found = rigidity(np.zeros((6, 1, 3)), np.ones((6, 1), dtype=bool))
+    assert (found.variability_m, found.variability_percent, found.frames) == (None, None, 6)
+
+
+def test_shares_are_means_of_each_pair_s_own() -> None:
+    """0 and 30 mm apart from 31 to 33, and 100 mm on: three distances, two of which vary."""
+    places = np.zeros((3, 3, 3))
+    places[:, 1, 0], places[:, 2, 1] = [0.031, 0.032, 0.033], 0.1
+    found = rigidity(places, np.ones((3, 3), dtype=bool))
+    slanted = np.hypot(places[:, 1, 0], 0.1)
+    spreads = [1e-3, 0.0, np.std(slanted, ddof=1)]
+    assert found.variability_m == pytest.approx(np.mean(spreads))
+    shares = [1e-3 / 0.032, 0.0, spreads[2] / slanted.mean()]
+    assert found.variability_percent == pytest.approx(100.0 * np.mean(shares))
+
+
 def test_rows_of_clusters(trial_with_clusters) -> None:
     markers, trial = trial_with_clusters
     rows = list(cluster_rows("s01", markers, trial))
@@ -80,6 +97,12 @@ def test_angle_of_one_rotation_to_another(angle: float) -> None:
     axis = one @ [0.0, 0.0, 1.0]
     assert turned_apart(one, one @ rotation_zxy(angle, 0.0, 0.0)) == pytest.approx(angle, rel=1e-6)
     assert np.linalg.norm(axis) == pytest.approx(1.0)
+
+
+def test_half_a_turn_is_the_most_also_where_matrices_are_rounded() -> None:
+    half = np.diag([-1.0, -1.0, 1.0])
+    for larger in (1.0, 1.0 + 1e-9):
+        assert turned_apart(np.eye(3), larger * half) == pytest.approx(np.pi, abs=1e-4)
 
 
 def test_likeness_by_hand() -> None:

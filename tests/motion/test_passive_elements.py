@@ -191,6 +191,44 @@ def test_faults_of_a_cohort_s_rows_are_told(
     assert (first.file, first.row, first.column) == ("own.csv", line, column)
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"a": 1.0, "b": 2.0},  # as steep per degree as may be
+        {"lower": 1.0, "upper": 1.0},
+        {"a": 2.0 * 1.0099},  # a b differ by just less than a hundredth of the larger
+        {"coordinate": "superior", "b": 5.0},  # per mm
+    ],
+)
+def test_rows_at_the_ends_of_what_may_be_are_taken(changed: dict[str, object]) -> None:
+    both = rows(**changed)
+    both.loc[3, ["a", "b"]] = [both.loc[2, "a"] * both.loc[2, "b"] / 0.2, 0.2]
+    if changed.get("a") == 2.0 * 1.0099:
+        both.loc[3, "a"] = 3.0
+    both.loc[3, "coordinate"] = both.loc[2, "coordinate"]
+    passive_elements(both)
+
+
+@pytest.mark.parametrize(
+    ("changed", "found"),
+    [
+        ({"b": 2.001}, "2.001"),
+        ({"a": 0.0}, "0"),
+        ({"upper": 0.0}, "0"),
+        ({"a": 2.03}, "a b is 0.609 on the positive and 0.6 on the negative side"),
+    ],
+)
+def test_rows_beyond_the_ends_are_not(changed: dict[str, object], found: str) -> None:
+    with pytest.raises(InputError) as caught:
+        passive_elements(rows(**changed), "own.csv")
+    first = caught.value.problems[0]
+    assert (first.row, first.found) == (2, found)
+
+
+def test_what_comes_along_cannot_be_written_over() -> None:
+    assert not any(getattr(LAWS, name).flags.writeable for name in (*NUMBERS, "source", "status"))
+
+
 def test_a_missing_column_is_told() -> None:
     with pytest.raises(InputError, match="upper"):
         passive_elements(rows().drop(columns="upper"))

@@ -78,6 +78,28 @@ def test_a_cohort_s_own_set_takes_the_place_of_one_of_its_name() -> None:
     assert np.count_nonzero(found.shares) == 2
 
 
+@pytest.mark.parametrize("ratios", [(0.6, 0.4, 0.0), (0.6, 0.4019), (0.6, 0.3981)])
+def test_a_share_may_be_nothing_and_a_sum_may_be_rounded(ratios: tuple[float, ...]) -> None:
+    assert ratio_sets(own(*ratios))["bruno_2015"].shares[1, 0] == ratios[1]
+
+
+@pytest.mark.parametrize("second", [0.4021, 0.3979])
+def test_a_sum_off_by_more_is_told_at_the_first_row_of_its_coordinate(second: float) -> None:
+    rows = pd.concat([own(1.0, name="christophy_2012"), own(0.6, second).set_axis([3, 4])])
+    with pytest.raises(InputError) as caught:
+        ratio_sets(rows, "mine.csv")
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.row, problem.column) == ("mine.csv", 3, "ratio")
+
+
+def test_shares_of_one_coordinate_are_no_shares_of_another() -> None:
+    rows = own(0.6, 0.4)
+    turned = rows.assign(coordinate="left_rotation", ratio=[0.3, 0.7]).set_axis([4, 5])
+    found = ratio_sets(pd.concat([rows, turned]))["bruno_2015"]
+    np.testing.assert_array_equal(found.shares[:2], [[0.6, 0.0, 0.3], [0.4, 0.0, 0.7]])
+    assert not found.shares.flags.writeable
+
+
 @pytest.mark.parametrize(
     ("rows", "told"),
     [

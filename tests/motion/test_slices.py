@@ -99,6 +99,33 @@ def test_the_pelvis_is_de_leva_s_lower_trunk() -> None:
     np.testing.assert_allclose(tall, 1.21 * found, rtol=1e-14)
 
 
+def test_a_woman_s_pelvis_has_radii_of_her_own() -> None:
+    """De Leva 1996 Table 4, women: 181.5 mm; radii sagittal, longitudinal, transverse."""
+    woman = Subject("female", 30.0, 1.735, 61.9)
+    expected = 9.0 * (0.1815 * np.array([0.433, 0.444, 0.402])) ** 2
+    np.testing.assert_allclose(pelvis_inertia(9.0, woman), np.diag(expected), rtol=1e-14)
+
+
+def test_each_slice_stands_between_its_own_joints() -> None:
+    """Unlike heights: the second step leads from L5's lower joint to its upper one."""
+    unlike = [
+        Pose(rotation_zxy(-0.01 * k, 0.0, 0.0), np.array([0.001 * k, 0.03 + 0.001 * k, 0.0]))
+        for k in range(17)
+    ]
+    found = slice_inertias(unlike, slices_kg(), REFERENCE)
+    for body in range(1, 17):
+        own = cylinder(unlike[body].origin, slices_kg()[body], "any")
+        np.testing.assert_array_equal(found[body], own)
+
+
+def test_a_slice_may_be_just_narrower_than_60_cm() -> None:
+    """Wide 2 a and deep 0.65 of it: pi a 0.65 a height 1000 kg."""
+    up, kg = np.array([0.0, 0.03, 0.0]), np.pi * 0.65 * 0.3**2 * 0.03 * 1000.0
+    assert cylinder(up, 0.999 * kg, "T1")[0, 0] > 0.0
+    with pytest.raises(ValueError, match=r"between joints 30 mm apart .* 600 mm wide"):
+        cylinder(up, 1.001 * kg, "T1")
+
+
 def test_a_body_that_is_no_slice_is_refused() -> None:
     kg = slices_kg()
     kg[-1] = 15.0
