@@ -16,7 +16,9 @@ include: "workflow/rules/execution.smk"
 
 
 SELECTION = selection()
-warm_up(modules_of_many(KINDS_IN_USE))
+# A submitted job has work to do, and Snakemake leaves out onstart.
+if not workflow.is_main_process:
+    warm_up(modules_of_many(KINDS_IN_USE))
 
 
 wildcard_constraints:
@@ -47,6 +49,7 @@ rule full:
 onstart:
     check_engine()
     check_writable()
+    warm_up_the_pool()
     tell_remade()
     tell_how_many_lost()
     tell_doubts()

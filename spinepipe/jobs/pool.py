@@ -114,7 +114,7 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
 
 
 def warm_up(modules: Sequence[str] = ()) -> None:
-    """Start the server that workers are forked from: its imports run while the caller plans.
+    """Start the server that workers are forked from: its imports run while the caller goes on.
 
     Parameters
     ----------

@@ -26,6 +26,12 @@ def check_engine():
         )
 
 
+def warm_up_the_pool():
+    """Have the workers' server import what the jobs at work need; a look or nothing to do starts none."""
+    kinds = {load(name)[0].kind for name in studies_at_work()}
+    warm_up(modules_of_many(kinds))
+
+
 def share_a_process():
     """Run all jobs of a submitted group in one process, on the machine it was submitted to.
 
