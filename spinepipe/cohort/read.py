@@ -47,7 +47,7 @@ def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
     return Reader().read(folder, further)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Reader:
     """Reads folders that do not change while it lives, the last `MOST_KEPT` of them once.
 
