@@ -37,7 +37,10 @@ class _Sheet:
     def cells(self, line: int) -> list[str]:
         """Cells of a line, blanks around them removed."""
         text = self.lines[line - 1]
-        return [cell.strip() for cell in text.split("\t")] if self.tabs else text.split()
+        if not self.tabs:
+            return text.split()
+        has_blanks = " " in text or not text.isascii()
+        return [cell.strip() for cell in text.split("\t")] if has_blanks else text.split("\t")
 
     def fault(self, line: int, column: str | None, found: str, allowed: str, do: str) -> InputError:
         """What is wrong in a line."""

@@ -11,13 +11,14 @@ from pathlib import Path
 
 from spinepipe.cli.program import main
 from tests.generators.spoilt.case import Case, Expected
-from tests.generators.spoilt.projects import MODEL
+from tests.generators.spoilt.projects import MODEL, Project
 
 MOST_TOLD = 100_000
 """Characters that all messages together may have."""
 
 _LINE = re.compile(
-    r"^(?P<kind>      |warn  |  |spinepipe check: )(?P<place>[^:]{1,400}?): found (?P<found>.*)",
+    r"^(?P<kind>      |warn  |  |spinepipe check: |spinepipe import: )"
+    r"(?P<place>[^:]{1,400}?): found (?P<found>.*)",
     re.S,
 )
 
@@ -67,14 +68,39 @@ class Verdict(Enum):
 
 def look(root: Path, *names: str) -> Seen:
     """What `spinepipe check` says of these studies, or of everything in a project."""
+    return _ran(root, "check", *names)
+
+
+def _ran(root: Path, *arguments: str) -> Seen:
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         try:
-            code = main(["--root", str(root), "check", *names])
+            code = main(["--root", str(root), *arguments])
         except Exception:
             traceback.print_exc(file=sys.stderr)
             code = -1
     return Seen(code, out.getvalue())
+
+
+def looked(case: Case, root: Path) -> Seen:
+    """What is said of a spoilt project that was written below a folder."""
+    if case.project.mapping:
+        return look_at_import(case.project, root)
+    return look(root, *asked(case))
+
+
+def look_at(project: Project, root: Path) -> Seen:
+    """What is said of a sound project."""
+    return look_at_import(project, root) if project.mapping else look(root)
+
+
+def look_at_import(project: Project, root: Path) -> Seen:
+    """What `spinepipe import` says and, of the cohort that it makes, `spinepipe check`."""
+    made = _ran(root, "import", str(root / project.mapping))
+    if made.code != 0:
+        return made
+    seen = look(root, project.cohort)
+    return Seen(seen.code, made.printed + seen.printed)
 
 
 def asked(case: Case) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import pytest
 
 from spinepipe import problems
 from spinepipe.problems import InputError, Problem
-from tests.cases.spoilt_cases import MOST_TOLD, Seen, Verdict, asked, look, verdict
+from tests.cases.spoilt_cases import MOST_TOLD, Seen, Verdict, asked, look, look_at, looked, verdict
 from tests.generators.spoilt.case import Case, Expected
 from tests.generators.spoilt.catalogue import cases
 from tests.generators.spoilt.documented import columns, keys
@@ -33,13 +33,13 @@ def sample() -> list[Case]:
 
 @pytest.mark.parametrize("case", sample(), ids=lambda case: case.name)
 def test_what_is_wrong_is_told_and_what_is_not_passes(case: Case, tmp_path: Path) -> None:
-    seen = look(case.write(tmp_path / "project"), *asked(case))
+    seen = looked(case, case.write(tmp_path / "project"))
     assert verdict(case, seen) is Verdict.RIGHT, seen.printed
 
 
 @pytest.mark.parametrize("project", projects(), ids=lambda project: project.name)
 def test_what_is_spoilt_is_sound(project, tmp_path: Path) -> None:
-    seen = look(write(project.files, tmp_path))
+    seen = look_at(project, write(project.files, tmp_path))
     assert (seen.code, seen.messages) == (0, []), seen.printed
 
 

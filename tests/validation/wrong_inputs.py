@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from tests.cases.spoilt_cases import Seen, Verdict, asked, look, verdict
+from tests.cases.spoilt_cases import Seen, Verdict, look_at, looked, verdict
 from tests.generators.spoilt.case import Case, removed
 from tests.generators.spoilt.catalogue import cases, sample
 from tests.generators.spoilt.projects import projects, write
@@ -77,7 +77,7 @@ def _one(number: int) -> tuple[int, str, int, str]:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "project"
         case.write(root)
-        seen = _in_a_process(root, asked(case))
+        seen = _in_a_process(root, case)
         removed(root)
     what = Verdict.HANGS if seen is None else verdict(case, seen)
     seen = seen or Seen(-2, "")
@@ -88,11 +88,11 @@ def _warm() -> None:
     """Load all that a check loads, so that each process starts with it."""
     for project in projects():
         with tempfile.TemporaryDirectory() as folder:
-            seen = look(write(project.files, Path(folder)))
+            seen = look_at(project, write(project.files, Path(folder)))
             assert (seen.code, seen.messages) == (0, []), seen.printed
 
 
-def _in_a_process(root: Path, names: tuple[str, ...]) -> Seen | None:
+def _in_a_process(root: Path, case: Case) -> Seen | None:
     """What was said; None where the process had to be ended."""
     reader, writer = os.pipe()
     child = os.fork()
@@ -102,7 +102,7 @@ def _in_a_process(root: Path, names: tuple[str, ...]) -> Seen | None:
         signal.alarm(60 * HANGS_S)  # one that waits uses no processor
         resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
         with os.fdopen(writer, "w", encoding="utf-8") as out:
-            seen = look(root, *names)
+            seen = looked(case, root)
             json.dump((seen.code, seen.printed), out)
         os._exit(0)
     os.close(writer)

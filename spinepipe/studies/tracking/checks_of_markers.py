@@ -173,11 +173,15 @@ def _told_exchange(look: Look, pair: tuple[int, int], when: str) -> Problem:
 
 def _exchanged_later(look: Look) -> Iterator[Problem]:
     """Markers that land on each other's former place, or farther than anybody moves."""
-    times, places, seen = look.trial.time_s, look.trial.places, look.trial.seen
-    last, when = places[0].copy(), np.where(seen[0], times[0], -np.inf)
-    for frame in range(1, len(times)):
-        recent = seen[frame] & (times[frame] - when < LONGEST_GAP_S)
-        step = np.where(recent, np.linalg.norm(places[frame] - last, axis=1), 0.0)
+    times, places = look.trial.time_s, look.trial.places
+    before = _seen_before(look.trial.seen)
+    since = np.where(before < 0, np.inf, times[:, None] - times[before])
+    recent = look.trial.seen & (since < LONGEST_GAP_S)
+    markers = np.arange(places.shape[1])
+    steps = np.linalg.norm(places - places[before, markers], axis=-1)
+    steps[~recent] = 0.0
+    for frame in np.flatnonzero((steps > JUMP_M).any(axis=1)).tolist():
+        step, last = steps[frame], places[before[frame], markers]
         jumped = np.flatnonzero(step > JUMP_M).tolist()
         partners: set[int] = set()
         for one, other in combinations(jumped, 2):
@@ -187,13 +191,18 @@ def _exchanged_later(look: Look) -> Iterator[Problem]:
                 pair = (one, other)
                 yield _told_exchange(look, pair, f"at {look.frames(frame, frame)}")
         for k in jumped:
-            if k not in partners and step[k] > FASTEST_M_PER_S * (times[frame] - when[k]):
+            if k not in partners and step[k] > FASTEST_M_PER_S * since[frame, k]:
                 found = f"jumps {step[k] * MM_PER_M:.0f} mm at {look.frames(frame, frame)}"
                 allowed = f"at most {FASTEST_M_PER_S:g} m/s"
                 remedy = "correct the name or delete the place"
                 yield look.in_motion(look.markers.names[k], found, allowed, remedy)
-        last[seen[frame]] = places[frame, seen[frame]]
-        when = np.where(seen[frame], times[frame], when)
+
+
+def _seen_before(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(F, K) the last frame before each in which a marker was seen; -1: in none."""
+    frames = np.where(seen, np.arange(len(seen))[:, None], -1)
+    ever = np.maximum.accumulate(frames, axis=0)
+    return np.concatenate([np.full((1, seen.shape[1]), -1), ever[:-1]])
 
 
 def _clusters(look: Look) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ from tests.generators.spoilt.folders import stray_cases, yaml_cases
 from tests.generators.spoilt.keys import key_cases, yaml_files
 from tests.generators.spoilt.projects import projects
 from tests.generators.spoilt.quantities import quantity_cases
+from tests.generators.spoilt.recordings import recording_cases
 from tests.generators.spoilt.tables import table_cases
 
 
@@ -17,6 +18,9 @@ def cases(seed: int = 19) -> Iterator[Case]:
     met: set[str] = set()
     for project in projects():
         rng = random.Random(f"{seed} {project.name}")
+        yield from recording_cases(project)
+        if project.spoilt_elsewhere:
+            continue
         for stem in project.tables:
             if _new(f"{project.folder}/{stem}", met):
                 yield from cell_cases(project, stem, rng)
@@ -25,7 +29,8 @@ def cases(seed: int = 19) -> Iterator[Case]:
             if _new(file, met):
                 yield from key_cases(project, file, form, rng)
                 yield from yaml_cases(project, file)
-        yield from stray_cases(project)
+        if not project.mapping:
+            yield from stray_cases(project)
         yield from quantity_cases(project)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
-PAGES = ("cohort-format.md", "model-file.md", "studies/*.md")
+PAGES = ("cohort-format.md", "import.md", "model-file.md", "studies/*.md")
 
 
 @dataclass(frozen=True)

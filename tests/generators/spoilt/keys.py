@@ -70,6 +70,9 @@ ANYWHERE = {
 
 def yaml_files(project: Project) -> Iterator[tuple[str, str]]:
     """Path and documented name of every YAML file of a project."""
+    if project.mapping:
+        yield project.mapping, "import"
+        return
     yield project.study, project.kind
     yield f"{project.folder}/cohort.yaml", "cohort.yaml"
     yield "config/config.yaml", "config.yaml"

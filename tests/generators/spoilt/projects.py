@@ -2,11 +2,15 @@
 
 import csv
 import io
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
 import yaml
+
+from tests.generators.spoilt import trunk
+from tests.generators.spoilt.c3d import Markers, read_trc, written
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 
@@ -23,6 +27,9 @@ class Project:
     Attributes
     ----------
     files : content by path. tables : stems of the cohort's documented tables.
+    mapping : path of the YAML that `spinepipe import` makes the cohort by; empty: it is there.
+    spoilt_elsewhere : whether its tables and YAML files are spoilt in another project.
+    markers : what its files of motion tell, by path, where they were made of it.
     """
 
     name: str
@@ -30,6 +37,9 @@ class Project:
     cohort: str
     files: Files
     tables: tuple[str, ...]
+    mapping: str = ""
+    spoilt_elsewhere: bool = False
+    markers: Mapping[str, Markers] = field(default_factory=dict)
 
     @property
     def folder(self) -> str:
@@ -288,7 +298,72 @@ def projects() -> tuple[Project, ...]:
         _small("small_rig", "discrepancy", {"base": {"stiffness": "per_specimen"}}, False, True),
         _small("on_model", "cohort_stiffness", {"base": {"model": MODEL}}, True, False),
         _small("small_factors", "global_sensitivity", _forms(), True, False),
+        _tracked_in_c3d(),
+        _own_trunk(),
+        _machine(),
     )
+
+
+def _tracked_in_c3d() -> Project:
+    """The tracked phantom, its motion as `.c3d`."""
+    plain = next(of for of in SHIPPED if of.study == "tracking_phantom")
+    of, name = _shipped(plain), "tracking_in_c3d"
+    markers = {
+        f"{file.removesuffix('.trc')}.c3d": read_trc(content.decode())
+        for file, content in of.files.items()
+        if file.endswith(".trc")
+    }
+    trials = f"{of.folder}/trials.csv"
+    files = {
+        "config/config.yaml": as_yaml({"studies": [name]}),
+        f"config/studies/{name}.yaml": as_yaml(
+            {**yaml.safe_load(of.files[of.study]), "study": name}
+        ),
+        **{n: c for n, c in of.files.items() if n.startswith(of.folder) and n[-4:] != ".trc"},
+        trials: of.files[trials].replace(b".trc", b".c3d"),
+        **{file: written(one) for file, one in markers.items()},
+    }
+    return replace(of, name=name, files=files, spoilt_elsewhere=True, markers=markers)
+
+
+def _own_trunk() -> Project:
+    """Persons and tasks of the shipped cohort on a trunk that the cohort brings along."""
+    plain = next(of for of in SHIPPED if of.study == "trunk_volunteers")
+    of, name = _shipped(plain), "own_trunk"
+    folder = f"config/cohorts/{name}"
+    header = yaml.safe_load(of.files[f"{of.folder}/cohort.yaml"])
+    subjects = of.table("subjects")[:3]
+    who = tuple(row[0] for row in subjects[1:])
+    rows = {
+        "specimens": [["specimen"], *([one] for one in who)],
+        "subjects": subjects,
+        "tasks": of.table("tasks")[:3],
+        **trunk.tables(who),
+    }
+    files = {
+        "config/config.yaml": as_yaml({"studies": [name]}),
+        f"config/studies/{name}.yaml": as_yaml(
+            {"study": name, "kind": of.kind, "cohort": name, "geometry": "cohort"}
+        ),
+        f"{folder}/cohort.yaml": as_yaml(
+            {**header, "cohort": name, "vertebrae": list(trunk.CHAIN)}
+        ),
+        **{f"{folder}/{stem}.csv": as_csv(table) for stem, table in rows.items()},
+    }
+    stems = ("joints", "muscles", "muscle_parameters", "body_frames")
+    return Project(name, of.kind, name, files, stems)
+
+
+RIG = CONFIG.parent / "docs/examples/testing_machine"
+
+
+def _machine() -> Project:
+    """The files of a testing machine that come along, of one specimen."""
+    keys = yaml.safe_load((RIG / "rig.yaml").read_text())
+    keys["files"] = [of for of in keys["files"] if of["specimen"] == "s01"]
+    files = {f"machine/{of['file']}": (RIG / of["file"]).read_bytes() for of in keys["files"]}
+    files = {"machine/rig.yaml": as_yaml(keys), **files}
+    return Project("machine_rig", "import", keys["cohort"], files, (), mapping="machine/rig.yaml")
 
 
 def write(files: Files, root: Path) -> Path:

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from tests.generators.spoilt.case import Case, Expected
 from tests.generators.spoilt.projects import Project, as_csv
+from tests.generators.spoilt.recordings import TRACKED
 
 TOLD, OPEN = Expected.TOLD, Expected.OPEN
 
@@ -97,9 +97,6 @@ EXCHANGED = (
 )
 
 
-TRACKED = ("s01_stance.trc", "trials.csv", "joints.csv", "marker_set.csv")
-"""Files of which two contradict each other where one is in another unit."""
-
 UNDECIDED = {
     ("l4l5_disc", "joints", "exchanged with y_mm"): "nobody tells where the joint of a disc lies",
     (
@@ -120,7 +117,6 @@ def quantity_cases(project: Project) -> Iterator[Case]:
     for stem, first, second in EXCHANGED:
         if stem in project.tables:
             yield from _exchanged(project, stem, first, second)
-    yield from _recordings(project)
 
 
 def _multiplied(project: Project, one: _Scaled) -> Iterator[Case]:
@@ -165,34 +161,3 @@ def _case(project: Project, place: str, what: str, rows: list[list[str]], of: _S
     return Case(
         project, "quantity", what, file, place, expected, lambda: {file: as_csv(rows)}, told_in
     )
-
-
-def _recordings(project: Project) -> Iterator[Case]:
-    """Files of motion: a wrong unit in the header, or nothing that can be read."""
-    for file in [name for name in project.files if name.endswith("stance.trc")][:1]:
-        text = project.files[file].decode()
-        cell = text.splitlines()[-1].split("\t")[4]
-        spoilt = {
-            "mm called m": text.replace("\tmm\t", "\tm\t"),
-            "mm called cm": text.replace("\tmm\t", "\tcm\t"),
-            "unknown unit": text.replace("\tmm\t", "\tfurlong\t"),
-            "empty": "",
-            "noise": "\x00\x01\x02" * 1000,
-            "one cell of words": text.replace(cell, "abc"),
-            "one cell inf": text.replace(cell, "inf"),
-            "cut": text[: len(text) // 2],
-            "decimal commas": text.replace(".", ","),
-            "100 000 digits": text.replace(cell, "4" * 100_000),
-        }
-        for what, new in spoilt.items():
-            content = new.encode()
-            yield Case(
-                project,
-                "recording",
-                what,
-                file,
-                "",
-                TOLD,
-                partial(dict, {file: content}),
-                TRACKED,
-            )
