@@ -1,7 +1,7 @@
 """A made-up trunk as a cohort brings one: joints, muscles, bodies. Round numbers, nobody's.
 
-Three muscles a side cross each joint from S1 to T11, behind it, before it and beside it, and three a
-side run from the pelvis to the ribs.
+Three muscles a side cross each joint from S1 to T11, behind it, before it and beside it, and three
+a side run from the pelvis to the ribs.
 """
 
 from itertools import pairwise
