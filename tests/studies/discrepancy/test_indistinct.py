@@ -37,8 +37,32 @@ def test_without_time_a_loop_may_be_creep(name: str) -> None:
     assert excluded(name, case(NONE)) == ("creep",)
     assert excluded(name, case((5.0,) * 5)) == ("creep",)  # a clock that stands
     assert excluded(name, case((0.0, 30.0, 30.0, 30.0, 30.0))) == ()  # it went, if only once
+    assert excluded(name, case((0.0, 0.0, 0.0, 0.0, 30.0))) == ()
+    assert excluded(name, case((120.0, 90.0, 60.0, 30.0, 0.0))) == ("creep",)  # it goes back
     assert excluded(name, case(), case(NONE)) == ("creep",)  # time is known of a part only
     assert excluded(name, case((0.0, 30.0, None, 90.0, 120.0))) == ("creep",)
+
+
+def test_a_test_of_one_step_neither_takes_time_nor_needs_any() -> None:
+    single = LoadCase("flexion", 1, case().steps[:1])
+    assert excluded("hysteresis", case(), single) == ()
+    assert excluded("hysteresis", single) == ("creep",)
+
+
+@pytest.mark.parametrize(("lighter", "alike"), [(95.0, True), (94.9, False)])
+def test_forces_are_alike_within_a_twentieth_of_the_largest(lighter: float, alike: bool) -> None:
+    two = case(forces=(100.0,) * 5), case(forces=(lighter,) * 5)
+    assert excluded("level_dependence", *two) == (("preload_stiffening",) if alike else ())
+    changing = case(forces=(100.0, 100.0, lighter, 100.0, 100.0))
+    for cases in (two, [changing]):
+        expected = ("level_dependence",) if alike else ()
+        assert excluded("preload_stiffening", *cases) == expected
+
+
+def test_without_any_test_nothing_is_recorded() -> None:
+    assert cannot_be_excluded("hysteresis", {}) == ("creep",)
+    assert cannot_be_excluded("level_dependence", {}) == ()
+    assert cannot_be_excluded("preload_stiffening", {}) == ("level_dependence",)
 
 
 def test_one_compression_does_not_tell_levels_from_preload() -> None:
