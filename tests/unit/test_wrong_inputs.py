@@ -53,7 +53,7 @@ def test_cases_are_many_and_the_same_each_time() -> None:
 
 def test_every_documented_key_and_every_column_that_is_there_is_spoilt() -> None:
     spoilt = {(case.file, case.place) for case in EVERY}
-    for project in projects():
+    for project in (one for one in projects() if not one.spoilt_elsewhere):
         for file, form in yaml_files(project):
             there = {place for name, place in spoilt if name == file}
             assert {entry.name for entry in keys(form) if "[" not in entry.name} <= there
