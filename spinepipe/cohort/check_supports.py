@@ -74,12 +74,8 @@ def _without_values(draft: Draft) -> Iterator[Problem]:
         return
     if not any(state == PRESCRIBED for _, (state,) in draft.rows("supports", "state")):
         return
-    rig, motion, reported = (
-        Rig(draft.tables["supports"], draft.joint_names),
-        _measured(draft),
-        set(),
-    )
-    fixed = cache(rig.fixed)
+    fixed = cache(Rig(draft.tables["supports"], draft.joint_names).fixed)
+    motion, reported = _measured(draft), set()
     for load in draft.applied:
         if load.step is None:
             continue

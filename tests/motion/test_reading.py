@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import opensim
 import pytest
-from ezc3d import c3d
+from c3d_of_ezc3d import RATE, write_c3d
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.reading import axes_of, read_motion
@@ -13,7 +13,6 @@ from spinepipe.motion.recorded import Recorded
 from spinepipe.problems import InputError, Problem
 
 NAMES = ("LPSI", "RPSI", "T1")
-RATE = 50.0
 ORIGINAL = ("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames")
 HELD_MM = 5e-4
 """Half of the last digit that is written by hand here."""
@@ -90,24 +89,9 @@ def test_opensim_reads_the_same_numbers_from_a_trc(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.time_s, table.getIndependentColumn(), atol=1e-12)
 
 
-def write_c3d(path: Path, places: Array, units: str = "mm", names: tuple[str, ...] = NAMES) -> Path:
-    """As ezc3d writes it; NaN is a residual of -1 with the place that was last seen."""
-    content = c3d()
-    content["parameters"]["POINT"]["RATE"]["value"] = [RATE]
-    content["parameters"]["POINT"]["LABELS"]["value"] = list(names)
-    content["parameters"]["POINT"]["UNITS"]["value"] = [units]
-    points = np.ones((4, places.shape[1], len(places)))
-    lost = np.isnan(places).any(axis=-1)
-    points[:3] = np.where(lost[..., None], 123.0, places).transpose(2, 1, 0)
-    content["data"]["points"] = points
-    content["data"]["meta_points"]["residuals"] = np.where(lost.T, -1.0, 0.0)[None]
-    content.write(str(path))
-    return path
-
-
 def test_a_c3d_that_ezc3d_writes_is_read_back(tmp_path: Path) -> None:
     """It holds single precision."""
-    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm()))
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), NAMES))
     assert_same(found, places_mm(), 1e-4)
     np.testing.assert_allclose(np.diff(found.time_s), 1.0 / RATE, atol=1e-9)
 
@@ -116,7 +100,7 @@ def test_a_residual_of_minus_one_and_noughts_are_gaps(tmp_path: Path) -> None:
     places = places_mm()
     places[1, 2] = np.nan
     places[3, 0] = 0.0
-    found = read_motion(write_c3d(tmp_path / "m.c3d", places))
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places, NAMES))
     assert {(int(f), int(k)) for f, k in np.argwhere(~found.seen)} == {(1, 2), (3, 0)}
     assert not found.places[~found.seen].any()
 
@@ -128,7 +112,9 @@ def test_units_of_the_file_count(tmp_path: Path, units: str, per_mm: float) -> N
     assert_same(
         read_motion(write(tmp_path / "m.trc", trc(in_units, units=units))), places_mm(), within
     )
-    assert_same(read_motion(write_c3d(tmp_path / "m.c3d", in_units, units)), places_mm(), 1e-4)
+    assert_same(
+        read_motion(write_c3d(tmp_path / "m.c3d", in_units, NAMES, units)), places_mm(), 1e-4
+    )
     header = ",".join(["time_s", *(f"{n}_{a}_{units}" for n in NAMES for a in "xyz")])
     rows = [
         ",".join(map(repr, [k / RATE, *frame]))
@@ -274,16 +260,16 @@ def test_frames_outside_the_crop_are_left_out(tmp_path: Path) -> None:
 
 def test_subjects_are_cut_off_names_where_each_stays_one(tmp_path: Path) -> None:
     full = ("Anna:LPSI", "Anna:RPSI", "T1")
-    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), names=full))
+    found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), full))
     assert found.names == NAMES
     assert found.repaired == ("names of markers without 'Anna:'",)
     two = ("Anna:T1", "Ben:T1", "Ben:LPSI")
-    found = read_motion(write_c3d(tmp_path / "n.c3d", places_mm(), names=two))
+    found = read_motion(write_c3d(tmp_path / "n.c3d", places_mm(), two))
     assert found.names == ("Anna:T1", "Ben:T1", "LPSI")
 
 
 def test_a_marker_that_comes_twice_is_refused(tmp_path: Path) -> None:
-    path = write_c3d(tmp_path / "m.c3d", places_mm(), names=("T1", "T1", "L3"))
+    path = write_c3d(tmp_path / "m.c3d", places_mm(), ("T1", "T1", "L3"))
     assert problem_of(path).found == "T1 more than once"
 
 

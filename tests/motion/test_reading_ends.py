@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ezc3d import c3d
+from c3d_of_ezc3d import write_c3d
 
 from spinepipe.motion import reading
 from spinepipe.motion import recorded as recordings
@@ -150,38 +150,28 @@ def test_cells_are_taken_quickly_where_all_are_plain_numbers(
     assert quickly(cells) == numbers
 
 
-def points(count: int, frames: int = 3) -> np.ndarray:
-    """(4, K, F) mm, of markers that are told apart by their x."""
-    found = np.ones((4, count, frames))
-    found[0] = 1.0 + np.arange(count)[:, None]
-    return found
-
-
-def write_c3d(path: Path, count: int) -> Path:
-    content = c3d()
-    point = content["parameters"]["POINT"]
-    point["RATE"]["value"], point["UNITS"]["value"] = [50.0], ["mm"]
-    point["LABELS"]["value"] = [f"M{k}" for k in range(count)]
-    content["data"]["points"] = points(count)
-    content.write(str(path))
-    return path
+def counted_c3d(path: Path, count: int) -> Path:
+    """Three frames of markers that are told apart by their x, mm."""
+    places = np.ones((3, count, 3))
+    places[..., 0] += np.arange(count)
+    return write_c3d(path, places, [f"M{k}" for k in range(count)])
 
 
 def test_more_markers_than_a_parameter_holds_keep_their_names(tmp_path: Path) -> None:
     """255 names stand in the first, the others in the next."""
-    found = read_motion(write_c3d(tmp_path / "m.c3d", 300))
+    found = read_motion(counted_c3d(tmp_path / "m.c3d", 300))
     assert found.names == tuple(f"M{k}" for k in range(300))
     np.testing.assert_allclose(1e3 * found.places[0, :, 0], 1.0 + np.arange(300))
 
 
 def test_a_c3d_begins_at_its_first_frame(tmp_path: Path) -> None:
     """Counted from nought by who wrote it, at 50 a second."""
-    found = read_motion(write_c3d(tmp_path / "m.c3d", 2))
+    found = read_motion(counted_c3d(tmp_path / "m.c3d", 2))
     np.testing.assert_allclose(found.time_s, [0.0, 0.02, 0.04], atol=1e-12)
 
 
 def test_a_c3d_without_a_rate_is_told(tmp_path: Path) -> None:
-    path = write_c3d(tmp_path / "m.c3d", 2)
+    path = counted_c3d(tmp_path / "m.c3d", 2)
     path.write_bytes(path.read_bytes().replace(struct.pack("<f", 50.0), bytes(4)))
     problem = problem_of(path)
     assert problem.column == "POINT:RATE"

@@ -13,10 +13,9 @@ from pathlib import Path
 
 from coverage import CoverageData
 
-from tests.mutants.lines import mentions, statement
+from tests.mutants.lines import ROOT, mentions, statement
 from tests.mutants.runner import SHARED
 
-ROOT = Path(__file__).resolve().parents[2]
 NEVER = ("workflow", "validation", "mutants", "generators", "cases")
 """Folders of tests that run whole studies, or that are no tests."""
 

@@ -15,7 +15,7 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 from parso.tree import NodeOrLeaf
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.mutants.lines import ROOT
 
 AREAS = {
     "statics": ("spinepipe/statics",),

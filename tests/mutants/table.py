@@ -12,10 +12,10 @@ from tests.mutants.sample import Mutant
 EQUAL = Path(__file__).with_name("equal.csv")
 
 WORDS = """\
-Small faults put into the code, place by place at random, and whether the tests near them see them.
-What lives is looked at one by one: a test is missing, or the code means the same, which is judged
-and argued in `tests/mutants/equal.csv`. Those found equal before are not tried again and do not
-count.
+Small faults put into the code, place by place at random, and whether the tests that run them see
+them. What lives is looked at one by one: a test is missing, or the code means the same, which is
+judged and argued in `tests/mutants/equal.csv`. Those found equal before are not tried again and do
+not count.
 """
 
 

@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,20 +10,20 @@ from xml.etree import ElementTree
 import pytest
 from drawn import caption, drawings
 from hostile import HARMLESS, PAYLOAD, Structure, mapped, renamed
+from made_pages import SVG, document_of, page_of
 from made_results import MAKERS, Made, made
 
 from spinepipe.documents.names import folder_fault, name_fault
 from spinepipe.marks import marked
 from spinepipe.report.page import document as page
 from spinepipe.report.page import space
-from spinepipe.report.page.document import Document, Picture, Results, origin
+from spinepipe.report.page.document import origin
 from spinepipe.report.style import picture, style
-from spinepipe.studies.registry import PACKAGE, kind_names, kind_of
+from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.tracking import in_space_still as tracking_still
 from spinepipe.studies.trunk_loads import in_space as trunk_space
 
 ROOT = Path(__file__).resolve().parents[2]
-SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SHORT = "<script>&\"'-->]]></svg>"
 
 
@@ -34,16 +33,6 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page, "get_plotlyjs", lambda: "/* drawing library */")
     for module in (space, tracking_still, trunk_space):
         monkeypatch.setattr(module, "picture", lambda figure, kind: SVG.encode())
-
-
-def document_of(found: Made) -> Document:
-    """What the kind puts on its page."""
-    metadata = {name: {"seed": "7", "study": found.study.study} for name in found.tables}
-    titles = {one.name: one.title for one in kind_of(found.study.kind).figures}
-    pictures = {name: Picture.of(name, title, SVG, "Words.") for name, title in titles.items()}
-    write = import_module(f"{PACKAGE}.{found.study.kind}.page").document
-    shown: Document = write(found.study, found.cohort, Results(found.tables, metadata, pictures))
-    return shown
 
 
 def scenes_of(text: str) -> Any:
@@ -80,7 +69,7 @@ def test_names_of_people_never_become_markup(results: Made, tmp_path: Path) -> N
     pages = []
     for payload in (PAYLOAD, HARMLESS):
         found = renamed(results, payload, tmp_path)
-        pages.append(document_of(found).html(found.study, found.cohort))
+        pages.append(page_of(found))
     assert pages[0].count("&lt;script&gt;alert(1)") > 10, "they do stand in the page"
     assert_alike(*pages)
     hostile, harmless = map(scenes_of, pages)

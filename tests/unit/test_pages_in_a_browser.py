@@ -8,15 +8,12 @@ import re
 import shutil
 import subprocess
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 from hostile import PAYLOAD, renamed
-from made_results import MAKERS, Made, made
-
-from spinepipe.report.page.document import Picture, Results
-from spinepipe.studies.registry import PACKAGE, kind_of
+from made_pages import page_of
+from made_results import MAKERS, made
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 QUIET = (
@@ -30,8 +27,6 @@ RUNS = re.sub(r"alert\((\d)\)", r"document.documentElement.dataset.ran=\1", PAYL
 FAR = "http://example.org/x.png"
 BROWSER = "not an origin"
 """Said of requests that no page makes: the clock, updates."""
-
-SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 
 pytestmark = [
     pytest.mark.slow,
@@ -72,17 +67,6 @@ def _addresses(log: Path) -> list[str]:
     told = [event.get("params", {}) for event in json.loads(log.read_text())["events"]]
     urls = {one["url"] for one in told if one.get("initiator", BROWSER) != BROWSER}
     return sorted(url for url in urls if not url.startswith(("file:", "data:", "blob:")))
-
-
-def page_of(found: Made) -> str:
-    """The whole page of a study, drawing library included; its figures are empty."""
-    metadata = {name: {"seed": "7", "study": found.study.study} for name in found.tables}
-    titles = {one.name: one.title for one in kind_of(found.study.kind).figures}
-    pictures = {name: Picture.of(name, title, SVG, "Words.") for name, title in titles.items()}
-    write = import_module(f"{PACKAGE}.{found.study.kind}.page").document
-    shown = write(found.study, found.cohort, Results(found.tables, metadata, pictures))
-    text: str = shown.html(found.study, found.cohort)
-    return text
 
 
 def test_what_runs_and_what_is_fetched_would_be_seen(tmp_path: Path) -> None:
