@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinepipe.effects import create
-from spinepipe.effects.field_numbers import Law, field_numbers, numbers_of
+from spinepipe.effects.field_numbers import Law, field_numbers, load_over, numbers_of
 
 K = 50.0
 
@@ -148,3 +148,18 @@ def test_many_joints_are_each_as_alone() -> None:
         alone = numbers_of([(law, own[k : k + 1]) for law, own in laws], "extension", 5.0)
         for name, value in alone.items():
             np.testing.assert_allclose(found[name][k], value[0], rtol=1e-9, err_msg=name)
+
+
+def test_load_over_another_coordinate_is_the_sum_of_all_laws() -> None:
+    """Springs bear nothing there, a coupling 15 N m/rad; friction is at the start of its path."""
+    motions = np.array([-0.05, 0.0, 0.1])
+    coupled = joint("bending_rotation_coupling", 15.0)
+    found = load_over(coupled, "left_rotation", "right_bending", motions)
+    np.testing.assert_allclose(found, 15.0 * motions, rtol=1e-14)
+    own = load_over(coupled, "right_bending", "right_bending", motions)
+    np.testing.assert_allclose(own, K * motions, rtol=1e-14)
+    rubbed = load_over(joint("hysteresis", 0.8, 0.02), "extension", "extension", motions)
+    branch = 0.8 * np.sign(motions) * -np.expm1(-np.abs(motions) / 0.02)
+    np.testing.assert_allclose(rubbed, K * motions + branch, rtol=1e-12)
+    lax = load_over(joint("local_laxity", 0.3), "extension", "extension", motions)
+    np.testing.assert_allclose(lax, 0.7 * K * motions, rtol=1e-14)
