@@ -135,20 +135,25 @@ class _Asked:
 def _stepped(
     problem: "Trajectory", state: _State, costs: Costs, asked: _Asked, damping: float
 ) -> tuple[_State, Costs, float, str]:
-    """One step downhill, damped as much as it takes; the last text says why there is none."""
+    """One step downhill, damped as much as it takes; the last text says why there is none.
+
+    Where all steps lead uphill the cost is at its least, up to rounding, and there is no text.
+    """
+    lost = ""
     while damping < _MOST_DAMPING:
         try:
             steps, shared = problem.step(asked, damping)
         except LinAlgError:
-            damping *= 10.0
+            damping, lost = 10.0 * damping, "the equations of a step are not definite"
             continue
+        lost = ""
         there = state.moved(steps, shared)
         found = problem.costs(there)
         if np.isfinite(found.total) and found.total <= costs.total:
             eased = max(0.2 * damping, _LEAST_DAMPING)
             return there, found, eased, ""
         damping *= 5.0
-    return state, costs, damping, ""
+    return state, costs, damping, lost
 
 
 @dataclass(frozen=True, eq=False)

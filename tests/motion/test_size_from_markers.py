@@ -135,6 +135,48 @@ def test_one_wrong_marker_is_named_with_what_it_costs() -> None:
     np.testing.assert_allclose(fit.factors, FACTORS, rtol=0.1)
 
 
+def test_what_is_left_is_told_in_millimetres_over_pairs() -> None:
+    """Distances again from a spine put together by hand, of the size that was found."""
+    places = moved_by_hand(FACTORS)
+    places += 2e-3 * np.random.default_rng(20011).normal(size=places.shape)
+    names = marker_set().names
+    pairs = [("LASI", "RASI"), ("L2_1", "L4_1"), ("L3", "L4_2"), ("T1_1", "T11_1"), ("T5", "T9")]
+    fit = fitted(generic(), marker_set(), standing(places), pairs)
+    again = moved_by_hand(fit.factors)
+    left = []
+    for pair in pairs:
+        one, other = (names.index(name) for name in pair)
+        apart = [np.linalg.norm(at[other] - at[one]) for at in (again, places)]
+        left.append(1e3 * abs(apart[0] - apart[1]))
+    assert fit.rms_mm == pytest.approx(np.sqrt(np.mean(np.square(left))), rel=1e-6)
+    assert fit.largest_mm == pytest.approx(max(left), rel=1e-6)
+    assert fit.largest_pair == pairs[int(np.argmax(left))]
+
+
+@pytest.mark.parametrize(("part", "size"), [("lumbar", 0.42), ("thoracic", 2.4)])
+def test_parts_from_two_fifths_to_two_and_a_half_times_the_generic_ones_are_people_s(
+    part: str, size: float
+) -> None:
+    factors = np.where(np.array(SEGMENTS) == part, size, 1.0)
+    fit = fitted(generic(), marker_set(), standing(moved_by_hand(factors)))
+    np.testing.assert_allclose(fit.factors, factors, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("part", "size", "told"), [("lumbar", 0.38, r"0\.40"), ("thoracic", 2.6, r"2\.50")]
+)
+def test_parts_beyond_are_not(part: str, size: float, told: str) -> None:
+    factors = np.where(np.array(SEGMENTS) == part, size, 1.0)
+    with pytest.raises(ValueError, match=f"the {part} part would be {told} times"):
+        fitted(generic(), marker_set(), standing(moved_by_hand(factors)))
+
+
+def test_pairs_within_a_cluster_tell_nothing_also_where_they_are_named() -> None:
+    pairs = [("L2_1", "L2_2"), ("T1_1", "T1_3")]
+    with pytest.raises(ValueError, match="no pair of markers is in sight in stance"):
+        fitted(generic(), marker_set(), standing(moved_by_hand(FACTORS)), pairs)
+
+
 def test_noise_of_a_millimetre_is_what_is_left() -> None:
     """Distances of two readings: 1 mm each along the line, so root 2; three factors of 235."""
     places = moved_by_hand(FACTORS)

@@ -84,6 +84,13 @@ def test_without_a_bend_or_without_sliding_markers_are_weighed_alike() -> None:
     assert with_sliding_skin(seen(at(bent())), bent(), stiff).shares is None
 
 
+@pytest.mark.parametrize(
+    "sizes", [Sizes(own_skin_m=0.0), Sizes(shared_skin_m=0.0)], ids=("alike", "by itself")
+)
+def test_skin_that_slides_in_one_of_two_ways_slides(sizes: Sizes) -> None:
+    assert with_sliding_skin(seen(at(bent())), bent(), sizes).shares is not None
+
+
 def test_vertebrae_are_not_dragged_down_with_their_markers() -> None:
     """Skin slides 15 mm down all vertebrae; half of what it drags them is left at most."""
     q = bent()

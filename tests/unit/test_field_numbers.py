@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinepipe.effects import create
-from spinepipe.effects.field_numbers import Law, field_numbers
+from spinepipe.effects.field_numbers import Law, field_numbers, load_over, numbers_of
 
 K = 50.0
 
@@ -96,3 +96,70 @@ def test_a_load_that_is_never_reached_is_none() -> None:
     assert found.motion_at_load == (None, None)
     assert found.stiffness_at_load == (None, None)
     assert found.zone is None
+
+
+@pytest.mark.parametrize("ratio", [1.12, 1.5, 3.0])
+def test_a_joint_breaks_where_it_is_half_as_much_stiffer_as_in_the_end(ratio: float) -> None:
+    """Stiffness K exp(b q) is K (1 + b M / K) under M: half way at q = log((1 + ratio) / 2) / b."""
+    rate = (ratio - 1.0) * K / 5.0
+    found = field_numbers(joint("nonlinear_stiffening", rate), "extension")
+    # |q| is rounded over 1e-4 rad
+    at = np.log(0.5 * (1.0 + ratio)) / rate
+    assert found.breaks == pytest.approx((-at, at), abs=1e-4, rel=1e-3)
+    assert found.zone == pytest.approx(2.0 * at, abs=2e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(1.10, False), (1.115, True)])
+def test_a_tenth_of_the_stiffness_makes_a_break(ratio: float, told: bool) -> None:
+    """Of the larger: nine tenths of 1.111."""
+    found = field_numbers(joint("nonlinear_stiffening", (ratio - 1.0) * K / 5.0), "extension")
+    assert (found.breaks[1] is not None) == told
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "load", "furthest"), [("extension", 5.0, 1.5), ("anterior", 50.0, 0.1)]
+)
+def test_a_joint_is_asked_up_to_a_and_a_half_radians_or_ten_centimetres(
+    coordinate: str, load: float, furthest: float
+) -> None:
+    for share, told in ((0.99, True), (1.01, False)):
+        stiffness = load / (share * furthest)
+        springs = [(create("linear_bushing"), np.full(6, stiffness))]
+        motion = field_numbers(springs, coordinate).motion_at_load[1]
+        assert motion == (pytest.approx(share * furthest) if told else None)
+
+
+def test_numbers_are_told_at_a_load_that_is_asked_for() -> None:
+    found = field_numbers(joint("flexion_extension_asymmetry", 0.2), "extension", 2.0)
+    assert found.load == 2.0
+    assert found.motion_at_load == pytest.approx((-2.0 / (0.8 * K), 2.0 / (1.2 * K)), rel=1e-3)
+
+
+def test_many_joints_are_each_as_alone() -> None:
+    """More than are held in memory together."""
+    count = 66
+    stiffness = np.tile([1e5] * 3 + [K] * 3, (count, 1)) * np.linspace(1.0, 2.0, count)[:, None]
+    laws: list[Law] = [
+        (create("linear_bushing"), stiffness),
+        (create("nonlinear_stiffening"), np.linspace(1.0, 9.0, count)[:, None]),
+    ]
+    found = numbers_of(laws, "extension", 5.0)
+    for k in (0, 63, 64, 65):
+        alone = numbers_of([(law, own[k : k + 1]) for law, own in laws], "extension", 5.0)
+        for name, value in alone.items():
+            np.testing.assert_allclose(found[name][k], value[0], rtol=1e-9, err_msg=name)
+
+
+def test_load_over_another_coordinate_is_the_sum_of_all_laws() -> None:
+    """Springs bear nothing there, a coupling 15 N m/rad; friction is at the start of its path."""
+    motions = np.array([-0.05, 0.0, 0.1])
+    coupled = joint("bending_rotation_coupling", 15.0)
+    found = load_over(coupled, "left_rotation", "right_bending", motions)
+    np.testing.assert_allclose(found, 15.0 * motions, rtol=1e-14)
+    own = load_over(coupled, "right_bending", "right_bending", motions)
+    np.testing.assert_allclose(own, K * motions, rtol=1e-14)
+    rubbed = load_over(joint("hysteresis", 0.8, 0.02), "extension", "extension", motions)
+    branch = 0.8 * np.sign(motions) * -np.expm1(-np.abs(motions) / 0.02)
+    np.testing.assert_allclose(rubbed, K * motions + branch, rtol=1e-12)
+    lax = load_over(joint("local_laxity", 0.3), "extension", "extension", motions)
+    np.testing.assert_allclose(lax, 0.7 * K * motions, rtol=1e-14)

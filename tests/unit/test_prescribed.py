@@ -158,6 +158,18 @@ def test_a_planar_chain_stands_where_its_energy_is_least(share: float) -> None:
     assert np.abs(found.missed).max() < 1e-12
 
 
+def test_from_its_own_end_nothing_is_left_to_do() -> None:
+    """Newton has arrived at its first step; and is near it from a pose near by."""
+    spine_model, wanted = model(), bent_by(0.5)
+    system = System(Chain(spine_model), spine_model, case())
+    there = hold_at(system, grips(), wanted, rotations())
+    again = hold_at(system, grips(), wanted, rotations(), there)
+    near = hold_at(system, grips(), wanted + 1e-5, rotations(), there)
+    assert (again.status, again.iterations) == (Ended.CONVERGED, 1)
+    np.testing.assert_allclose(again.q, there.q, rtol=0, atol=1e-12)
+    assert near.iterations < min(there.iterations, 5)
+
+
 @pytest.mark.parametrize("axis", range(3))
 def test_the_pushes_do_the_work_that_the_spine_stores(axis: int) -> None:
     """Castigliano: the stored energy grows by push times displacement."""
