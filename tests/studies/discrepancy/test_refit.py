@@ -10,7 +10,14 @@ import pytest
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search import refit as refits_of
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
-from spinepipe.studies.discrepancy.search.refit import leading, refit, standing, started, weaker
+from spinepipe.studies.discrepancy.search.refit import (
+    Refit,
+    leading,
+    refit,
+    standing,
+    started,
+    weaker,
+)
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
 
 
@@ -121,6 +128,13 @@ def test_a_strength_starts_on_its_side_and_inside_its_bounds(
     assert found.start[0] == pytest.approx(value, rel=1e-9)
 
 
+def test_a_moment_starts_off_both_its_bounds_by_a_fiftieth_of_its_prior_sd() -> None:
+    """0.3 N m, of 10 N m to either side: a thousandth of the whole way is 0.02 N m."""
+    for sds, value in ((90.0, 9.994), (-90.0, -9.994)):
+        found = started(tried(Form(OFFSET, Spread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
+        assert found.start == pytest.approx([value] * 3)
+
+
 def test_weaker_is_a_share_of_the_way_from_off() -> None:
     """Of a ratio the share of its logarithm; shapes stay."""
     ratio = Supposed(Form(LEVELS, Spread.SHARED), np.array([4.0]))
@@ -162,6 +176,12 @@ class Fits:
         supposed, *_ = args
         self.starts.append(float(supposed[-1].start[0]))
         return SimpleNamespace(usable=self.usable.pop(0), chi2=60.0)
+
+
+def test_a_form_adds_the_unknowns_of_its_own() -> None:
+    form = Form(ZONE, Spread.SHARED)
+    fit = fit_of([(0, 0, 0.0), (1, 0, 0.0), (1, 1, 0.0), (2, 0, 0.0)], *[None] * 2)  # type: ignore[list-item]
+    assert Refit(form, fit, 0.0, 0.0).unknowns == 2  # of the last, the second
 
 
 def refit_with(fits: Fits, monkeypatch: pytest.MonkeyPatch, degenerate: bool = False) -> Any:
