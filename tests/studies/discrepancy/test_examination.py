@@ -163,7 +163,7 @@ def a_refit(name: str, log_evidence: float, unknowns: int) -> Refit:
     return cast(Refit, SimpleNamespace(name=name, log_evidence=log_evidence, unknowns=unknowns))
 
 
-@pytest.mark.parametrize(("behind", "first"), [(1.0, 1), (2.9, 1), (3.1, 3)])
+@pytest.mark.parametrize(("behind", "first"), [(1.0, 1), (2.9, 1), (3.0, 3), (3.1, 3)])
 def test_a_plain_form_hardly_behind_stands_first(behind: float, first: int) -> None:
     """Equal values predict a specimen that nobody measured; values of its own do not."""
     found = [

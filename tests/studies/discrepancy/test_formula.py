@@ -201,6 +201,14 @@ def made_up(seed: int, weights: Mapping[Candidate, float], draws: int = 300) -> 
 ALL, ONE = Candidate(1, EVERYWHERE, EVERYWHERE), Candidate(3, 1, 0)
 
 
+def test_what_is_above_the_noise_is_of_the_data_alone() -> None:
+    problem = made_up(1, {ALL: 1.0})
+    assert problem.excess == pytest.approx(np.linalg.norm(problem.errors[:, 0]) ** 2 - 117.0)
+    assert abs(made_up(2, {}).excess) < 5.0 * np.sqrt(2.0 * 117.0)  # noise: chi2, five SDs
+    everywhere = 5 * (2 + 1) * (2 + 1)  # terms, each joint and all, each specimen and all
+    assert len(set(problem.candidates())) == len(problem.candidates()) == everywhere
+
+
 def test_drops_of_chi2_are_those_of_least_squares() -> None:
     problem = made_up(1, {ALL: 1.0, ONE: 1.0})
     ranked = problem.ranked([ALL], FALSE_ALARM)

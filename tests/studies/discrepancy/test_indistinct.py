@@ -68,6 +68,7 @@ def test_without_any_test_nothing_is_recorded() -> None:
 def test_one_compression_does_not_tell_levels_from_preload() -> None:
     bare, pressed, harder = case(), case(forces=(300.0,) * 5), case(forces=(500.0,) * 5)
     assert excluded("level_dependence", pressed) == ("preload_stiffening",)
+    assert excluded("level_dependence", case(forces=(0.5,) * 5)) == ("preload_stiffening",)
     assert excluded("level_dependence", bare) == ()  # nothing listed compresses
     for two in ((bare, pressed), (pressed, harder)):
         assert excluded("level_dependence", *two) == ()

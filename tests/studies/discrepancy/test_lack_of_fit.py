@@ -131,7 +131,7 @@ def test_readings_drift_to_a_tenth_of_the_largest_motion(zeroed: bool) -> None:
 
 def test_a_shift_is_of_one_test() -> None:
     cases = [FLEXION, BENDING]
-    shifted = ("flexion", "bending")
+    shifted = tuple("".join(name) for name in (["flex", "ion"], ["bend", "ing"]))  # as read
     found = generic_columns(chain(), cases, False, ROTATIONS, shifted=shifted)
     for number in range(2):
         for test in range(2):

@@ -217,7 +217,7 @@ class Index:
                     strength,
                     specimen if by_specimen else None,
                     joint if by_joint else None,
-                    test if spread is Spread.BY_TEST else None,
+                    test,
                 )
                 found += [(number, key) for number in numbers]
         return found

@@ -1,0 +1,135 @@
+"""The screen: which columns a form sums, how large strengths may be, and what is evident."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.stats import gumbel_r
+
+from spinepipe.effects import Spread
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
+from spinepipe.studies.discrepancy.search.projected import columns_of
+from spinepipe.studies.discrepancy.search.screen import (
+    Group,
+    Index,
+    Screened,
+    exceeded,
+    screen,
+    sides,
+)
+
+TESTS = ("flexion", "bending")
+OFFSET = Variant("load_offset", ())
+LAXITY = Variant("local_laxity", (("coordinate", "extension"),))
+
+
+def strengths(*forms: Form) -> list[set[tuple[str, int | None, str, int]]]:
+    """Of each strength of the first form, all it sums: specimen, joint, test, column of values."""
+    form = forms[0]
+    index = Index(columns_of(Trials("", (form.variant,), forms), 2, TESTS))
+    places, values = index.places(form, (), ("a", "b"), TESTS)
+    found: list[set[tuple[str, int | None, str, int]]] = [set() for _ in values]
+    for specimen, columns, owners in places:
+        for column, owner in zip(columns.tolist(), owners.tolist(), strict=True):
+            one = index.columns[column]
+            assert one.strength == values[owner]
+            found[owner].add((specimen, one.joint, one.test, one.strength))
+    return found
+
+
+def test_what_differs_by_test_has_strengths_of_each_test_for_all_specimens() -> None:
+    found = strengths(Form(OFFSET, Spread.BY_TEST), Form(OFFSET, Spread.SHARED))
+    expected = [
+        {("a", None, test, axis), ("b", None, test, axis)} for axis in range(3) for test in TESTS
+    ]
+    assert len(found) == 6
+    assert all(one in found for one in expected)
+
+
+def test_what_is_shared_has_one_strength_of_all_tests() -> None:
+    found = strengths(Form(OFFSET, Spread.SHARED), Form(OFFSET, Spread.BY_TEST))
+    assert found == [{("a", None, "*", axis), ("b", None, "*", axis)} for axis in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [
+        (Form(LAXITY, Spread.SHARED), [["a0", "a1", "b0", "b1"]]),
+        (Form(LAXITY, Spread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
+        (Form(LAXITY, Spread.BY_SPECIMEN), [["a0", "a1"], ["b0", "b1"]]),
+        (Form(LAXITY, Spread.EACH), [["a0"], ["a1"], ["b0"], ["b1"]]),
+        (Form(LAXITY, Spread.ONE_JOINT, 1), [["a1", "b1"]]),
+        (Form(LAXITY, Spread.ONE, 0, "b"), [["b0"]]),
+    ],
+)
+def test_each_way_to_differ_sums_its_places(form: Form, expected: list[list[str]]) -> None:
+    found = [sorted(f"{s}{joint}" for s, joint, _, _ in one) for one in strengths(form)]
+    assert found == expected
+
+
+def test_columns_by_test_are_made_only_where_a_form_asks() -> None:
+    shared, by_test = (Form(OFFSET, spread) for spread in (Spread.SHARED, Spread.BY_TEST))
+    assert len(columns_of(Trials("", (OFFSET,), (shared,)), 2, TESTS)) == 3
+    assert len(columns_of(Trials("", (OFFSET,), (shared, by_test)), 2, TESTS)) == 3 * 3
+
+
+def test_a_column_is_scaled_by_the_prior_sd_of_its_strength() -> None:
+    column, _ = columns_of(Trials("", (LAXITY,), ()), 2, TESTS)
+    assert (column.scale, column.joint, column.test) == (0.3, 0, "*")
+
+
+def test_bounds_tell_the_side_of_a_strength() -> None:
+    """A fraction is lost from nothing on, a softer zone goes up to one, a ratio goes both ways."""
+    stiffer = Variant("level_dependence", (("coordinate", "extension"),))
+    zone = Variant("neutral_zone", (("coordinate", "extension"),))
+    found = [sides(Form(v, Spread.SHARED), v.strengths).tolist() for v in (LAXITY, zone, stiffer)]
+    assert found == [[1.0], [-1.0], [0.0]]
+
+
+@pytest.mark.parametrize(("curvature", "moment"), [(1.0, 0.0), (4.0, 6.0)])
+def test_strengths_are_from_a_tenth_to_three_prior_sds(curvature: float, moment: float) -> None:
+    """Marginal over N(0, t^2): exp(b^2 t^2 / 2 (1 + t^2 l)) / sqrt(1 + t^2 l), a mean of four."""
+    group = Group.of(np.array([[curvature]]), np.zeros(1))
+    t = np.array([0.1, 0.3, 1.0, 3.0])
+    spread = 1.0 + t**2 * curvature
+    expected = np.log(np.mean(np.exp(0.5 * moment**2 * t**2 / spread) / np.sqrt(spread)))
+    assert group.log_evidence(np.array([[moment]]))[0] == pytest.approx(expected)
+
+
+# What is evident
+
+
+def test_few_draws_have_the_tail_of_a_gumbel_distribution() -> None:
+    """With their mean and SD; from five beyond on they are counted."""
+    values = np.random.default_rng(20002).normal(3.0, 2.0, 499)
+    standard = gumbel_r()
+    scale = values.std() / standard.std()
+    expected = gumbel_r(values.mean() - scale * standard.mean(), scale)
+    assert exceeded(values, 0.01) == pytest.approx(expected.isf(0.01))
+
+
+@pytest.mark.parametrize(("count", "share"), [(500, 0.01), (100, 0.05)])
+def test_five_draws_beyond_are_counted(count: int, share: float) -> None:
+    values = np.arange(float(count))[::-1]
+    assert exceeded(values, share) == pytest.approx((1.0 - share) * (count - 1))
+
+
+def effect(name: str, evidence: float, null: Sequence[float]) -> Screened:
+    return Screened(name, evidence, np.array(null), ())
+
+
+def test_the_threshold_is_that_of_the_largest_of_all_effects_in_each_draw() -> None:
+    rng = np.random.default_rng(20003)
+    one, other = 9.0 + rng.normal(size=(2, 1000))
+    found = screen([effect("a", 1.0, one), effect("b", 2.0, other)], 0.05)
+    assert found.threshold == pytest.approx(np.quantile(np.maximum(one, other), 0.95))
+    assert found.draws == 1000
+    assert [o.effect for o in found.effects] == ["b", "a"]
+
+
+def test_the_threshold_is_no_less_than_what_is_very_strong() -> None:
+    """Twice the logarithm of the odds above ten, Kass and Raftery 1995."""
+    low = [effect("b", 1.0, [-1.0, 0.0, 0.5]), effect("a", 1.0, [0.0, 0.2, 0.3])]
+    assert screen(low, 0.01).threshold == 10.0 / 2.0
+    assert screen(low, 0.01, 1.5).threshold == 1.5  # as known from before
+    assert [one.effect for one in screen(low, 0.01).effects] == ["a", "b"]  # alike: by name
