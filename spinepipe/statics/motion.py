@@ -9,9 +9,10 @@ translations), the exact tangents on a serial chain are
 so a constant force has a symmetric tangent and a constant moment has not.
 """
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import AppliedLoad, Array, Neutral
 from spinepipe.frames import Pose, transform_of
@@ -22,6 +23,12 @@ def cross_matrix(vector: Array) -> Array:
     """(3, 3) matrix W with ``W @ u = vector x u``."""
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+@cache
+def _below(n: int) -> NDArray[np.bool_]:
+    """(n, n) whether a place is below the diagonal."""
+    return np.tri(n, k=-1, dtype=bool)
 
 
 class ChainMotion:
@@ -75,9 +82,12 @@ class ChainMotion:
         """Generalised load (n,) of a ground-fixed wrench and its tangent (n, n)."""
         velocities, angular = self.velocities(body, point), self.angular(body)
         load = velocities @ force + angular @ moment
-        products = (self.axes @ cross_matrix(force).T) @ velocities.T
-        tangent = np.triu(products) + np.triu(products, 1).T
-        tangent += np.tril(angular @ (angular @ cross_matrix(moment).T).T, -1)
+        n, tangent = len(load), np.zeros((len(load), len(load)))
+        if force.any():
+            products = (self.axes @ cross_matrix(force).T) @ velocities.T
+            tangent += np.where(_below(n), products.T, products)
+        if moment.any():
+            tangent += _below(n) * (angular @ (angular @ cross_matrix(moment).T).T)
         return AppliedLoad(load, tangent)
 
     def _jacobian(self, body: int, local_point: Array) -> tuple[Array, Array]:

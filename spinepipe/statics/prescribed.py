@@ -28,7 +28,7 @@ from spinepipe.statics.equilibrium import (
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
-from spinepipe.statics.motion import ChainMotion
+from spinepipe.statics.motion import ChainMotion, cross_matrix
 from spinepipe.statics.system import System
 from spinepipe.status import Ended
 
@@ -121,17 +121,16 @@ class Tilt:
 
     def slope(self, motion: ChainMotion) -> Array:
         line = self._now(motion)
-        found: Array = motion.angular(self.body) @ np.cross(line, self._gradient(line))
+        found: Array = motion.angular(self.body) @ (cross_matrix(line) @ self._gradient(line))
         return found
 
     def bend(self, motion: ChainMotion) -> Array:
         line, angular = self._now(motion), motion.angular(self.body)
-        moment = np.cross(line, self._gradient(line))
+        of_line, gradient = cross_matrix(line), self._gradient(line)
+        moment = of_line @ gradient
         turned = motion.wrench(self.body, np.zeros(3), np.zeros(3), moment).tangent
-        change = np.cross(angular, line)  # of the line, by each coordinate
-        by_change = np.cross(change, self._gradient(line)) + np.cross(
-            line, self._bent(line, change)
-        )
+        change = angular @ of_line  # of the line, by each coordinate
+        by_change = change @ cross_matrix(gradient) + self._bent(line, change) @ of_line.T
         found: Array = turned + angular @ by_change.T
         return found
 

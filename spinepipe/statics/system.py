@@ -302,28 +302,35 @@ class System:
         """Generalised applied load (n,) and its tangent (n, n)."""
         velocities = self._slot_velocities(motion, loading)
         load = self._wrenches(motion, loading, velocities)
-        forces = np.zeros((self.chain.n, self.chain.n))
-        moments = np.zeros_like(forces)
-        axes = motion.axes
         if self._heavy:
             load += self._weight(motion, loading)
+        tangent = self._tangent(motion, loading, velocities)
+        for active in self.load_effects:
+            response = self._effect(active, motion, loading)
+            load += loading.share * response.load
+            tangent += loading.share * response.tangent
+        return load, tangent
+
+    def _tangent(
+        self, motion: ChainMotion, loading: Loading, velocities: list[Array | None]
+    ) -> Array:
+        """(n, n) change with the coordinates of what weight and wrenches apply."""
+        forces = np.zeros((self.chain.n, self.chain.n))
+        moments = np.zeros_like(forces)
+        if self._heavy:
             weight = cross_matrix(loading.share * self.model.gravity)
-            forces += (axes @ weight.T) @ motion.mass_velocity.T
+            forces += (motion.axes @ weight.T) @ motion.mass_velocity.T
         for slot, (body, _) in enumerate(self.slots.places):
             velocity, moment = velocities[slot], loading.moments[slot]
             if velocity is not None:
-                forces += (axes @ cross_matrix(loading.forces[slot]).T) @ velocity.T
+                forces += (motion.axes @ cross_matrix(loading.forces[slot]).T) @ velocity.T
             if moment.any():
                 angular = motion.angular(body)
                 moments += angular @ (angular @ cross_matrix(moment).T).T
         above = forces * self._above
         tangent = above + above.T + moments * self._below
         tangent[self._diagonal] += forces[self._diagonal]
-        for active in self.load_effects:
-            response = self._effect(active, motion, loading)
-            load += loading.share * response.load
-            tangent += loading.share * response.tangent
-        return load, tangent
+        return tangent
 
     def _effect(self, active: ActiveLoad, motion: ChainMotion, loading: Loading) -> AppliedLoad:
         return active.effect.apply(
