@@ -39,6 +39,9 @@ ANNOTATIONS = ("tfpdef", "annassign")
 DECORATOR = "decorator"
 """Nor with what stands in one: that data are frozen is asked of all files by test_house.py."""
 
+LENGTHS_ASKED = "strict"
+"""An argument of `zip` that ends a run in which lengths differ: no result hangs on it."""
+
 _ENDS_AT_ONCE = ("LShift", "RShift", "BitOr", "BitAnd", "BitXor")
 """Of floats these are errors, which any test sees: they would only make the share look good."""
 
@@ -109,7 +112,7 @@ def _every(area: str, path: Path) -> Iterator[tuple[tuple[str, int, int], Mutant
             continue
         found = [(node, at) for node in nodes for at in made().mutation_positions(node)]
         for occurrence, (node, ((line, column), _)) in enumerate(found):
-            if not _is_annotation(node):
+            if not (_is_annotation(node) or _asks_lengths(node)):
                 yield (name, line, column), Mutant(area, name, line, operator, occurrence)
 
 
@@ -123,3 +126,13 @@ def _is_annotation(node: NodeOrLeaf | None) -> bool:
             return True
         node = parent
     return False
+
+
+def _asks_lengths(node: NodeOrLeaf) -> bool:
+    """Whether a node is the value of ``strict``."""
+    parent = node.parent
+    return (
+        parent is not None
+        and parent.type == "argument"
+        and getattr(parent.children[0], "value", "") == LENGTHS_ASKED
+    )

@@ -26,6 +26,13 @@ def test_a_draw_hangs_on_its_seed_and_takes_each_place_once() -> None:
     assert all(mutant.path.startswith(AREAS[AREA][0]) for mutant in one)
 
 
+def test_lengths_that_must_be_alike_are_not_spoilt() -> None:
+    false = [one for one in drawn("trunk", 10_000, 1) if one.operator.endswith("TrueWithFalse")]
+    lines = [(ROOT / one.path).read_text().splitlines()[one.line - 1] for one in false]
+    assert lines
+    assert not [line for line in lines if "strict=True" in line and line.count("True") == 1]
+
+
 @pytest.mark.parametrize("mutant", drawn(AREA, 6, 1), ids=lambda one: f"{one.path}:{one.line}")
 def test_a_mutant_is_code_that_differs_in_one_place(mutant: Mutant) -> None:
     whole, code = (ROOT / mutant.path).read_text(), mutant.code()
