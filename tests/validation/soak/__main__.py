@@ -35,8 +35,9 @@ KILLS_HEAD = (
     "second; three of five kill all processes at once, one Snakemake alone, one a worker. "
     "When a study comes to its end before all kills are spent, it begins anew "
     "(rounds). Files that differ: from those of an undisturbed run, byte by byte, in all "
-    f"rounds together; tables that tell processor time (`{kills.TELLS_TIME}`) are compared without "
-    "it, row by row. Finished files made twice: those that were there at a kill and that "
+    f"rounds together; what tells processor time is left out: of tables the column "
+    f"`{kills.TELLS_TIME}` and the row `{kills.ROW_OF_TIME}`, and the page with that row, the "
+    "report of `tracking`, as a whole. Finished files made twice: there at a kill, and "
     "Snakemake's record did not have as being made. The command fails where a verdict is not "
     f'"{kills.SOUND}". In the system\'s temporary folder killed processes leave empty '
     "folders of Python and Snakemake."

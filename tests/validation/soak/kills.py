@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+import pyarrow as pa
 import pyarrow.parquet as pq
 from small_project import Project
 from small_studies import SMALL
@@ -43,6 +44,9 @@ SOUND = "nothing lost, nothing twice, same bytes"
 
 TELLS_TIME = "cpu_s"
 """A column of processor time, which no two runs share: files are compared without it."""
+
+ROW_OF_TIME, PAGE_OF_TIME = "results.computation_time", "processor time of a motion"
+"""A row of the comparison with a paper is left out; a page that has that row is not compared."""
 
 MOST_DELAY_S = 1.0
 STARTING_S = 10.0
@@ -201,17 +205,28 @@ def clear(project: Project) -> None:
 
 
 def digests(project: Project) -> dict[str, str]:
-    """sha256 of each result file; of tables that tell processor time, of all but that."""
+    """sha256 of each result file, of all in it that does not tell processor time."""
     return {name: _digest(project.path(f"results/{name}")) for name in project.files()}
 
 
 def _digest(path: Path) -> str:
     data = path.read_bytes()
-    if path.suffix == ".parquet" and TELLS_TIME in (table := pq.read_table(path)).column_names:
-        told = {k: v for k, v in table.schema.metadata.items() if k != CONTENT.encode()}
-        rest = table.drop_columns([TELLS_TIME]).replace_schema_metadata(None)
-        data = repr((sorted(told.items()), rest.schema.to_string(), rest.to_pylist())).encode()
+    if path.suffix == ".html" and PAGE_OF_TIME.encode() in data:
+        data = PAGE_OF_TIME.encode()
+    if path.suffix == ".parquet":
+        data = _timeless(pq.read_table(path)) or data
     return hashlib.sha256(data).hexdigest()
+
+
+def _timeless(table: pa.Table) -> bytes | None:
+    """A table's rows and notes without processor time; None where it tells none."""
+    rows, names = table.to_pylist(), table.column_names
+    rest = [{key: cell for key, cell in row.items() if key != TELLS_TIME} for row in rows]
+    rest = [row for row in rest if row.get("id") != ROW_OF_TIME]
+    if TELLS_TIME not in names and len(rest) == len(rows):
+        return None
+    told = {key: value for key, value in table.schema.metadata.items() if key != CONTENT.encode()}
+    return repr((sorted(told.items()), table.schema.remove_metadata().to_string(), rest)).encode()
 
 
 def incomplete(project: Project) -> set[str]:
