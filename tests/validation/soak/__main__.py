@@ -38,7 +38,7 @@ KILLS_HEAD = (
     f"rounds together; what tells processor time is left out: of tables the column "
     f"`{kills.TELLS_TIME}` and the row `{kills.ROW_OF_TIME}`, and the page with that row, the "
     "report of `tracking`, as a whole. Finished files made twice: there at a kill, and "
-    "Snakemake's record did not have as being made. The command fails where a verdict is not "
+    "not in Snakemake's record as being made. The command fails where a verdict is not "
     f'"{kills.SOUND}". In the system\'s temporary folder killed processes leave empty '
     "folders of Python and Snakemake."
 )
