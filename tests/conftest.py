@@ -5,7 +5,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from small_project import Project, Shared, copy_project
+
+settings.register_profile("same everywhere", derandomize=True, deadline=None, database=None)
+settings.load_profile("same everywhere")
+"""Drawn examples are the same on each machine, and a slow one fails none of them."""
 
 
 @pytest.hookimpl(tryfirst=True)

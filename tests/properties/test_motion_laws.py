@@ -14,7 +14,7 @@ from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System, follow
 from spinepipe.world import Chain
 
-FEW = settings(derandomize=True, max_examples=15, deadline=None, database=None)
+FEW = settings(max_examples=15)
 
 ROUND_OFF = 1e-11
 """m and rad: Newton's steps end below 1e-9 and square, loads are good to 1e-13."""

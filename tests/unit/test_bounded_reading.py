@@ -343,9 +343,7 @@ def spoilt(data: bytes, how: str, where: float, token: str, byte: int) -> bytes:
 
 
 @given(spoils=SPOILS)
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_is_put_into_the_files_is_accepted_or_told(spoils, tmp_path_factory) -> None:
     folder = write(tmp_path_factory.mktemp("spoilt") / NAME)
     for file, *change in spoils:

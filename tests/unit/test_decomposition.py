@@ -122,7 +122,7 @@ def test_singular_vectors_are_orthonormal_and_make_the_matrix(
         assert_decomposed(matrix)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(
     rows=st.integers(1, 40),
     columns=st.integers(1, 40),

@@ -90,7 +90,7 @@ NAMES = st.one_of(
 )
 
 
-@settings(derandomize=True, max_examples=300, deadline=None, database=None)
+@settings(max_examples=300)
 @given(NAMES)
 def test_any_accepted_name_stays_below_the_folder_of_its_study(
     paths: list[tuple[str, str]], name: str

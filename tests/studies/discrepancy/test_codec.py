@@ -26,7 +26,7 @@ from spinepipe.studies.discrepancy.search.joint_fit import Setting
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
-MANY = settings(derandomize=True, max_examples=150, deadline=None, database=None)
+MANY = settings(max_examples=150)
 
 
 def bits(value: float) -> bytes:

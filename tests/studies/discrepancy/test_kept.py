@@ -44,7 +44,7 @@ def test_nothing_is_made_by_looking(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == []
 
 
-@settings(derandomize=True, max_examples=200, deadline=None, database=None)
+@settings(max_examples=200)
 @given(st.data())
 def test_any_change_of_any_byte_is_seen(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
