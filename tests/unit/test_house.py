@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -100,9 +101,15 @@ def dotted(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax of a file."""
+    return ast.parse(path.read_bytes())
+
+
 def imports(path: Path) -> Iterator[tuple[int, str]]:
     """Line and full name of everything a file imports, also inside functions."""
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -200,7 +207,7 @@ def test_the_core_names_no_kind() -> None:
         f"{dotted(path)}:{node.lineno}: {node.value}"
         for path in MODULES
         if kind_named(dotted(path)) is None
-        for node in ast.walk(ast.parse(path.read_bytes()))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.Constant) and node.value in KINDS
     ]
     assert not named, "a kind is found by its folder (spinepipe/studies/registry.py)"
@@ -351,7 +358,7 @@ def test_decompositions_are_seen_by_whatever_name(text: str, found: list[str]) -
 def test_only_one_module_decomposes(path: Path) -> None:
     """Others would fail on some processors: see `spinepipe.decomposition`."""
     if dotted(path) != f"{PACKAGE}.decomposition":
-        assert decompositions(ast.parse(path.read_bytes())) == []
+        assert decompositions(tree_of(path)) == []
 
 
 def test_data_are_frozen() -> None:
@@ -360,7 +367,7 @@ def test_data_are_frozen() -> None:
     found = {
         f"{dotted(path)}.{node.name}"
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_bytes()))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.ClassDef)
         for by in node.decorator_list
         if "dataclass" in ast.unparse(by) and "frozen=True" not in ast.unparse(by)
