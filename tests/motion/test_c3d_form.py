@@ -170,6 +170,10 @@ def test_a_parameter_that_leads_on_by_nought_is_the_last() -> None:
     assert found.parameters == {("", "A"): (7.0,)}
 
 
+def test_a_way_may_be_the_last_of_a_file() -> None:
+    assert taken_apart(last_entry(b"\x01\xffA\x00\x00")).parameters == {}
+
+
 @pytest.mark.parametrize(
     ("data", "says"),
     [
