@@ -171,7 +171,8 @@ def test_a_parameter_that_leads_on_by_nought_is_the_last() -> None:
 
 
 def test_a_way_may_be_the_last_of_a_file() -> None:
-    assert taken_apart(last_entry(b"\x01\xffA\x00\x00")).parameters == {}
+    found = taken_apart(last_entry(b"\x01\xffB\x00\x00"))
+    assert found.parameters == {("B", "A"): (0.0,)}
 
 
 @pytest.mark.parametrize(
