@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvalsh
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics import System
@@ -117,6 +118,35 @@ def test_what_is_proven_is_what_decays(
     by_forms = stability.proven_by_forms(lanes)
     assert not (by_forms & ~stands).any()
     assert by_forms.sum() >= 0.9 * stands.sum()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 3.0])
+@pytest.mark.parametrize("n_joints", [1, 2, 5])
+def test_no_mode_lies_below_the_rate_where_the_form_loses_its_sign(
+    n_joints: int, share: float
+) -> None:
+    """S - v^2 M + c (u - i A) is positive up to a v that eigenvalues of the whole matrices tell.
+
+    The weight c is so many times the size of S over that of A; u is that of A.
+    """
+    rng = np.random.default_rng(20_040 + n_joints)
+    made = [loaded(rng, n_joints, size, 1.0) for size in (0.1, 0.3, 1.0)]
+    stack = stack_of(made)
+    q = rng.normal(0.0, 0.1, (3, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
+    tangents = stack.bound(np.arange(3), {}).held(q).tangent
+    for lane, chain in enumerate(made):
+        mass, tangent = by_pybullet(chain, q[lane])
+        whole, skew = 0.5 * (tangent + tangent.T), 0.5 * (tangent - tangent.T)
+        low = np.abs(np.linalg.eigvals(skew)).max()
+        weight = share * np.linalg.eigvalsh(whole).max() / low
+        form = whole + weight * (low * np.eye(len(mass)) - 1j * skew)
+        highest = np.sqrt(eigvalsh(form, mass)[0])
+        lanes = stability.lanes_of(
+            stack.chains, part(stack.loads, np.array([lane])), q[[lane]], tangents[[lane]]
+        )
+        for factor, apart in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+            found = lanes.apart(*np.array([[low], [factor * highest], [weight]]))
+            assert found.tolist() == [apart]
 
 
 def growth(mass: Array, tangent: Array) -> float:
