@@ -45,8 +45,11 @@ class Reach:
         return [name for name in files_of_tests() if not self._holds(name)]
 
     def vouch(self, tests: str) -> None:
-        """Note of which code a file of tests was followed."""
-        code = {path: _digest(path) for path in (tests, *self._run(tests))}
+        """Note of which code a file of tests was followed: what it calls, not what it just loads."""
+        called = [
+            path for path, at in self._run(tests).items() if any(_is_called(path, n) for n in at)
+        ]
+        code = {path: _digest(path) for path in (tests, *called)}
         self.kept(tests).with_suffix(".code").write_text(json.dumps(code))
 
     def _holds(self, tests: str) -> bool:
@@ -117,6 +120,13 @@ class Reach:
         data.read()
         lines = {path: data.contexts_by_lineno(path) for path in data.measured_files()}
         return {path: at for path, at in lines.items() if at}
+
+
+def _is_called(path: str, line: int) -> bool:
+    try:
+        return statement(path, line).inside
+    except ValueError:
+        return False
 
 
 @cache
