@@ -45,7 +45,7 @@ class Reach:
         return [name for name in files_of_tests() if not self._holds(name)]
 
     def vouch(self, tests: str) -> None:
-        """Note the code that a file of tests was seen to call; what it only loads does not count."""
+        """Note what code a file of tests was seen to call; what it only loads does not count."""
         called = [
             path for path, at in self._run(tests).items() if any(_is_called(path, n) for n in at)
         ]
