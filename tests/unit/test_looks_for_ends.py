@@ -276,6 +276,31 @@ def test_the_others_stay_inside_their_bounds(along: bool) -> None:
     assert (found.high[0], -found.low[0]) == pytest.approx((end, end), rel=0.03)
 
 
+@pytest.mark.parametrize(
+    ("pull", "looks", "end"), [(0.2, 1, 1.0), (0.6, None, 0.8602)], ids=["little", "much"]
+)
+def test_one_linear_step_is_believed_where_it_gains_little(
+    pull: float, looks: int | None, end: float
+) -> None:
+    """x and p x + y + 40 y^2 are read: a straight step makes up for all of p x, of which it can
+    1/160. With p = 0.2 that is 0.04 of the rise, below a tenth, with 0.6 it is 0.36: then
+    x^2 + (0.6 x - 1/160)^2 = 1 is the end."""
+    asked = []
+
+    def point(at: Array) -> tuple[Array, Array]:
+        x, y = at
+        asked.append(x)
+        slopes = np.array([[1.0, 0.0], [pull, 1.0 + 80.0 * y]])
+        return np.array([x, pull * x + y + 40.0 * y**2]), slopes
+
+    low, high = np.array([0.0, -9.0]), np.full(2, 9.0)
+    origin, straight = np.zeros(2), np.zeros(2, dtype=bool)
+    best = Best(origin, np.zeros(2), np.eye(2), low, high, np.ones(2), straight)
+    found = profile_in_turn(best, point, [0], limit=1.0)
+    assert found.high[0] == pytest.approx(end, rel=0.03)
+    assert looks is None or len(asked) == looks
+
+
 def test_one_linear_step_ends_where_the_cost_is_least_within_bounds() -> None:
     """Of (a - 2)^2 + (b + a - 3)^2: 0 at (2, 1); where a is 1.5 at most, 0.25 at (1.5, 1.5)."""
     jacobian = np.array([[1.0, 0.0], [1.0, 1.0]])
