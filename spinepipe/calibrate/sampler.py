@@ -102,7 +102,7 @@ class Convergence:
     @property
     def message(self) -> str:
         """Why the draws are not to be believed; "" where they are."""
-        worst, least = float(self.r_hat.max()), float(min(self.ess_bulk.min(), self.ess_tail.min()))
+        worst, least = float(self.r_hat.max()), float(np.min([self.ess_bulk, self.ess_tail]))
         told = []
         if not worst <= LARGEST_R_HAT:
             told.append(f"R-hat is {worst:.3f}, allowed {LARGEST_R_HAT:g}")

@@ -86,10 +86,14 @@ def _refused(groups: Sequence[Array], n: int) -> Outcome | None:
     if len(groups) < FEWEST_GROUPS or empty or n == len(groups):
         message = f"{n} values in {len(groups)} groups, {empty} of them empty; at least "
         return KRUSKAL_WALLIS.without(
-            Ended.TOO_FEW, n, f"{message}{FEWEST_GROUPS} groups with values, one with two, needed"
+            Ended.TOO_FEW, n, f"{message}{FEWEST_GROUPS} groups of two values needed"
         )
     if constant(np.concatenate(groups)):
         return KRUSKAL_WALLIS.without(Ended.CONSTANT, n, "all values are the same")
+    alone = sum(len(group) == 1 for group in groups)
+    if alone:
+        message = f"{alone} of {len(groups)} groups with a single value; each needs two"
+        return KRUSKAL_WALLIS.without(Ended.TOO_FEW, n, message)
     return None
 
 
