@@ -43,7 +43,8 @@ def kruskal_wallis(groups: Sequence[ArrayLike]) -> Outcome:
 
     Parameters
     ----------
-    groups : the values of each group, (n,) each; the groups may differ in length.
+    groups : the values of each group, (n,) each; the groups may differ in length, and a group of a
+        single value is too few.
 
     p is exact where the values can be dealt out in at most 20,000 ways (two groups of up to 8,
     three of up to 3). Above that it is chi-squared's with groups - 1 degrees of freedom if all
