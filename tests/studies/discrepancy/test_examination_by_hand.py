@@ -1,0 +1,195 @@
+"""The rules of an examination one by one: better forms, two for one, rivals, plain stiffness."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spinepipe.effects import Spread
+from spinepipe.studies.discrepancy.search import examination
+from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
+from spinepipe.studies.discrepancy.search.inquiry import Rival, Stage
+from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
+
+MARGIN, NEEDED = 3.0, 5.0
+
+
+def form(name: str, spread: Spread = Spread.SHARED, coordinate: str = "extension") -> Form:
+    return Form(Variant(name, (("coordinate", coordinate),)), spread)
+
+
+def refitted(
+    name: str, log_evidence: float, unknowns: int = 1, spread: Spread = Spread.SHARED
+) -> Any:
+    return SimpleNamespace(
+        name=name,
+        form=form(name, spread),
+        log_evidence=log_evidence,
+        unknowns=unknowns,
+        fit=(name, spread),
+    )
+
+
+# Who takes a place
+
+OWN = form("a")
+
+
+@pytest.mark.parametrize(("lead", "gives_way"), [(2.99, False), (3.01, True)])
+def test_a_form_gives_way_to_a_clearly_better_one_of_its_effect(
+    lead: float, gives_way: bool
+) -> None:
+    """By three, whatever the margin between effects is."""
+    own, other = refitted("a", 40.0), refitted("a", 40.0 + lead, 3, Spread.EACH)
+    for margin in (0.5, 9.0):
+        found = examination._better(OWN, own, [own, other], margin)
+        assert found is (other if gives_way else None)
+
+
+@pytest.mark.parametrize(("lead", "gives_way"), [(5.99, False), (6.01, True)])
+def test_another_effect_must_be_ahead_of_the_best_form(lead: float, gives_way: bool) -> None:
+    """The plainest form stands, three behind the best of its effect; the margin comes on top."""
+    own, best = refitted("a", 40.0), refitted("a", 43.0, 3, Spread.EACH)
+    other = refitted("b", 40.0 + lead)
+    assert examination._better(OWN, own, [own, best, other], MARGIN) is (
+        other if gives_way else None
+    )
+
+
+def test_the_best_form_counts_for_three_more_than_the_plainest_at_most() -> None:
+    own = refitted("a", 40.0)
+    for best, counted in ((39.0, 40.0), (42.0, 42.0), (50.0, 43.0)):
+        tried = [refitted("a", best, 3, Spread.EACH), refitted("b", 90.0)]
+        assert examination._of_effect(own, tried) == counted
+
+
+def test_with_nothing_tried_nothing_gives_way() -> None:
+    assert examination._better(OWN, refitted("a", 40.0), [], MARGIN) is None
+
+
+# Rivals
+
+
+def test_a_rival_is_kept_once_by_its_smallest_margin_nearest_first() -> None:
+    rivals = (Rival("b", 2.0), Rival("c", 5.0))
+    assert examination._nearest(rivals, Rival("d", 1.0)) == (
+        Rival("d", 1.0),
+        Rival("b", 2.0),
+        Rival("c", 5.0),
+    )
+    assert examination._nearest(rivals, Rival("c", 1.0)) == (Rival("c", 1.0), Rival("b", 2.0))
+    assert examination._nearest(rivals, Rival("b", 9.0)) == rivals
+    assert examination._nearest((), Rival("b", 9.0)) == (Rival("b", 9.0),)
+
+
+def test_rivals_have_the_evidence_of_their_best_refit_or_of_the_screen() -> None:
+    own = refitted("a", 40.0)
+    tried = [own, refitted("b", 30.0), refitted("b", 35.0, 3, Spread.EACH), refitted("c", -np.inf)]
+    effects = [
+        Screened(name, evidence, np.zeros(1), (Tried(form(name), (), (), 0.0, np.zeros(0), 0.0),))
+        for name, evidence in (("a", 44.0), ("b", 99.0), ("c", 20.0), ("d", 12.0))
+    ]
+    found = examination._rivals(own, tried, Screen(tuple(effects), NEEDED, 1))
+    assert found == (Rival("b", 5.0, ("extension",)), Rival("d", 28.0, ("extension",)))
+
+
+# Two for one
+
+
+class Asked:
+    """An inquiry whose next look has these refits."""
+
+    def __init__(self, *tried: Any, names: Sequence[str] = ("level_dependence",)) -> None:
+        self.tried, self.places = tried, list[tuple[Any, str]]()
+        self.rules = SimpleNamespace(margin=MARGIN, trials=[Trials(name, (), ()) for name in names])
+
+    def stage(self, grounds: Any, in_place_of: str) -> Stage:
+        self.places.append((grounds.there, in_place_of))
+        return Stage("", Screen((), NEEDED, 1), self.tried, True)
+
+
+def grounds(there: Any = None) -> Any:
+    return SimpleNamespace(there=there, at=grounds)
+
+
+def two(inquiry: Asked, own: Any, *tried: Any) -> Any:
+    return examination._two_simpler(grounds(), own, tried, inquiry)  # type: ignore[arg-type]
+
+
+MANY = refitted("a", 40.0, 6, Spread.EACH)
+
+
+def test_two_plain_effects_stand_for_one_of_many_unknowns() -> None:
+    inquiry = Asked(refitted("c", 12.0), refitted("d", 15.0), MANY)
+    found = two(inquiry, MANY, MANY, refitted("b", 30.0), refitted("e", 29.0))
+    assert inquiry.places == [(("b", Spread.SHARED), "a, beside b")]
+    assert found.forms == (form("b"), form("d"))
+    assert found.grounds.there == ("d", Spread.SHARED)
+    assert found.lead == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(("evidence", "tried"), [(12.1, True), (11.9, False)])
+def test_the_first_has_three_tenths_of_the_evidence(evidence: float, tried: bool) -> None:
+    inquiry = Asked(refitted("c", 39.0))
+    found = two(inquiry, MANY, refitted("b", evidence))
+    assert (found is not None) is tried is bool(inquiry.places)
+
+
+def test_the_first_has_fewer_unknowns_and_both_no_more_than_the_one() -> None:
+    for unknowns, tried in ((5, True), (6, False)):
+        inquiry = Asked(refitted("c", 39.0))
+        assert (two(inquiry, MANY, refitted("b", 30.0, unknowns)) is not None) is tried
+    for unknowns, found in ((2, True), (3, False)):
+        inquiry = Asked(refitted("c", 39.0, unknowns))
+        assert (two(inquiry, MANY, refitted("b", 30.0, 4)) is not None) is found
+
+
+@pytest.mark.parametrize(("second", "found"), [(NEEDED + 0.1, True), (NEEDED, False)])
+def test_the_second_is_evident_beside_the_first(second: float, found: bool) -> None:
+    assert (two(Asked(refitted("c", second)), MANY, refitted("b", 39.0)) is not None) is found
+    assert two(Asked(), MANY, refitted("b", 39.0)) is None
+
+
+@pytest.mark.parametrize(("second", "found"), [(7.01, True), (6.99, False)])
+def test_together_they_are_no_more_than_the_margin_behind(second: float, found: bool) -> None:
+    assert (two(Asked(refitted("c", second)), MANY, refitted("b", 30.0)) is not None) is found
+
+
+# Plain stiffness
+
+
+def over(
+    spread: Spread, name: str = "a", coordinate: str = "extension", plain: float = 30.0, **more: Any
+) -> tuple[float | None, list[Any]]:
+    inquiry: Any = Asked(**more)
+    asked: list[Any] = []
+
+    def refit(without: Any, one: Any) -> Any:
+        asked.append(one)
+        return refitted("level_dependence", plain)
+
+    inquiry.refit = refit
+    own = refitted(name, 40.0, 6, spread)
+    own.form = form(name, spread, coordinate)
+    return examination._over_stiffness(grounds(), own, inquiry), asked
+
+
+@pytest.mark.parametrize("spread", [Spread.BY_JOINT, Spread.EACH])
+def test_many_strengths_are_held_against_a_stiffness_of_each_joint(spread: Spread) -> None:
+    """That starts a hundredth above off."""
+    ahead, (one,) = over(spread)
+    assert ahead == 10.0
+    assert (one.form.name, one.form.spread) == ("level_dependence", Spread.EACH)
+    assert one.form.variant.acts_on == ("extension",)
+    assert one.start == pytest.approx([np.exp(0.01)])
+
+
+def test_few_strengths_and_stiffness_itself_are_held_against_nothing() -> None:
+    assert over(Spread.SHARED) == (None, [])
+    assert over(Spread.BY_SPECIMEN) == (None, [])
+    assert over(Spread.EACH, "level_dependence") == (None, [])
+    assert over(Spread.EACH, names=("b",)) == (None, [])
+    assert over(Spread.EACH, coordinate="all") == (None, [])
+    assert over(Spread.EACH, plain=-np.inf)[0] is None
