@@ -9,7 +9,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Supposed, hypothesis
-from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Near, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
@@ -145,8 +145,9 @@ def _why_not(models: Hypothesis, setting: Setting) -> str:
 
 
 def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
-    fit = run(joint_fit, models, setting)
+    near: Near = None
     for _ in range(MOST_BASE_FITS):
+        fit = run(joint_fit, models, setting, near)
         if not fit.usable:
             raise NoBase(_why_not(models, setting) or fit.status)
         if not fit.status:
@@ -154,5 +155,5 @@ def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
         members = {
             name: replace(member, model=fit.models[name]) for name, member in models.members.items()
         }
-        fit = run(joint_fit, replace(models, members=members), setting, fit.poses)
+        models, near = replace(models, members=members), fit.poses
     raise NoBase(fit.status)
