@@ -299,9 +299,14 @@ def test_derivatives_by_loads_and_joint_poses() -> None:
             lane += 1
 
 
-def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it() -> None:
+HANGING = [effect for effect in VARIANTS if effect.kind in (Kind.LOAD, Kind.PATH)]
+
+
+@pytest.mark.parametrize("effect", HANGING, ids=lambda effect: effect.name)
+def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it(effect: Effect) -> None:
     rng = np.random.default_rng(7)
-    gain = next(effect for effect in VARIANTS if effect.name == "load_gain")
-    stack = stack_of([draw.model(rng, 2, [gain])])
-    with pytest.raises(ValueError, match="load and path effects"):
-        by_joint_pose(stack, np.zeros((6, 2, 6)))
+    stack = stack_of([draw.model(rng, 2, [effect])])
+    q = np.zeros((len(stack.run), 2, 6))
+    for derivative in (lambda: by_joint_pose(stack, q), lambda: by_load(stack, q, 0)):
+        with pytest.raises(ValueError, match="load and path effects"):
+            derivative()

@@ -147,6 +147,17 @@ def test_a_solve_starts_where_the_rig_has_the_joint() -> None:
     assert System(Chain(model), model, twisted()).free is None
 
 
+def test_what_a_rig_fixes_is_missing_by_how_far_it_is_off() -> None:
+    """Its row of the balance is q - value, in its unit, and changes as q does."""
+    model = coupled()
+    system = System(Chain(model), model, twisted([Support(0, ROTATION, 0.1)]))
+    loading, states = system.loading(system.case.steps[0]), system.initial_states()
+    found = system.balance(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), loading, states)
+    assert found.residual[ROTATION] == pytest.approx(0.3, rel=1e-15)
+    np.testing.assert_array_equal(found.tangent[ROTATION], np.eye(6)[ROTATION])
+    np.testing.assert_array_equal(found.tangent[:, ROTATION], np.eye(6)[ROTATION])
+
+
 def test_a_measured_load_that_is_listed_leaves_no_reaction() -> None:
     """Prescribed to where the listed load brings it, the joint needs no rig."""
     free, *_ = solved(coupled(), twisted())

@@ -244,6 +244,11 @@ def test_declared_numbers_make_sense(variant) -> None:
         ("flexion_extension_asymmetry", {"coordinate": ""}, "'' is not one of"),
         ("bending_rotation_coupling", {"pair": ["extension"]}, "is not two coordinates"),
         ("bending_rotation_coupling", {"pair": ["right", "right"]}, "is not two coordinates"),
+        (
+            "bending_rotation_coupling",
+            {"pair": ["anterior", "superior", "right"]},
+            "is not two coordinates",
+        ),
         ("bending_rotation_coupling", {"pair": ["right", "left"]}, "pair 'left' is not one of"),
         ("facet_contact", {"side": "left"}, "side 'left' is not one of positive, negative"),
         ("facet_contact", {"coordinate": "x"}, "coordinate 'x' is not one of"),
