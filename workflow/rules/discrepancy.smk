@@ -24,6 +24,7 @@ rule discrepancy_search:
         model_with_effects=f"{DISCREPANCIES}/model_with_effects.yaml",
     log:
         f"{LOGS}/discrepancy_search.log",
+    priority: 1
     params:
         digest=digest("search"),
     run:

@@ -23,11 +23,22 @@ class Unlisted(Sequence):
 
 
 class FewReady(JobScheduler):
-    """A scheduler whose looks do not grow with the number of jobs."""
+    """A scheduler whose looks do not grow with the number of jobs.
+
+    Rules with a priority have jobs of minutes that hang on nothing: the first look starts with
+    them, so that no run waits for one of them alone at its end.
+    """
+
+    first_look = True
 
     @property
     def open_jobs(self):
-        return list(islice(self.workflow.dag.ready_jobs, MOST_READY))
+        ready = self.workflow.dag.ready_jobs
+        if self.first_look:
+            self.first_look = False
+            if longest := [job for job in ready if job.rule.priority]:
+                return longest
+        return list(islice(ready, MOST_READY))
 
     @property
     def remaining_jobs(self):

@@ -10,6 +10,7 @@ rule population:
         output=f"{PATIENTS}/population.parquet",
     log:
         f"{LOGS}/population.log",
+    priority: 1
     resources:
         tmpdir=TMPDIR,
     params:

@@ -45,6 +45,7 @@ rule tune:
         agreement=f"{TRUNKS}/agreement.parquet",
     log:
         f"{LOGS}/tune.log",
+    priority: 1
     resources:
         tmpdir=TMPDIR,
     params:
