@@ -1,10 +1,15 @@
 """Parts of equilibrium and settling by closed forms: factors, decay, sizes of steps, the method."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from spinepipe.statics.equilibrium import (
+    STEP_TOLERANCE,
     SingularTangent,
+    _newton,
     _smallest_eigenvalue_bound,
     decays,
     factor,
@@ -180,3 +185,24 @@ def test_a_ramp_is_given_so_many_times_a_second() -> None:
     step = 0.5 / 12.0
     after = course.corners_after(np.array([0.0, 1.5 * step, 2.0 * step, 0.5, 1.0]))
     np.testing.assert_allclose(after, [step, 2.0 * step, 3.0 * step, np.inf, np.inf])
+
+
+# Newton's steps
+
+
+@pytest.mark.parametrize(("beyond", "arrives"), [(-0.01, True), (0.01, False)])
+def test_twelve_steps_are_taken_at_most(beyond: float, arrives: bool) -> None:
+    """Towards a root of third order each step is two thirds of the one before.
+
+    The twelfth is just within or just beyond what ends the steps.
+    """
+    first = np.array([3.0 * STEP_TOLERANCE[0] * 1.5**11 * (1.0 + beyond), *[0.0] * 5])
+
+    def balance(q: np.ndarray, *_: object) -> Any:
+        slopes = np.diag([3.0 * q[0] ** 2, *[1.0] * 5])
+        return SimpleNamespace(residual=np.array([q[0] ** 3, *q[1:]]), tangent=slopes)
+
+    system: Any = SimpleNamespace(start=lambda q, loading: q.copy(), balance=balance)
+    found = _newton(system, first, None, None)  # type: ignore[arg-type]
+    assert (found is not None) is arrives
+    assert found is None or found.iterations == 12
