@@ -199,6 +199,14 @@ def test_a_design_settles_in_eight_parts_at_most() -> None:
     assert [stage.samples for stage in whole] == [1024]
 
 
+def test_nothing_is_too_fine_where_no_resolution_is_told() -> None:
+    design = draw("morris", ALONE, 16, 20033)
+    outputs = 1e-3 * np.exp(design.unit[:, :1])
+    for resolution, status in (({}, Known.DONE), ({"resolution": 0.01}, Known.CONSTANT)):
+        (stage,) = convergence(design, outputs, settings=QUICK, sizes=1, **resolution)
+        assert {index.status for index in stage.indices} == {(status,)}
+
+
 def test_a_design_too_small_for_indices_is_one_stage_that_says_so() -> None:
     design = draw("latin_hypercube", ALONE, 30, 20032)
     (stage,) = convergence(design, np.exp(design.unit[:, :1]), settings=QUICK)
