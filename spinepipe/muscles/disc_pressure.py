@@ -46,7 +46,7 @@ class DiscPressure:
     @property
     def inside(self) -> bool:
         """Whether compression and flexion are in the range to which Eq 6 was fitted."""
-        return 0.0 <= self.nominal_pa <= LARGEST_PA and 0.0 <= self.flexion <= LARGEST_FLEXION
+        return not self.outside
 
     @property
     def outside(self) -> str:

@@ -128,7 +128,7 @@ def test_an_unknown_unit_is_named(tmp_path: Path) -> None:
     assert (problem.row, problem.column, problem.found) == (3, "Units", "'inch'")
 
 
-@pytest.mark.parametrize("blank", ["\t", "  "])
+@pytest.mark.parametrize("blank", ["\t", "  ", " \t ", "\t\u00a0"])
 def test_tabs_and_spaces_part_cells(tmp_path: Path, blank: str) -> None:
     assert_same(read_motion(write(tmp_path / "m.trc", trc(places_mm(), blank=blank))), places_mm())
 

@@ -47,6 +47,12 @@ def test_what_is_out_of_range_is_told(compression: float, theta_deg: float, told
     assert found.inside == (told == "") == (found.outside == "")
 
 
+def test_a_disc_without_load_is_within_and_one_that_is_pulled_is_not() -> None:
+    assert disc_pressure(0.0, AREA, 0.0).inside
+    assert not disc_pressure(-1e-9, AREA, 0.0).inside
+    assert not disc_pressure(0.0, AREA, -1e-9).inside
+
+
 @pytest.mark.parametrize(("nominal_mpa", "theta_deg"), [(0.62, -1.5), (1.24, 0.8), (1.86, 3.0)])
 def test_pressure_is_least_at_a_flexion_that_grows_with_load(
     nominal_mpa: float, theta_deg: float

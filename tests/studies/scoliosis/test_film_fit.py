@@ -8,6 +8,7 @@ import pytest
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.progress import Progress
+from spinepipe.studies.scoliosis import film_regions
 from spinepipe.studies.scoliosis.film_fit import (
     NO_POSE,
     TOPS,
@@ -155,6 +156,15 @@ def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Pa
     reach = region(coarse, population, coarse.fit(population), 5)
     assert reach.open_below
     assert reach.open_above
+
+
+def test_a_ratio_whose_fit_does_not_arrive_is_left_open(
+    patient: Patient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After two evaluations nothing has settled: what lies about such a point is no region."""
+    monkeypatch.setattr(film_regions, "SETTLED", replace(film_regions.SETTLED, evaluations=2))
+    fit, population = FilmFit(patient, weights_of_a_usual_study()), assumed(patient.chain.n_joints)
+    assert region(fit, population, fit.fit(population), 5) is film_regions.OPEN
 
 
 def test_a_patient_without_a_pose_is_told_and_keeps_the_population(
