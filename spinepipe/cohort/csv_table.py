@@ -140,8 +140,7 @@ def _converted(
         )
     if column.kind == "text":
         return _text_series(cells, rows.index)
-    known = {cell: _number(cell) for cell in set(cells)}
-    numbers = np.array([known[cell] for cell in cells])
+    numbers = _numbers(cells)
     wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
     problems += first_of(
         Problem(
@@ -152,6 +151,15 @@ def _converted(
     )
     numbers[wrong] = nan
     return pd.Series(numbers, index=rows.index, dtype="float64")
+
+
+def _numbers(cells: list[str]) -> NDArray[np.float64]:
+    """The numbers that cells are; where most occur more than once, each is looked at once."""
+    known = set(cells)
+    if 2 * len(known) > len(cells):
+        return np.array([_number(cell) for cell in cells], dtype=np.float64)
+    numbers = {cell: _number(cell) for cell in known}
+    return np.array([numbers[cell] for cell in cells], dtype=np.float64)
 
 
 def _number(cell: str) -> float:
