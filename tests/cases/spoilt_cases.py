@@ -18,7 +18,7 @@ MOST_TOLD = 100_000
 
 _LINE = re.compile(
     r"^(?P<kind>      |warn  |  |spinepipe check: |spinepipe import: )"
-    r"(?P<place>[^:]{1,400}?): found (?P<found>.*)",
+    r"(?P<place>(?:[^:]|:(?! )){1,400}?): found (?P<found>.*)",
     re.S,
 )
 

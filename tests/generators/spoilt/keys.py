@@ -127,6 +127,10 @@ UNREAD = ("effects[].values[].specimen",)
 """Of bushings in a model file that the study replaces by its own: nobody asks what they say."""
 
 
+OF_RECORDINGS = ("column", "driving")
+"""Keys that name a column: one that is not there is told at the recordings that lack it."""
+
+
 class _Maker:
     """Cases of one key."""
 
@@ -140,7 +144,9 @@ class _Maker:
         def changes() -> dict[str, bytes]:
             return {self.file: self._text(raw)}
 
-        return Case(self.project, "value", what, self.file, self.entry.name, expected, changes)
+        name = self.entry.name
+        told_in = ("*",) if name.rpartition(".")[2] in OF_RECORDINGS else ()
+        return Case(self.project, "value", what, self.file, name, expected, changes, told_in)
 
     def _text(self, raw: str) -> bytes:
         text = as_yaml(_put(self.data, self.path, HERE)).decode()
@@ -210,7 +216,8 @@ class _Maker:
             ("date", "2024-01-01"),
             ("inf", ".inf"),
         ):
-            yield self.case(what, raw, REFUSED)
+            lawful = what == "number" and "integer" in self.entry.words  # the number of a column
+            yield self.case(what, raw, OPEN if lawful else REFUSED)
         if is_prose:
             return
         for what in ("unknown", "path", "dollars", "tag", "100 000 characters", "look-alike"):
