@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from spinepipe.documents.names import ALLOWED, name_fault
 from spinepipe.documents.settings import validate
 from spinepipe.documents.text import NUMBER
 from spinepipe.documents.yaml_text import Document, read_yaml
@@ -105,7 +106,10 @@ def read_model(path: str | Path) -> ModelFile:
     model, faults = validate(ModelFile, document)
     if problems or model is None:
         raise InputError([*problems, *faults])
-    problems = [
+    if (fault := name_fault(model.model)) is not None:
+        place = (name, document.line_of("model"), "model")
+        problems.append(Problem(*place, fault, ALLOWED, "rename the model"))
+    problems += [
         p for number, entry in enumerate(model.effects) for p in _check(document, number, entry)
     ]
     if problems:

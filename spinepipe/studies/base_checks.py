@@ -79,7 +79,7 @@ class BaseCheck:
             yield from _order(model, name)
         for number, entry in enumerate(model.effects):
             place = f"effects.{number}"
-            if entry.effect != BUSHING or not self.own_bushings:
+            if entry.effect != BUSHING or not self.own_bushings or maker is None:
                 yield from _strangers(entry, name, place, cohort)
             if entry.effect != BUSHING and self.own_bushings:
                 yield from _without_values(entry, name, place, cohort)

@@ -98,6 +98,8 @@ def test_a_written_file_reads_back_the_same(tmp_path: Path) -> None:
         ("tests: [twist]", "trials: [twist]", r"effects\.1\.scope\.trials"),
         ("cohort: small", "cohort: [small]", "cohort.*string"),
         ("model: for a test", "model: [", "YAML"),
+        ("model: for a test", "model: fоr a test", "model: found .*CYRILLIC|alphabet"),
+        ("model: for a test", "model: <b>test</b>", "model: found .*; allowed: at most"),
         ("cohort: small\n", "", "cohort: found nothing: the key is missing"),
     ],
 )

@@ -58,6 +58,11 @@ def _frames(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
         if body not in CARRIERS:
             place, found = (file, int(str(line)), "carried_by"), f"unknown vertebra '{body}'"
             yield Problem(*place, found, carriers.allowed, carriers.remedy(str(body)))
+    as_written = {name.casefold(): name for name in CARRIERS}
+    for line, body in rows["body"].items():
+        if body not in CARRIERS and (meant := as_written.get(str(body).casefold())):
+            place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
+            yield Problem(*place, found, f"'{meant}', as elsewhere", f"write '{meant}'")
 
 
 def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[Problem]:

@@ -213,6 +213,7 @@ FAULTS = [
     (FOR_ALL.replace("{rise", "{specimen: a, rise"), "effects.1.values", "no value for b, c"),
     (FOR_ALL.replace("  values", "  scope: {specimens: [x]}\n  values"), "effects.1.scope.specimens", "unknown specimen 'x'"),
     (FOR_ALL.replace("  values", "  scope: {tests: [flexon]}\n  values"), "effects.1.scope.tests", "did you mean 'flexion'"),
+    (FOR_ALL.replace("effect: linear_bushing\n", "effect: linear_bushing\n  scope: {tests: [flexon]}\n", 1), "effects.0.scope.tests", "did you mean 'flexion'"),
     (FOR_ALL.replace("2000.0", "-1.0"), "effects.1.values.rise", "found -1.0"),
     ("effects: [", "model.yaml", "no YAML"),
     (HEAD.replace("- effect: linear_bushing\n", f"{CUBIC}  - {{rise: 5.0}}\n- effect: linear_bushing\n"), "effects.0", "move linear_bushing to the top"),

@@ -267,6 +267,13 @@ def test_bodies_of_frames_and_the_sheath_are_known(tmp_path: Path) -> None:
     assert told(tmp_path / "unframed", pelvis) == []
 
 
+def test_a_vertebra_in_other_letters_is_none(tmp_path: Path) -> None:
+    further = line(FRAMES, 4, "a,t12,T12,0,200,0,0,0,0\na,T12,T12,0,200,0,0,0,0")
+    (problem,) = told(tmp_path, framed(further))
+    assert (problem.row, problem.column, problem.found) == (4, "body", "unknown body 't12'")
+    assert problem.remedy == "write 'T12'"
+
+
 def test_one_muscle_on_the_other_side_is_left_to_be_mirrored(tmp_path: Path) -> None:
     assert told(tmp_path, ONE_MIRRORED) == []
 
