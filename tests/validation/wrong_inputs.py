@@ -1,7 +1,8 @@
 """Thousands of projects that are spoilt in one place each: is every one told, and where?
 
 `python -m tests.validation wrong_inputs` looks at `DRAWN` of them, drawn from all by a seed;
-`python -m tests.validation.wrong_inputs all` at every one. Each is looked at in a process of its
+`python -m tests.validation.wrong_inputs all` at every one, with a number at those of another draw.
+Each is looked at in a process of its
 own, which the system ends after ten seconds of processor time. What was seen is kept, case by case,
 in `results/validation/wrong_inputs`, as long as library, documentation and cases stay the same: a
 run that was cut off goes on.
@@ -144,12 +145,13 @@ def counted(counts: Counter[tuple[str, str, str]]) -> pd.DataFrame:
     return table
 
 
-def drawn() -> list[Case]:
-    """The cases of the part of `make validate`."""
-    return sample(DRAWN)
+def drawn(seed: int = 19) -> list[Case]:
+    """The cases of the part of `make validate`, or those of another draw."""
+    return sample(DRAWN, seed)
 
 
 if __name__ == "__main__":
-    every = list(cases()) if sys.argv[1:] == ["all"] else drawn()
+    asked = sys.argv[1:]
+    every = list(cases()) if asked == ["all"] else drawn(*map(int, asked))
     for found in tables(every, os.cpu_count() or CORES):
         print(found.to_string())
