@@ -2,10 +2,9 @@
 
 `python -m tests.validation wrong_inputs` looks at `DRAWN` of them, drawn from all by a seed;
 `python -m tests.validation.wrong_inputs all` at every one, with a number at those of another draw.
-Each is looked at in a process of its
-own, which the system ends after ten seconds of processor time. What was seen is kept, case by case,
-in `results/validation/wrong_inputs`, as long as library, documentation and cases stay the same: a
-run that was cut off goes on.
+Each is looked at in a process of its own, which the system ends after ten seconds of processor
+time. What was seen is kept, case by case, in `results/validation/wrong_inputs`, as long as library,
+documentation and cases stay the same: a run that was cut off goes on.
 """
 
 import json
