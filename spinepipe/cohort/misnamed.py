@@ -37,7 +37,7 @@ def misnamed(folder: Path, name: str, absent: Sequence[str]) -> Iterator[Problem
     absent : names of files that are looked for and not there.
     """
     for path in sorted(islice(folder.iterdir(), MOST_FILES)):
-        if len(path.name) > LONGEST or is_hidden(path) or not path.is_file():
+        if len(path.name) > LONGEST or is_hidden(path.name) or not path.is_file():
             continue
         meant = next((file for file in absent if _is_like(path.name, file)), None)
         if meant is not None:

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 
-def is_hidden(path: Path) -> bool:
+def is_hidden(name: str) -> bool:
     """Whether a name is that of a hidden file (``.#x``, ``._x``, ``.x.swp``) or a copy (``x~``)."""
-    return path.name.startswith((".", "#", "~")) or path.name.endswith(("~", ".bak", ".tmp"))
+    return name.startswith((".", "#", "~")) or name.endswith(("~", ".bak", ".tmp"))
 
 
 def files_in(folder: Path, ending: str) -> list[Path]:
@@ -32,4 +32,4 @@ def _seen(folder: Path) -> list[Path]:
     """What is in a folder but hidden things; nothing where there is no such folder."""
     if not folder.is_dir():
         return []
-    return sorted(path for path in folder.iterdir() if not is_hidden(path))
+    return sorted(path for path in folder.iterdir() if not is_hidden(path.name))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.strays import is_hidden
 from spinepipe.files import Stamp, stamp
 from spinepipe.studies.read import check, read
 from spinepipe.studies.study import STUDIES, Study
@@ -31,10 +32,14 @@ def study_of(root: str, name: str) -> tuple[Study, Cohort]:
 
 
 def study_of_kind(kind: type[AnyStudy], root: str, name: str) -> tuple[AnyStudy, Cohort]:
-    """The validated study and its cohort; read once per worker and state of the files."""
+    """The validated study and its cohort; read once per worker and state of the files.
+
+    What an editor puts beside them, such as a link to nowhere, is none of them.
+    """
     study_file = stamp(os.path.join(root, STUDIES, f"{name}.yaml"))
     with os.scandir(_folder(name, root, study_file)) as entries:
-        files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in entries)
+        read_ones = (e for e in entries if not is_hidden(e.name) and os.path.exists(e.path))
+        files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in read_ones)
     study, cohort = _study(name, root, study_file, tuple(files))
     assert isinstance(study, kind)
     return study, cohort

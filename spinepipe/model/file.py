@@ -3,13 +3,14 @@
 Geometry, masses and loads stay in the cohort.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from spinepipe.documents.names import ALLOWED, name_fault
 from spinepipe.documents.settings import validate
@@ -32,6 +33,15 @@ class Scope(BaseModel):
     specimens: tuple[str, ...] = Field(default=("*",), description="specimens it acts in")
     joints: tuple[str, ...] = Field(default=("*",), description="joints it acts on")
     tests: tuple[str, ...] = Field(default=("*",), description="tests it acts in")
+
+    @field_validator("specimens", "joints", "tests")
+    @classmethod
+    def _once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Each name once."""
+        twice = [name for name, times in Counter(names).items() if times > 1]
+        if twice:
+            raise ValueError(f"'{twice[0]}' twice; name it once")
+        return names
 
 
 class Values(BaseModel):
