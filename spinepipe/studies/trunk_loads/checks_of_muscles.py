@@ -27,7 +27,7 @@ def muscle_problems(cohort: Cohort) -> Iterator[Problem]:
     points, muscles = further.get("muscles"), further.get("muscle_parameters")
     frames = _frames_of_owner(cohort)
     if frames is not None:
-        yield from _frames(f"{name}/body_frames.csv", frames)
+        yield from _frames(f"{name}/body_frames.csv", further["body_frames"], not frames.empty)
     if points is not None:
         yield from _points(f"{name}/muscles.csv", points, frames)
     if muscles is not None:
@@ -48,9 +48,9 @@ def _frames_of_owner(cohort: Cohort) -> pd.DataFrame | None:
     return frames[frames["specimen"] == cohort.joints["specimen"].iloc[0]]
 
 
-def _frames(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
-    """Bodies that move with nothing known; no rows at all where points are told in their frames."""
-    if rows.empty:
+def _frames(file: str, rows: pd.DataFrame, has_owner: bool) -> Iterator[Problem]:
+    """Bodies of anybody that move with nothing known; no rows of whose muscles are taken."""
+    if not has_owner:
         found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
         yield Problem(file, None, "specimen", found, allowed, "add its rows, or delete the file")
     carriers = Spelling(CARRIERS, "ribs, arms and head move with a vertebra")

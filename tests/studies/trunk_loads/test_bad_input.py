@@ -223,6 +223,7 @@ MUSCLE_CASES = [
     Case("one point", line(POINTS, 7, None), POINTS, 6, "muscle", "LTpT_T12_l has one point", "add its other end"),
     Case("unknown body", cell(POINTS, 3, "body", "humerus"), POINTS, 3, "body", "unknown body 'humerus'", "belong to T11"),
     Case("a body without a frame", framed(line(FRAMES, 4, None)), POINTS, 7, "body", "unknown body 'T12'", "add its frame"),
+    Case("of somebody whose muscles are not taken", framed(add(FRAMES, "b,S1,s1,0,0,0,0,0,0")), FRAMES, 5, "carried_by", "unknown vertebra 's1'", "move with a vertebra"),
     Case("rib on nothing", framed(cell(FRAMES, 4, "carried_by", "sternum")), FRAMES, 4, "carried_by", "unknown vertebra 'sternum'", "move with a vertebra"),
     Case("mirrored twice", MIRRORED, POINTS, 4, "z_mm", "2 of 2 muscles that are left lie on the other side, LD_l", "mirrored twice?"),
     Case("all mirrored", ALL_MIRRORED, POINTS, None, "z_mm", "most muscles on the other side", "change the sign of z"),
