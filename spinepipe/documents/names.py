@@ -6,6 +6,7 @@ alike must be alike, and none may mean anything to a shell, a path or a formula.
 
 import re
 import unicodedata
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 
@@ -118,3 +119,17 @@ def _alphabet(character: str) -> str | None:
 def _shown(character: str) -> str:
     told = unicodedata.name(character, f"U+{ord(character):04X}").lower()
     return f"'{character}' ({told})"
+
+
+def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names as they are.
+
+    Raises
+    ------
+    ValueError
+        For a name that stands there twice.
+    """
+    twice = next((name for name, times in Counter(names).items() if times > 1), None)
+    if twice is not None:
+        raise ValueError(f"each name once ('{twice}' stands there twice)")
+    return names

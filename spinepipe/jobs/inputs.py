@@ -38,7 +38,7 @@ def study_of_kind(kind: type[AnyStudy], root: str, name: str) -> tuple[AnyStudy,
     """
     study_file = stamp(os.path.join(root, STUDIES, f"{name}.yaml"))
     with os.scandir(_folder(name, root, study_file)) as entries:
-        read_ones = (e for e in entries if not is_hidden(e.name) and os.path.exists(e.path))
+        read_ones = (e for e in entries if not is_hidden(e.name) and (e.is_file() or e.is_dir()))
         files = sorted((e.path, e.stat().st_size, e.stat().st_mtime_ns) for e in read_ones)
     study, cohort = _study(name, root, study_file, tuple(files))
     assert isinstance(study, kind)

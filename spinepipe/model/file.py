@@ -3,16 +3,15 @@
 Geometry, masses and loads stay in the cohort.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from spinepipe.documents.names import ALLOWED, name_fault
+from spinepipe.documents.names import ALLOWED, distinct, name_fault
 from spinepipe.documents.settings import validate
 from spinepipe.documents.text import NUMBER
 from spinepipe.documents.yaml_text import Document, read_yaml
@@ -25,23 +24,17 @@ from spinepipe.problems import InputError, Problem
 _FORM = ConfigDict(extra="forbid", frozen=True)
 
 
+_Names = Annotated[tuple[str, ...], AfterValidator(distinct)]
+
+
 class Scope(BaseModel):
     """Where an effect acts; ``*`` stands for all."""
 
     model_config = _FORM
 
-    specimens: tuple[str, ...] = Field(default=("*",), description="specimens it acts in")
-    joints: tuple[str, ...] = Field(default=("*",), description="joints it acts on")
-    tests: tuple[str, ...] = Field(default=("*",), description="tests it acts in")
-
-    @field_validator("specimens", "joints", "tests")
-    @classmethod
-    def _once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Each name once."""
-        twice = [name for name, times in Counter(names).items() if times > 1]
-        if twice:
-            raise ValueError(f"'{twice[0]}' twice; name it once")
-        return names
+    specimens: _Names = Field(default=("*",), description="specimens it acts in")
+    joints: _Names = Field(default=("*",), description="joints it acts on")
+    tests: _Names = Field(default=("*",), description="tests it acts in")
 
 
 class Values(BaseModel):
@@ -85,7 +78,7 @@ class ModelFile(BaseModel):
 
     model_config = _FORM
 
-    model: str = Field(min_length=1, description="name of the model")
+    model: str = Field(min_length=1, description="name of the model, of letters as all names")
     cohort: str = Field(min_length=1, description="cohort the model was made for")
     effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
 

@@ -25,6 +25,17 @@ def cross_matrix(vector: Array) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def dead_tangent(by_force: Array, by_moment: Array) -> Array:
+    """(n, n) tangent of dead loads: of forces symmetric as it is above, of moments as it is below.
+
+    Parameters
+    ----------
+    by_force : (n, n) f . (a_i x v_j), summed over forces. by_moment : (n, n) m . (a_j x a_i).
+    """
+    below = _below(len(by_force))
+    return np.where(below, by_force.T + by_moment, by_force)
+
+
 @cache
 def _below(n: int) -> NDArray[np.bool_]:
     """(n, n) whether a place is below the diagonal."""
@@ -82,13 +93,12 @@ class ChainMotion:
         """Generalised load (n,) of a ground-fixed wrench and its tangent (n, n)."""
         velocities, angular = self.velocities(body, point), self.angular(body)
         load = velocities @ force + angular @ moment
-        n, tangent = len(load), np.zeros((len(load), len(load)))
+        by_force, by_moment = np.zeros((2, len(load), len(load)))
         if force.any():
-            products = (self.axes @ cross_matrix(force).T) @ velocities.T
-            tangent += np.where(_below(n), products.T, products)
+            by_force = (self.axes @ cross_matrix(force).T) @ velocities.T
         if moment.any():
-            tangent += _below(n) * (angular @ (angular @ cross_matrix(moment).T).T)
-        return AppliedLoad(load, tangent)
+            by_moment = angular @ (angular @ cross_matrix(moment).T).T
+        return AppliedLoad(load, dead_tangent(by_force, by_moment))
 
     def _jacobian(self, body: int, local_point: Array) -> tuple[Array, Array]:
         return self.chain.jacobian(self.q, body, local_point)

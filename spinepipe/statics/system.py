@@ -33,7 +33,7 @@ from spinepipe.statics.holding import (
 )
 from spinepipe.statics.holding import differentiate as differentiate_holding
 from spinepipe.statics.instruments import Instrument
-from spinepipe.statics.motion import ChainMotion, cross_matrix
+from spinepipe.statics.motion import ChainMotion, cross_matrix, dead_tangent
 from spinepipe.statics.placement import ActiveGeometry, Placed, place
 from spinepipe.world import Chain
 
@@ -156,9 +156,6 @@ class System:
                 self._activate(index, scoped)
         self._blocks = _block_indices(model.n_joints)
         self._heavy = bool(np.any(model.gravity))
-        ones = np.ones((chain.n, chain.n))
-        self._above, self._below = np.triu(ones, 1), np.tril(ones, -1)
-        self._diagonal = np.diag_indices(chain.n)
         self.fixed: Indices = np.array(case.fixed, dtype=np.int64)
 
     def _activate(self, index: int, scoped: ScopedEffect) -> None:
@@ -327,10 +324,7 @@ class System:
             if moment.any():
                 angular = motion.angular(body)
                 moments += angular @ (angular @ cross_matrix(moment).T).T
-        above = forces * self._above
-        tangent = above + above.T + moments * self._below
-        tangent[self._diagonal] += forces[self._diagonal]
-        return tangent
+        return dead_tangent(forces, moments)
 
     def _effect(self, active: ActiveLoad, motion: ChainMotion, loading: Loading) -> AppliedLoad:
         return active.effect.apply(

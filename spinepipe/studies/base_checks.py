@@ -79,6 +79,7 @@ class BaseCheck:
             yield from _order(model, name)
         for number, entry in enumerate(model.effects):
             place = f"effects.{number}"
+            # Bushings that a study replaces are judged, too, in a file that no study makes.
             if entry.effect != BUSHING or not self.own_bushings or maker is None:
                 yield from _strangers(entry, name, place, cohort)
             if entry.effect != BUSHING and self.own_bushings:

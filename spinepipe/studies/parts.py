@@ -17,6 +17,7 @@ from pydantic import (
 
 from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
+from spinepipe.documents.names import distinct
 from spinepipe.effects.contract import Array
 from spinepipe.units import (
     COORDINATES,
@@ -152,20 +153,6 @@ class Shift(_InOrder):
     anterior: _Millimetres = Field(default=0.0, description="shift anterior, mm")
     superior: _Millimetres = Field(default=0.0, description="shift superior, mm")
     right: _Millimetres = Field(default=0.0, description="shift to the right, mm")
-
-
-def distinct(names: tuple[str, ...]) -> tuple[str, ...]:
-    """The names as they are.
-
-    Raises
-    ------
-    ValueError
-        For a name that stands there twice.
-    """
-    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
-    if twice:
-        raise ValueError(f"each name once ('{twice[0]}' stands there twice)")
-    return names
 
 
 Item = TypeVar("Item")

@@ -95,7 +95,7 @@ def test_a_written_file_reads_back_the_same(tmp_path: Path) -> None:
         ("rise: 1234.5", "rice: 1.0", r"effects\.1\.values\.rice.*allowed: rise"),
         ("coordinate: left", "direction: left", r"no option 'direction'.*coordinate"),
         ("effect: cubic_for", "effect: cubical_for", r"unknown effect 'cubical_for.*linear_b"),
-        ("tests: [twist]", "tests: [twist, twist]", r"scope\.tests.*'twist' twice"),
+        ("tests: [twist]", "tests: [twist, twist]", r"scope\.tests.*'twist' stands there twice"),
         ("tests: [twist]", "trials: [twist]", r"effects\.1\.scope\.trials"),
         ("cohort: small", "cohort: [small]", "cohort.*string"),
         ("model: for a test", "model: [", "YAML"),

@@ -14,6 +14,7 @@ from pydantic import (
 )
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.names import distinct
 from spinepipe.sensitivity.global_indices.spread import (
     LogNormal,
     LogUniform,
@@ -34,7 +35,6 @@ from spinepipe.studies.parts import (
     PublishedStiffness,
     Tests,
     Weights,
-    distinct,
 )
 from spinepipe.studies.study import Study
 

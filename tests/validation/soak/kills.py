@@ -220,11 +220,11 @@ def _digest(path: Path) -> str:
 
 def _timeless(table: pa.Table) -> bytes | None:
     """A table's rows and notes without processor time; None where it tells none."""
-    rows, names = table.to_pylist(), table.column_names
-    rest = [{key: cell for key, cell in row.items() if key != TELLS_TIME} for row in rows]
-    rest = [row for row in rest if row.get("id") != ROW_OF_TIME]
-    if TELLS_TIME not in names and len(rest) == len(rows):
+    ids = table["id"].to_pylist() if "id" in table.column_names else ()
+    if TELLS_TIME not in table.column_names and ROW_OF_TIME not in ids:
         return None
+    rows = [row for row in table.to_pylist() if row.get("id") != ROW_OF_TIME]
+    rest = [{key: cell for key, cell in row.items() if key != TELLS_TIME} for row in rows]
     told = {key: value for key, value in table.schema.metadata.items() if key != CONTENT.encode()}
     return repr((sorted(told.items()), table.schema.remove_metadata().to_string(), rest)).encode()
 
