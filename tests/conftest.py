@@ -17,7 +17,6 @@ settings.load_profile("same everywhere")
 FULL_FOR_NOW = frozenset(
     [
         "test_stale",
-        "test_plausibility",
         "test_investigation_edges",
         "test_cluster_like",
         "test_damage",
@@ -42,9 +41,7 @@ FULL_FOR_NOW = frozenset(
         "test_discrepancy_run",
         "test_tracking_checks",
         "test_figures",
-        "test_forward_runs",
         "test_tracking_page",
-        "test_fits_with_effects",
         "test_cohort_figures",
         "test_ishigami_run",
         "test_trunk_figures",
@@ -53,7 +50,6 @@ FULL_FOR_NOW = frozenset(
         "test_nuisances",
         "test_against_gould_2024a",
         "test_cli",
-        "test_zeroed_noise",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""
