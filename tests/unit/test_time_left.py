@@ -1,5 +1,5 @@
-"""The time that a run still takes: catches an estimate of one rule told for the whole run, jobs that
-are counted twice, and a clock that stands at what another machine needed."""
+"""The time that a run still takes: catches an estimate of one rule told for the whole run, jobs
+that are counted twice, and a clock that stands at what another machine needed."""
 
 import io
 from pathlib import Path
