@@ -14,10 +14,10 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
-	$(BIN)/snakemake -j$(CORES) all
+	$(BIN)/python -m spinepipe.jobs.if_changed all $(BIN)/snakemake -j$(CORES) all
 
-full: env  ## build the long studies too
-	$(BIN)/snakemake -j$(CORES) full
+full: env  ## build the long studies too, and what takes long of the others
+	$(BIN)/python -m spinepipe.jobs.if_changed full $(BIN)/snakemake -j$(CORES) full
 
 test: dev-env  ## run the tests that a change must pass
 	$(PYTEST) -m "not full"
