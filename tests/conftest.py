@@ -32,9 +32,7 @@ FULL_FOR_NOW = frozenset(
         "test_cohort_analysis",
         "test_grid_run",
         "test_cohort_study",
-        "test_posterior",
         "test_identification_figures",
-        "test_hidden_data",
         "test_sensitivity_figures",
         "test_tracking_findings",
         "test_toy_kind",
@@ -46,10 +44,8 @@ FULL_FOR_NOW = frozenset(
         "test_ishigami_run",
         "test_trunk_figures",
         "test_discrepancy_page",
-        "test_wrong_inputs",
         "test_nuisances",
         "test_against_gould_2024a",
-        "test_cli",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""

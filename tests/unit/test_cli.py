@@ -428,8 +428,11 @@ def test_a_broken_library_is_one_message(
     assert "`spinepipe doctor` says what is missing" in err
 
 
-def test_as_a_program() -> None:
-    command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check"]
+@pytest.mark.parametrize(
+    "named", [["linear_spines"], pytest.param([], marks=pytest.mark.full)], ids=["one", "all"]
+)
+def test_what_is_shipped_is_sound_to_the_program(named: list[str]) -> None:
+    command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check", *named]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 

@@ -224,7 +224,11 @@ FACTORS = np.array([1.5, 0.6, 1.0, 1.35, 1.0, 1.0])
 """Of stiffness, between a model and what was measured."""
 
 
-@COURSES
+@pytest.mark.parametrize(
+    "course",
+    [QUASI_STATIC, pytest.param(RAMPED, marks=pytest.mark.full)],
+    ids=["constant", "ramped"],
+)
 def test_a_truth_made_by_opensim_comes_back(course: Course) -> None:
     """CPodes' end of the segment with other stiffness, within 1 %."""
     chain = pushed_segment()

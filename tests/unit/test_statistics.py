@@ -241,6 +241,7 @@ def test_chi_squared_without_degree_of_freedom_points_to_kolmogorov_smirnov() ->
     assert "Kolmogorov-Smirnov" in found.message
 
 
+@pytest.mark.full
 def test_chi_squared_rejects_true_normals_as_often_as_it_says() -> None:
     draws = np.random.default_rng(1).normal(3.0, 0.2, size=(600, 200))
     rejected = np.mean([chi_squared_normality(values).p < 0.05 for values in draws])
@@ -273,12 +274,12 @@ def test_lilliefors_agrees_with_simulation_by_another_library() -> None:
     values = np.random.default_rng(4).gamma(4.0, size=30)
     found = lilliefors_normality(values)
     simulated = stats.goodness_of_fit(
-        stats.norm, values, statistic="ks", n_mc_samples=4000, rng=np.random.default_rng(5)
+        stats.norm, values, statistic="ks", n_mc_samples=1000, rng=np.random.default_rng(5)
     )
     # scipy fits by maximum likelihood: SD with n instead of n - 1, hence the small difference
     assert found.statistic == pytest.approx(simulated.statistic, rel=0.03)
     assert 0.02 < simulated.pvalue < 0.9
-    assert found.p == pytest.approx(simulated.pvalue, abs=0.04)
+    assert found.p == pytest.approx(simulated.pvalue, abs=0.05)
 
 
 def test_lilliefors_and_kolmogorov_smirnov_differ_in_p_only() -> None:
@@ -376,6 +377,7 @@ def test_exchanging_the_two_mirrors_the_agreement() -> None:
     assert other.proportional.effect == pytest.approx(-one.proportional.effect)
 
 
+@pytest.mark.full
 def test_the_intervals_cover_what_they_say() -> None:
     """Few pairs, where the approximation for many would miss: 95 % of true values inside."""
     draws = np.random.default_rng(3).normal(0.5, 2.0, size=(1000, 6))
