@@ -51,14 +51,25 @@ FULL_FOR_NOW = frozenset(
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""
 
 
+SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
+"""Long files whose tests share nothing: each test may go to another worker."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first. Those that share projects go to any worker, all others file by file."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Slow tests and long files first, so that none of them runs alone at the end.
+
+    Tests that share projects, and those of long files, go to any worker, all others file by file.
+    """
+
+    def short(item: pytest.Item) -> bool:
+        return item.get_closest_marker("slow") is None and item.path.stem not in SPREAD
+
+    items.sort(key=short)
     for item in items:
         if item.path.stem in FULL_FOR_NOW:
             item.add_marker(pytest.mark.full)
-        if "shared" not in getattr(item, "fixturenames", ()):
+        if "shared" not in getattr(item, "fixturenames", ()) and item.path.stem not in SPREAD:
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 

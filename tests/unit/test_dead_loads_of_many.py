@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Neutral
@@ -24,7 +24,7 @@ LOADS: list[tuple[str, dict[str, Any]]] = [
     ("segment_weight", {"where": "each"}),
     ("segment_weight", {"where": "top"}),
 ]
-EVERY = pytest.mark.parametrize(("name", "options"), LOADS, ids=str)
+EVERY = sweep("name, options", LOADS, str)
 
 
 def of(name: str, options: dict[str, Any]) -> DeadLoad:
