@@ -1,4 +1,7 @@
-"""Equilibria against OpenSim, pinocchio and closed forms; loads against energies; stability."""
+"""Equilibria against OpenSim, pinocchio and closed forms; loads against energies; stability.
+
+Catches an equilibrium that differs from two other engines', and a tipping one called stable.
+"""
 
 from dataclasses import replace
 

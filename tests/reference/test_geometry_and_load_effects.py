@@ -2,6 +2,8 @@
 
 A displaced joint centre is an OpenSim joint that stands there, a tilt of axes a joint tilted so, a
 left-out weight a heavier body, a follower load a path actuator under constant tension.
+
+Catches an effect that is not the real thing it stands for.
 """
 
 from collections.abc import Callable

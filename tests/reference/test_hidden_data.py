@@ -1,4 +1,7 @@
-"""The cohorts with a hidden truth: spinepipe reads them, and without effects it moves like them."""
+"""The cohorts with a hidden truth: spinepipe reads them, and without effects it moves like them.
+
+Catches made-up cohorts whose truth is not what they say, so that tests on them prove nothing.
+"""
 
 import json
 from dataclasses import replace

@@ -2,6 +2,8 @@
 
 OpenSim's expressions are written here from the published laws with the roundings the effects
 state, in OpenSim's own language; nothing of the effects is asked for them.
+
+Catches a law that another engine solves to another pose.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""The exported .osim file, opened in OpenSim, against spinepipe and against pinocchio."""
+"""The exported .osim file, opened in OpenSim, against spinepipe and against pinocchio.
+
+Catches an exported model that OpenSim moves otherwise.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

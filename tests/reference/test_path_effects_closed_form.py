@@ -1,4 +1,7 @@
-"""Hysteresis and creep against their differential equations, solved by scipy for one joint."""
+"""Hysteresis and creep against their differential equations, solved by scipy for one joint.
+
+Catches hysteresis or creep that is not its differential equation's.
+"""
 
 import numpy as np
 from scipy.integrate import solve_ivp

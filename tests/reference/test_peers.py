@@ -1,4 +1,7 @@
-"""The peers against closed forms and against each other, before anything is measured by them."""
+"""The peers against closed forms and against each other, before anything is measured by them.
+
+Catches a peer that is wrong itself, by which agreement would mean nothing.
+"""
 
 from dataclasses import replace
 

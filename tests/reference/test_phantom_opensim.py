@@ -1,6 +1,8 @@
 """The phantom's true motion is OpenSim's: geometry, loads and truth give the same poses there.
 
 Generator, peer and spinepipe share no mechanics; spinepipe is compared with the same motion too.
+
+Catches a phantom whose motion is not that of its loads, or that is read wrongly.
 """
 
 from functools import cache

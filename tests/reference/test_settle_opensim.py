@@ -1,4 +1,7 @@
-"""Settling in time against OpenSim's implicit integrator, and its end against the equilibrium."""
+"""Settling in time against OpenSim's implicit integrator, and its end against the equilibrium.
+
+Catches a way or end of settling that another integrator does not take.
+"""
 
 from dataclasses import replace
 

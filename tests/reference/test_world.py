@@ -4,6 +4,8 @@ Every chain has all six joint types, tilted frames and full inertia tensors. Bot
 double precision, so they differ by rounding only: some hundred operations of 1e-16 each, on
 numbers that differ in size between rows. Errors are therefore held against the largest number of
 the same kind (translations, rotations), not entry by entry.
+
+Catches a wrong mass matrix, bias or Jacobian of the loaded chain.
 """
 
 from dataclasses import replace

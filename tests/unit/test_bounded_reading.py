@@ -1,4 +1,7 @@
-"""Files that people write are read within bounds: each is refused with its place, none holds up."""
+"""Files that people write are read within bounds: each is refused with its place, none holds up.
+
+Catches a reader that hangs, swells or runs what a file holds, and a fault told without its place.
+"""
 
 from collections.abc import Callable
 from importlib import import_module

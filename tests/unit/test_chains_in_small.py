@@ -1,4 +1,7 @@
-"""Chains on densities that are written down: coordinates, starts, lengths, what is believed."""
+"""Chains on densities that are written down: coordinates, starts, lengths, what is believed.
+
+Catches a sampler's wrong step, Jacobian of coordinates or test of convergence.
+"""
 
 from collections.abc import Sequence
 from types import SimpleNamespace

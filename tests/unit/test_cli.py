@@ -1,4 +1,7 @@
-"""The command line: what it prints, what it writes, how it ends."""
+"""The command line: what it prints, what it writes, how it ends.
+
+Catches a command that prints another answer, writes elsewhere or ends well where it should not.
+"""
 
 import shutil
 import subprocess

@@ -1,4 +1,7 @@
-"""Every malformed cohort is refused with file, row, column and a sentence that helps."""
+"""Every malformed cohort is refused with file, row, column and a sentence that helps.
+
+Catches a malformed cohort that is accepted, or a message that names another place.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""``supports.csv``: what a rig fixes, as the engine gets it, as it is read, and what is refused."""
+"""``supports.csv``: what a rig fixes, as the engine gets it, as it is read, and what is refused.
+
+Catches a rig's fixed coordinates that reach the engine wrongly or are left out unsaid.
+"""
 
 from itertools import product
 from pathlib import Path

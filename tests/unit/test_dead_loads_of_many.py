@@ -1,4 +1,7 @@
-"""Dead loads of many tests at once are those of each alone, and slopes are differences."""
+"""Dead loads of many tests at once are those of each alone, and slopes are differences.
+
+Catches loads of one test that act in another, and a wrong tangent of dead loads.
+"""
 
 from typing import Any
 

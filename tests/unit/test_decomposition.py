@@ -2,6 +2,8 @@
 
 Tolerances: rounding of a backward stable decomposition is a few times the size of the matrix times
 1.1e-16 of its largest singular value; `LEAST` is some hundred times that of the largest one here.
+
+Catches a decomposition that fails or is wrong on matrices where LAPACK gives up.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,4 +1,7 @@
-"""Disks that take no more: what was there stays, nothing half is left, and a sentence says so."""
+"""Disks that take no more: what was there stays, nothing half is left, and a sentence says so.
+
+Catches half a file, or a lost old one, where the disk takes no more.
+"""
 
 import errno
 import resource

@@ -1,4 +1,7 @@
-"""The mark told beforehand is the one a job writes, and hangs on no more than the job reads."""
+"""The mark told beforehand is the one a job writes, and hangs on no more than the job reads.
+
+Catches stale files that are joined, and files made anew though nothing of theirs changed.
+"""
 
 import re
 import shutil

@@ -1,4 +1,7 @@
-"""Numbers of the field against closed forms, whatever the law is called."""
+"""Numbers of the field against closed forms, whatever the law is called.
+
+Catches ranges, stiffness and breaks that hang on the name of a law.
+"""
 
 from collections.abc import Mapping
 from typing import Any

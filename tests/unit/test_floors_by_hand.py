@@ -1,4 +1,7 @@
-"""Floors and limits of indices where they can be worked out: closed forms, numbers, edges."""
+"""Floors and limits of indices where they can be worked out: closed forms, numbers, edges.
+
+Catches a floor or limit of indices that is off at its edge.
+"""
 
 from dataclasses import replace
 

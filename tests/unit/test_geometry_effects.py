@@ -1,4 +1,7 @@
-"""Effects on geometry: where a joint's laws act, worked by hand, and all their derivatives."""
+"""Effects on geometry: where a joint's laws act, worked by hand, and all their derivatives.
+
+Catches a displaced law that acts elsewhere, and any wrong derivative of it.
+"""
 
 from itertools import product
 

@@ -1,4 +1,7 @@
-"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, the dummy."""
+"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, the dummy.
+
+Catches an index that differs from SALib's, and failed runs that count.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""No name and no text of anybody becomes markup, in page or figures of any kind of study."""
+"""No name and no text of anybody becomes markup, in page or figures of any kind of study.
+
+Catches a name that becomes markup in a page or a figure.
+"""
 
 import json
 import re

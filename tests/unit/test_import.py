@@ -2,6 +2,8 @@
 
 The files are made by a generator that knows nothing of the library (tests/generators/
 testing_machine.py); true values come from its closed forms.
+
+Catches a machine's file read in a wrong unit, sign, zero or cycle.
 """
 
 import json

@@ -1,4 +1,7 @@
-"""Instruments that follow other joints or drift: worked by hand, slopes, stack beside engine."""
+"""Instruments that follow other joints or drift: worked by hand, slopes, stack beside engine.
+
+Catches readings that follow the wrong joint, and derivatives lost between stack and engine.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,7 @@
-"""What the product runs on may be passed on with it; who needs a judgement has one that holds."""
+"""What the product runs on may be passed on with it; who needs a judgement has one that holds.
+
+Catches a new dependency that may not be passed on.
+"""
 
 import re
 from importlib.metadata import PathDistribution, distribution

@@ -1,4 +1,7 @@
-"""Loops of load and rotation against closed forms, and their intervals against sampled noise."""
+"""Loops of load and rotation against closed forms, and their intervals against sampled noise.
+
+Catches hysteresis, neutral zone or stiffness read off a loop wrongly, and intervals too short.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Marker bias: what is reported against rotations multiplied out, in and out of tests' scopes."""
+"""Marker bias: what is reported against rotations multiplied out, in and out of tests' scopes.
+
+Catches a bias turned about the wrong axis, or reported outside of its tests.
+"""
 
 from dataclasses import replace
 

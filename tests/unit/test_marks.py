@@ -1,4 +1,7 @@
-"""Every kind of result file carries its mark and gives it back; other files have none."""
+"""Every kind of result file carries its mark and gives it back; other files have none.
+
+Catches a file without its mark, and a damaged one that is believed.
+"""
 
 import io
 import json

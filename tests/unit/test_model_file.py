@@ -1,4 +1,7 @@
-"""The model file: effects by name with scope and values, refused when anything in it is off."""
+"""The model file: effects by name with scope and values, refused when anything in it is off.
+
+Catches a model file that is accepted though it is wrong, or written otherwise than read.
+"""
 
 import re
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Motion that no load makes: the unit that explains it in all joints is named."""
+"""Motion that no load makes: the unit that explains it in all joints is named.
+
+Catches a wrong unit of all motion that is named wrongly or not at all.
+"""
 
 from math import pi
 

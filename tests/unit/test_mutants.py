@@ -1,4 +1,7 @@
-"""Mutation testing: what is drawn, how it is run, what is counted."""
+"""Mutation testing: what is drawn, how it is run, what is counted.
+
+Catches mutants drawn twice, run wrongly or counted as seen.
+"""
 
 import ast
 import csv

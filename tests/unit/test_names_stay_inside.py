@@ -1,4 +1,7 @@
-"""No name and no link leads out of the folder it belongs to."""
+"""No name and no link leads out of the folder it belongs to.
+
+Catches a name or link by which a job reads or writes outside of its folder.
+"""
 
 import os
 from collections.abc import Iterator

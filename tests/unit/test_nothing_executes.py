@@ -1,4 +1,7 @@
-"""Nothing that lies on disk as data is executed: no file of the library knows how (0036)."""
+"""Nothing that lies on disk as data is executed: no file of the library knows how (0036).
+
+Catches a library call that runs what a data file holds.
+"""
 
 import ast
 import pickle

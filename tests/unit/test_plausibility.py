@@ -1,4 +1,7 @@
-"""Cohorts that are sound cell by cell and wrong: told at their place, and good ones never."""
+"""Cohorts that are sound cell by cell and wrong: told at their place, and good ones never.
+
+Catches a rule of `check` that sees a mistake no more, or doubts good data.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""Spines held in place: against a planar chain written down on its own, virtual work, mirrors."""
+"""Spines held in place: against a planar chain written down on its own, virtual work, mirrors.
+
+Catches spines held in place that move, or whose holding loads are wrong.
+"""
 
 from dataclasses import replace
 from functools import cached_property

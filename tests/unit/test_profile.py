@@ -1,4 +1,7 @@
-"""Regions of fitted unknowns against closed forms and plain scans of the cost."""
+"""Regions of fitted unknowns against closed forms and plain scans of the cost.
+
+Catches a region too narrow, and an end that was not looked for.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,7 @@
-"""Fits to settling runs: how loads come on, derivatives of the end, and truth that returns."""
+"""Fits to settling runs: how loads come on, derivatives of the end, and truth that returns.
+
+Catches wrong derivatives of the end of a run, and a course that is not the given one.
+"""
 
 from dataclasses import replace
 

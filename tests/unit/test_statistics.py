@@ -1,4 +1,7 @@
-"""Statistics against published examples, hand-worked cases and closed forms."""
+"""Statistics against published examples, hand-worked cases and closed forms.
+
+Catches a statistic or p-value that is not the published one.
+"""
 
 import math
 from itertools import pairwise, permutations

@@ -1,4 +1,7 @@
-"""Tests of values exactly where they change their way: counts, sizes, rounding, signs."""
+"""Tests of values exactly where they change their way: counts, sizes, rounding, signs.
+
+Catches a test that takes the wrong way exactly at its threshold.
+"""
 
 import numpy as np
 import pytest

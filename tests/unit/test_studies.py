@@ -1,4 +1,7 @@
-"""Studies: defaults, places, and every fault of a study file located and explained."""
+"""Studies: defaults, places, and every fault of a study file located and explained.
+
+Catches a study file's fault that is accepted or told at another place.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path

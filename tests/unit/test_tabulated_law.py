@@ -1,4 +1,7 @@
-"""The tabulated law: straight pieces through its knots, corners as running means, derivatives."""
+"""The tabulated law: straight pieces through its knots, corners as running means, derivatives.
+
+Catches a law that misses its knots, or a wrong derivative between them.
+"""
 
 from typing import Any
 

@@ -1,5 +1,8 @@
 """The shipped cohort ``tracking_phantom`` and what makes it: reproduced, apart from spinepipe,
-and moved as mechanics wants it."""
+and moved as mechanics wants it.
+
+Catches shipped data that their generator no longer makes, and a generator that uses the library.
+"""
 
 import ast
 from functools import cache

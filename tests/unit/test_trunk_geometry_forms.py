@@ -1,4 +1,7 @@
-"""The forms of a cohort's own muscles fit the generic male and name what is wrong."""
+"""The forms of a cohort's own muscles fit the generic male and name what is wrong.
+
+Catches a muscle form that accepts what does not fit.
+"""
 
 from pathlib import Path
 

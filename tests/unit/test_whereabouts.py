@@ -2,6 +2,8 @@
 
 Every project that tests build in one run of theirs is looked through as soon as it is there
 (`small_project`); here stands that the look sees what it is for.
+
+Catches names of machines, people or folders in results.
 """
 
 import base64

@@ -1,4 +1,7 @@
-"""Projects spoilt in one place each: a sample of what `make validate` tries (wrong_inputs)."""
+"""Projects spoilt in one place each: a sample of what `make validate` tries (wrong_inputs).
+
+Catches a spoilt project that passes, ends in a stack, or is told of at another place.
+"""
 
 import random
 from collections import defaultdict
