@@ -15,6 +15,7 @@ import importlib
 import multiprocessing
 import os
 import queue
+import resource
 import signal
 import sys
 import threading
@@ -30,6 +31,9 @@ from typing import Any
 _JOBS = Path(__file__).resolve().parent
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
+_MOST_MEMORY_KB = 500_000
+"""A worker that once held more than this serves no further job: its memory would stay taken."""
+
 _REMEDIES = {
     errno.ENOSPC: "no space is left on the disk of {folder}; free some space",
     errno.EDQUOT: "your disk quota is used up in {folder}; free some space",
@@ -99,10 +103,13 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
     try:
         worker.connection.send((function, arguments))
         wait([worker.connection, worker.process.sentinel])
-        failure = worker.connection.recv()
+        failure, memory_kb = worker.connection.recv()
     except (EOFError, OSError):
         _fail(job, log, _fate(worker))
-    _idle.put(worker)
+    if memory_kb < _MOST_MEMORY_KB:
+        _idle.put(worker)
+    else:
+        worker.connection.close()  # at which it ends: what a large job left behind goes with it
     if failure is not None:
         written = arguments.get("output") or arguments.get("svg") or ""
         folder = os.path.dirname(failure.path or str(written)) or "."
@@ -185,7 +192,8 @@ def _serve(connection: Connection) -> None:
             function, arguments = connection.recv()
         except EOFError:
             return
-        connection.send(_answer(function, arguments))
+        failure = _answer(function, arguments)
+        connection.send((failure, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 
 def _end_with_parent() -> None:
