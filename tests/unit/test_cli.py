@@ -3,7 +3,6 @@
 Catches a command that prints another answer, writes elsewhere or ends well where it should not.
 """
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +15,7 @@ import pytest
 from chain_cases import JOINTS, Chains
 from cohort_cases import swap, text, without, write
 from cohort_edge_cases import A
+from mistaken_cohorts import good
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
@@ -57,12 +57,10 @@ def test_check_tells_how_much_the_data_tell(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], free: str
 ) -> None:
     """Moments, and rotations alone were read: translations asked for are warned of."""
-    shutil.copytree(
-        ROOT / "config/cohorts/t12s1_phantom", tmp_path / "config/cohorts/t12s1_phantom"
-    )
-    motion = pd.read_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv")
+    file = good("t12s1_phantom", tmp_path / "config/cohorts") / "motion.csv"
+    motion = pd.read_csv(file)
     motion[["anterior_mm", "superior_mm", "right_mm"]] = np.nan
-    motion.to_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv", index=False)
+    motion.to_csv(file, index=False)
     (tmp_path / "config/studies").mkdir()
     asked = f"calibration: {{free: {free}}}\n" if free else ""
     (tmp_path / "config/studies/pose.yaml").write_text(PURE_MOMENTS + asked)

@@ -75,7 +75,7 @@ def as_it_is() -> Iterator[list[str]]:
     yield []
 
 
-either_way = pytest.mark.parametrize("lapack", [as_it_is, divide_and_conquer_gives_up])
+either_way = sweep("lapack", [as_it_is, divide_and_conquer_gives_up])
 
 
 def made(rows: int, columns: int, rank: int, zeros: int, seed: int) -> Array:
@@ -93,11 +93,7 @@ SHAPES = [
 ]
 """Tall, wide and square; rows, columns, rank, zero columns."""
 
-of_each_shape = pytest.mark.parametrize(
-    "matrix",
-    [made(*shape, seed) for seed, shape in enumerate(SHAPES)],
-    ids=["-".join(map(str, shape)) for shape in SHAPES],
-)
+of_each_shape = sweep("matrix", [made(*shape, seed) for seed, shape in enumerate(SHAPES)])
 
 
 def assert_decomposed(matrix: Array) -> None:

@@ -115,7 +115,7 @@ def quick(generator: str) -> tuple[mujoco.MjModel, Motion]:
     return built(person, generator == "muscles"), motion
 
 
-@pytest.mark.parametrize("generator", ["torques", "muscles"])
+@pytest.mark.parametrize("generator", ["torques", pytest.param("muscles", marks=pytest.mark.full)])
 def test_loads_of_the_motion_are_those_that_moved_it(generator: str) -> None:
     """By the engine's inverse dynamics of the written motion; its damping is its own.
 
