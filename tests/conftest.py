@@ -1,16 +1,22 @@
 """What holds for all tests: in which order they run, and projects that several look at."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from small_project import Project, Shared, copy_project
+from small_project import Project, Shared
+from snakemake_starts import SnakemakeStarts
 
 settings.register_profile("same everywhere", derandomize=True, deadline=None, database=None)
 settings.load_profile("same everywhere")
 """Drawn examples are the same on each machine, and a slow one fails none of them."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Starts of Snakemake are counted."""
+    config.pluginmanager.register(SnakemakeStarts())
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -33,32 +39,35 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
     projects.check()
 
 
-@pytest.fixture
-def new_project(tmp_path: Path) -> Callable[[int], Project]:
-    """Makes a project without results, its study `small` with so many poses."""
-
-    def make(poses: int) -> Project:
-        project = copy_project(tmp_path / "project")
-        project.write_study("small", poses)
-        return project
-
-    return make
-
-
 @pytest.fixture(scope="session")
-def finished(shared: Shared) -> Project:
-    """A project whose study `small` (6 poses) has been computed; not to be changed."""
+def eight(shared: Shared) -> Project:
+    """A project whose studies, one of each kind, have been computed at once; not to be changed."""
 
     def build(folder: Path) -> Project:
-        project = copy_project(folder)
-        project.write_study("small", poses=6)
+        from small_studies import eight_kinds
+
+        project = eight_kinds(folder)
         project.run()
         return project
 
-    return shared.project("finished", build)
+    return shared.project("eight", build)
+
+
+@pytest.fixture(scope="session")
+def toy(shared: Shared) -> Project:
+    """A project with a kind more than there are, its study computed; not to be changed."""
+
+    def build(folder: Path) -> Project:
+        from toy import toy_project
+
+        project = toy_project(folder)
+        project.run()
+        return project
+
+    return shared.project("toy", build)
 
 
 @pytest.fixture
-def project(finished: Project, tmp_path: Path) -> Project:
+def toy_copy(toy: Project, tmp_path: Path) -> Project:
     """The same, for one test to change."""
-    return finished.copy(tmp_path / "project")
+    return toy.copy(tmp_path / "project")
