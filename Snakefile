@@ -40,10 +40,10 @@ rule all:
         everything(SELECTION.studies),
 
 
-# The long studies of config.yaml, read only when asked for.
+# The long studies of config.yaml, read only when asked for, and what takes long of the others.
 rule full:
     input:
-        lambda wildcards: everything(SELECTION.full),
+        lambda wildcards: everything(SELECTION.studies + SELECTION.full, full=True),
 
 
 onstart:
