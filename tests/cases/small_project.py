@@ -190,12 +190,16 @@ def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
     return {name for name, time in after.items() if before.get(name) != time}
 
 
-def copy_project(folder: Path) -> Project:
-    """The project without results and with nothing selected but a study `small`."""
-    # Not above: it brings most of the library along, which few tests need.
-    from machine_code import of_joints
+def copy_project(folder: Path, solves: bool = True) -> Project:
+    """The project without results and with nothing selected but a study `small`.
 
-    of_joints()
+    solves : whether its studies will solve anything, and are to find compiled loops.
+    """
+    if solves:
+        # Not above: it brings most of the library along, which few tests need.
+        from machine_code import of_joints
+
+        of_joints()
     folder.mkdir(parents=True)
     for part in _PARTS:
         source = _ROOT / part

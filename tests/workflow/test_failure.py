@@ -94,13 +94,17 @@ def ended(pid: int, start: float) -> bool:
     return not process.is_running() or process.create_time() != start
 
 
-def test_an_unsound_cohort_is_told_before_anything_runs(toy_copy: Project) -> None:
+def test_an_unsound_cohort_or_study_is_told_before_anything_runs(toy_copy: Project) -> None:
     shutil.rmtree(toy_copy.path("results"))
-    joints = toy_copy.path("config/cohorts/stack/joints.csv")
-    joints.write_text(joints.read_text().replace("b,L2L3,0,36,", "b,L2L3,0,high,"))
+    toy_copy.edit("config/cohorts/stack/joints.csv", "b,L2L3,0,36,", "b,L2L3,0,high,")
+    text = toy_copy.path("config/studies/counted.yaml").read_text()
+    other = text.replace("study: counted", "study: other").replace("times: 2", "times: 0")
+    toy_copy.path("config/studies/other.yaml").write_text(other)
+    toy_copy.edit("config/config.yaml", "[counted]", "[counted, other]")
     done = toy_copy.snakemake("-j2", "all")
     assert done.returncode != 0
-    assert "joints.csv" in done.stdout
+    for told in ("joints.csv", "high", "other.yaml", "times", "greater than or equal to 1"):
+        assert told in done.stdout, told
     assert "Traceback" not in done.stdout
     assert not toy_copy.path("results").exists()
 

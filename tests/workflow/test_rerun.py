@@ -12,6 +12,7 @@ import planted
 import pytest
 from small_project import Project, written
 from small_studies import SMALL
+from toy import add_kind
 
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of, kind_of
@@ -24,16 +25,19 @@ BATCH = "global_sensitivity/jobs/responses/specimen=b/batch=00002.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
 """Lost files."""
 
-UNTOUCHED = ("discrepancy", "scoliosis", "trunk_loads")
+UNTOUCHED = ("scoliosis", "trunk_loads")
 
 
 def made_of(project: Project, *tables: str) -> set[str]:
     """Tables, figures and report of joint poses that hang on any of these tables, but they."""
     files, reached = files_of(*check(project.folder, POSES)), set(tables)
-    jobs = [job for job in kind_of(POSES).analyses if set(job.writes) <= set(files.tables)]
+    tables_of_all = set(files.tables_of(full=False))
+    jobs = [job for job in kind_of(POSES).analyses if set(job.writes) <= tables_of_all]
     for _ in jobs:
         reached |= {name for job in jobs if reached & set(job.reads) for name in job.writes}
-    figures = [name for name in files.figures if reached & set(files.figure(name).tables)]
+    figures = [
+        name for name in files.figures(full=False) if reached & set(files.figure(name).tables)
+    ]
     return {
         *(f"{POSES}/{name}.parquet" for name in reached - set(tables)),
         *(f"{POSES}/figures/{name}.{kind}" for name in figures for kind in ("svg", "png")),
@@ -49,17 +53,24 @@ def of_jobs(files: set[str]) -> set[str]:
 def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
     eight: Project, tmp_path: Path
 ) -> None:
-    """A change in each of five studies, none in three, and a study more; pickles beside all."""
+    """A change in each of five studies, none in two; a study, a kind, an effect more; pickles.
+
+    The search alone tries each effect that there is.
+    """
     project = eight.copy(tmp_path / "project")
     frames, simulate = project.path("spinepipe/frames.py"), project.job(POSES, "simulate")
     frames.write_text(f'"""Other words."""\n{frames.read_text()}\n# a comment\n')
     simulate.write_text(simulate.read_text() + "\n_UNUSED = 1\n")
     project.edit("config/studies/cohort_stiffness.yaml", "significance: 0.05", "significance: 0.01")
     project.edit("config/cohorts/stack/joints.csv", "b,L2L3,0,36,", "b,L2L3,0,37,")
+    effects = project.path("spinepipe/effects")
+    another = (effects / "hysteresis.py").read_text().replace('"hysteresis"', '"lately_added"')
+    (effects / "lately_added.py").write_text(another)
     for lost in (BATCH, MOTION):
         project.path(f"results/{lost}").unlink()
     project.write_study("other", poses=2)
-    project.edit("config/config.yaml", "studies: [", "studies: [other, ")
+    add_kind(project)
+    project.edit("config/config.yaml", "studies: [", "studies: [other, counted, ")
     sprung = tmp_path / "sprung"
     planted.plant(project.folder, sprung)
     left = project.path(f"results/{POSES}/.best.json.{2**30}")  # of a process that is no more
@@ -75,7 +86,10 @@ def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
     for kind in UNTOUCHED:
         assert of[kind] == set(), kind
     assert "other/report.html" in planned
-    assert {Path(name).parts[0] for name in planned} == {"other", *SMALL} - set(UNTOUCHED)
+    assert "discrepancy/discrepancy/verdict.json" in of["discrepancy"]
+    assert {Path(name).parts[0] for name in planned} == {"other", "counted", *SMALL} - set(
+        UNTOUCHED
+    )
     all_simulations = {name for name in before if name.startswith(SIMULATIONS)}
     assert len(all_simulations) == 4 * 3
     assert of_jobs(of[POSES]) == all_simulations
