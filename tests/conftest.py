@@ -2,12 +2,13 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from small_project import Project, Shared, copy_project
+from small_project import Project, Shared
+from snakemake_starts import SnakemakeStarts
 
 settings.register_profile("same everywhere", derandomize=True, deadline=None, database=None)
 settings.load_profile("same everywhere")
@@ -16,32 +17,18 @@ settings.load_profile("same everywhere")
 
 FULL_FOR_NOW = frozenset(
     [
-        "test_stale",
         "test_investigation_edges",
-        "test_cluster_like",
-        "test_damage",
-        "test_global_sensitivity_run",
         "test_scoliosis_figures",
-        "test_failure",
-        "test_rerun",
-        "test_tracking_run",
         "test_tracking_figures",
-        "test_results",
-        "test_search_run",
         "test_posterior_job",
         "test_cohort_analysis",
-        "test_grid_run",
-        "test_cohort_study",
         "test_identification_figures",
         "test_sensitivity_figures",
         "test_tracking_findings",
-        "test_toy_kind",
-        "test_discrepancy_run",
         "test_tracking_checks",
         "test_figures",
         "test_tracking_page",
         "test_cohort_figures",
-        "test_ishigami_run",
         "test_trunk_figures",
         "test_discrepancy_page",
         "test_nuisances",
@@ -53,6 +40,11 @@ FULL_FOR_NOW = frozenset(
 
 SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
 """Long files whose tests share nothing: each test may go to another worker."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Starts of Snakemake are counted."""
+    config.pluginmanager.register(SnakemakeStarts())
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -92,32 +84,35 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
     projects.check()
 
 
-@pytest.fixture
-def new_project(tmp_path: Path) -> Callable[[int], Project]:
-    """Makes a project without results, its study `small` with so many poses."""
-
-    def make(poses: int) -> Project:
-        project = copy_project(tmp_path / "project")
-        project.write_study("small", poses)
-        return project
-
-    return make
-
-
 @pytest.fixture(scope="session")
-def finished(shared: Shared) -> Project:
-    """A project whose study `small` (6 poses) has been computed; not to be changed."""
+def eight(shared: Shared) -> Project:
+    """A project whose studies, one of each kind, have been computed at once; not to be changed."""
 
     def build(folder: Path) -> Project:
-        project = copy_project(folder)
-        project.write_study("small", poses=6)
+        from small_studies import eight_kinds
+
+        project = eight_kinds(folder)
         project.run()
         return project
 
-    return shared.project("finished", build)
+    return shared.project("eight", build)
+
+
+@pytest.fixture(scope="session")
+def toy(shared: Shared) -> Project:
+    """A project with a kind more than there are, its study computed; not to be changed."""
+
+    def build(folder: Path) -> Project:
+        from toy import toy_project
+
+        project = toy_project(folder)
+        project.run()
+        return project
+
+    return shared.project("toy", build)
 
 
 @pytest.fixture
-def project(finished: Project, tmp_path: Path) -> Project:
+def toy_copy(toy: Project, tmp_path: Path) -> Project:
     """The same, for one test to change."""
-    return finished.copy(tmp_path / "project")
+    return toy.copy(tmp_path / "project")
