@@ -1,6 +1,7 @@
-"""What holds for all tests: in which order they run, and projects that several look at."""
+"""What holds for all tests: in which order they run, shared projects, what the last line says."""
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,13 +14,71 @@ settings.load_profile("same everywhere")
 """Drawn examples are the same on each machine, and a slow one fails none of them."""
 
 
+FULL_FOR_NOW = frozenset(
+    [
+        "test_stale",
+        "test_investigation_edges",
+        "test_cluster_like",
+        "test_damage",
+        "test_global_sensitivity_run",
+        "test_scoliosis_figures",
+        "test_failure",
+        "test_rerun",
+        "test_tracking_run",
+        "test_tracking_figures",
+        "test_results",
+        "test_search_run",
+        "test_posterior_job",
+        "test_cohort_analysis",
+        "test_grid_run",
+        "test_cohort_study",
+        "test_identification_figures",
+        "test_sensitivity_figures",
+        "test_tracking_findings",
+        "test_toy_kind",
+        "test_discrepancy_run",
+        "test_tracking_checks",
+        "test_figures",
+        "test_tracking_page",
+        "test_cohort_figures",
+        "test_ishigami_run",
+        "test_trunk_figures",
+        "test_discrepancy_page",
+        "test_nuisances",
+        "test_against_gould_2024a",
+    ]
+)
+"""Files of 50 s and more: `full` until each is made light. The list must become empty."""
+
+
+SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
+"""Long files whose tests share nothing: each test may go to another worker."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first. Those that share projects go to any worker, all others file by file."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Slow tests and long files first, so that none of them runs alone at the end.
+
+    Tests that share projects, and those of long files, go to any worker, all others file by file.
+    """
+
+    def short(item: pytest.Item) -> bool:
+        return item.get_closest_marker("slow") is None and item.path.stem not in SPREAD
+
+    items.sort(key=short)
     for item in items:
-        if "shared" not in getattr(item, "fixturenames", ()):
+        if item.path.stem in FULL_FOR_NOW:
+            item.add_marker(pytest.mark.full)
+        if "shared" not in getattr(item, "fixturenames", ()) and item.path.stem not in SPREAD:
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line that says what could not be tested here, and why."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(one.longrepr[2].removeprefix("Skipped: ") for one in skipped)
+    told = "; ".join(f"{count} ({reason})" for reason, count in sorted(reasons.items()))
+    terminalreporter.write_line(f"not tested here: {told or 'nothing was skipped'}")
 
 
 @pytest.fixture(scope="session")
