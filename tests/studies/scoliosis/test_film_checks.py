@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import Document
@@ -120,8 +121,8 @@ def unbent(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
+@sweep(
+    "change, words",
     [
         (radians, ["film erect", "radians? multiply by 57.3"]),
         (mirrored("right_bending"), ["film right_bending", "mirrored"]),
