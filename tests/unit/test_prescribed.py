@@ -296,8 +296,10 @@ def test_steps_that_stand_together_are_those_of_each_alone() -> None:
             np.testing.assert_allclose(one.step, alone.step, rtol=1e-9, atol=1e-12)
     singular = HeldChain(model(), nothing, rotations())
     none, one = newton_steps([Trial(singular, poses[3], pushes[3], wanted, 0.0), trials[0]])
-    assert none is not None and np.isnan(none.step).all()
-    assert one is not None and np.isfinite(one.step).all()
+    assert none is not None
+    assert np.isnan(none.step).all()
+    assert one is not None
+    assert np.isfinite(one.step).all()
 
 
 def test_effects_other_than_joint_laws_are_refused() -> None:
