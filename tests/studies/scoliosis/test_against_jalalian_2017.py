@@ -3,6 +3,9 @@
 Expected values are worked by hand from small invented tables and from the numbers of the paper,
 entered here a second time; where the lists of its numbers lie beside this repository, every row of
 them is looked for.
+
+Would catch a number of the paper without its row, a verdict that the numbers do not bear, and
+rows that change where nothing they hang on does.
 """
 
 import csv

@@ -1,4 +1,7 @@
-"""Errors by how near the films come to the published ends: classes, counts and roots by hand."""
+"""Errors by how near the films come to the published ends: classes, counts and roots by hand.
+
+Would catch a rotation in the wrong class, and errors pooled over patients that lack a pose.
+"""
 
 from pathlib import Path
 from typing import Any

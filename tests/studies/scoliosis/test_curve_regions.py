@@ -1,4 +1,7 @@
-"""Curves are named by where their apex is, as Lenke 2001 names them."""
+"""Curves are named by where their apex is, as Lenke 2001 names them.
+
+Would catch an apex at the border of two regions that is counted to the other.
+"""
 
 import numpy as np
 from sweeps import sweep

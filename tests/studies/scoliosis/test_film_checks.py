@@ -1,4 +1,8 @@
-"""Everything that may be wrong with films is told, with film, vertebra and remedy."""
+"""Everything that may be wrong with films is told, with film, vertebra and remedy.
+
+Would catch a fault of films that passes, sound films that are blamed, and words that do not name
+the film, the vertebra or what to do.
+"""
 
 from collections.abc import Callable
 from pathlib import Path

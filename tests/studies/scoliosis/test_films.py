@@ -1,4 +1,7 @@
-"""Films as they are read: axes, signs, corners, scales, scatter; and the angles of curves."""
+"""Films as they are read: axes, signs, corners, scales, scatter; and the angles of curves.
+
+Would catch a sign, a unit or a corner taken for another, and readings averaged or scaled wrongly.
+"""
 
 from pathlib import Path
 

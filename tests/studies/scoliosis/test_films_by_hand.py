@@ -1,4 +1,8 @@
-"""Films and angles of a few vertebrae, worked by hand; how models miss them, and reading noise."""
+"""Films and angles of a few vertebrae, worked by hand; how models miss them, and reading noise.
+
+Would catch a wrong end or apex of a curve, a centre or height of a vertebra read wrongly, and
+scatter of readings pooled by the wrong numbers.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace

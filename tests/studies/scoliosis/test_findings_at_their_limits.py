@@ -1,4 +1,7 @@
-"""Sentences at the numbers where they turn: exactly at a limit, and just beside it."""
+"""Sentences at the numbers where they turn: exactly at a limit, and just beside it.
+
+Would catch a comparison that includes its limit where it should not, or the other way round.
+"""
 
 from typing import Any
 

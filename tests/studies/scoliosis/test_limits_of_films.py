@@ -1,4 +1,7 @@
-"""Where films stop being believed: each limit from both sides, on films of a few vertebrae."""
+"""Where films stop being believed: each limit from both sides, on films of a few vertebrae.
+
+Would catch a limit that has moved, or is kept on one side only.
+"""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,6 +1,8 @@
 """The numbers of Jalalian 2017, entered a second time, and what they are allowed to be off by.
 
 Ranges follow from how a number is printed: what rounds to it, its SD, half to twice of it.
+
+Would catch a number of the paper that was entered wrongly, or a range wider than its print allows.
 """
 
 from typing import Any

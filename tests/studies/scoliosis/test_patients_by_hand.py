@@ -1,4 +1,7 @@
-"""Arms, sizes, forces and rows of patients, worked by hand on two or three segments."""
+"""Arms, sizes, forces and rows of patients, worked by hand on two or three segments.
+
+Would catch wrong arms, sizes, chains and units of rows, where no whole patient is solved.
+"""
 
 from types import SimpleNamespace
 from typing import Any

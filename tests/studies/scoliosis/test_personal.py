@@ -1,4 +1,8 @@
-"""Patients as models: mirrors, what films do not tell, poses held where the films have the top."""
+"""Patients as models: mirrors, what films do not tell, poses held where the films have the top.
+
+Would catch a model that is not mirrored by mirrored films, a top that is not where the film has
+it, and size of stiffness that seeps into poses.
+"""
 
 from dataclasses import replace
 from pathlib import Path

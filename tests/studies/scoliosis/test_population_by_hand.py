@@ -1,4 +1,7 @@
-"""What is taken for granted of a population, what rounds do with it, and what films add to it."""
+"""What is taken for granted of a population, what rounds do with it, and what films add to it.
+
+Would catch rounds that end too early or never, and spreads with the wrong prior.
+"""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,7 @@
-"""Sentences of the report: each turns out otherwise when the numbers do."""
+"""Sentences of the report: each turns out otherwise when the numbers do.
+
+Would catch a sentence that stays when its table says otherwise, or counts wrongly.
+"""
 
 from typing import Any
 

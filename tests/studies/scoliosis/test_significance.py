@@ -1,4 +1,7 @@
-"""Tests between models over patients: numbers worked by hand."""
+"""Tests between models over patients: numbers worked by hand.
+
+Would catch pairs of patients exchanged, a correction over other tests, and a p of too few.
+"""
 
 from typing import Any
 

@@ -1,4 +1,7 @@
-"""Characterisation of tangent laws: the published equations and what is known of them."""
+"""Characterisation of tangent laws: the published equations and what is known of them.
+
+Would catch a wrong law, forces whose ratio or size is not that of the films, and bounds untold.
+"""
 
 import numpy as np
 import pytest
