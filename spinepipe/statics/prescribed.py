@@ -386,7 +386,7 @@ def newton_steps(trials: Sequence[Trial]) -> list[NewtonStep | None]:
     given = np.array([one.compliance for one in trials])[:, None] * first.units**2
     missing[:, count:] += given * pushes - wanted
     matrix[:, range(count, size), range(count, size)] = given
-    inside = np.isfinite(load).all(axis=1)
+    inside = np.asarray(np.isfinite(load).all(axis=1))
     matrix[~inside], missing[~inside] = np.eye(size), 0.0  # have no step
     steps = _solved(matrix, -missing)
     found = map(NewtonStep, steps, matrix)
