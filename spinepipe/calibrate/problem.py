@@ -162,6 +162,11 @@ class Evaluator:
         self._solver.forget()
         self._known.clear()
 
+    def start_at(self, x: Array) -> None:
+        """Begin the next searches at x (m,), wherever others have been; nothing is recalled."""
+        self._solver.start_at(x)
+        self._known.clear()
+
     def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,); known points are recalled."""
         return self.together([(0, x)])[0]

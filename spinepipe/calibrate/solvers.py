@@ -46,10 +46,21 @@ class AtRest:
         self._cases = tuple(cases)
         self._stacks = _Stacks(model, self._cases)
         self._last: dict[int, tuple[Array, Array, Array]] = {}
+        self._first: tuple[Array, Array, Array] | None = None
 
     def forget(self) -> None:
         """Start the next points from the neutral pose."""
         self._last.clear()
+        self._first = None
+
+    def start_at(self, x: Array) -> None:
+        """Begin the next searches from the poses to which the loads lead at x (m,)."""
+        first = self._first
+        self.forget()
+        if first is None or not np.array_equal(first[0], x):
+            self.solve([(0, x)])
+            first = self._last.pop(0, None)
+        self._first = first
 
     def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
         """What is seen with the unknowns at x (m,), or why there is nothing.
@@ -80,21 +91,31 @@ class AtRest:
 
     def _guesses(self, points: Sequence[tuple[int, Array]], stack: Stack) -> Array | None:
         """(L, J, 6) poses to start from, to first order; NaN for searches that have none."""
-        if not self._last:
+        if self._first is None and not self._last:
             return None
         nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
         guesses = []
         for number, x in points:
-            if number not in self._last:
+            known = self._last.get(number, self._first)
+            if known is None:
                 guesses.append(nothing)
                 continue
-            there, q, dq = self._last[number]
+            there, q, dq = known
             guesses.append(q + dq @ np.clip(x - there, -self._reach, self._reach))
         return np.concatenate(guesses)
 
     def record(self, x: Array) -> tuple[Array, ...] | str:
-        """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
-        return by_record(moved(self._model, self._free, x), self._cases)
+        """(T, n) poses of every case by the engine of record, or why not.
+
+        Both engines go the same way from the neutral pose (`tests.validation engines`): where the
+        stack gets through, the engine starts each step from where that has come.
+        """
+        model = moved(self._model, self._free, x)
+        self.start_at(x)
+        if self._first is None:
+            return by_record(model, self._cases)
+        ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
+        return by_record(model, self._cases, np.split(self._first[1], ends))
 
 
 class _Stacks:
@@ -137,6 +158,9 @@ class Settling:
         self._sizes: dict[bytes, Mapping[int, tuple[float, ...]]] = {}
 
     def forget(self) -> None:
+        """Nothing: each run starts from the neutral pose."""
+
+    def start_at(self, x: Array) -> None:
         """Nothing: each run starts from the neutral pose."""
 
     def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
@@ -199,12 +223,20 @@ LEAST_MOTION = np.array([1e-4] * 3 + [1e-3] * 3)
 """m and rad: smaller motion is held against this."""
 
 
-def by_record(model: SpineModel, cases: Sequence[LoadCase]) -> tuple[Array, ...] | str:
-    """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
+def by_record(
+    model: SpineModel, cases: Sequence[LoadCase], near: Sequence[Array] | None = None
+) -> tuple[Array, ...] | str:
+    """(T, n) poses of every case by the engine of record, or why not.
+
+    Parameters
+    ----------
+    near : (T, J, 6) of every case, where each step may start; None: from the neutral pose.
+    """
     chain = Chain(model)
     found = []
-    for case in cases:
-        solved = follow(System(chain, model, case))
+    for number, case in enumerate(cases):
+        guesses = None if near is None else [q.ravel() for q in near[number]]
+        solved = follow(System(chain, model, case), guesses)
         for step in solved:
             if not step.usable:
                 return step.equilibrium.message
