@@ -40,10 +40,10 @@ rule all:
         everything(SELECTION.studies),
 
 
-# The long studies of config.yaml, read only when asked for.
+# The long studies of config.yaml, read only when asked for, and what takes long of the others.
 rule full:
     input:
-        lambda wildcards: everything(SELECTION.full),
+        lambda wildcards: everything(SELECTION.studies + SELECTION.full, full=True),
 
 
 onstart:
@@ -56,13 +56,14 @@ onstart:
     lift_rate_limit()
     look_at_few()
     keep_the_graph()
+    tell_what_is_ahead()
     logger.addFilter(to_the_point)
 
 
 onsuccess:
     tell_how_many_lost()
     sweep_logs()
-    say_where()
+    keep_costs()
 
 
 onerror:

@@ -1,25 +1,76 @@
-"""What holds for all tests: in which order they run, and projects that several look at."""
+"""What holds for all tests: in which order they run, shared projects, what the last line says."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from small_project import Project, Shared, copy_project
+from small_project import Project, Shared
+from snakemake_starts import SnakemakeStarts
 
 settings.register_profile("same everywhere", derandomize=True, deadline=None, database=None)
 settings.load_profile("same everywhere")
 """Drawn examples are the same on each machine, and a slow one fails none of them."""
 
 
+FULL_FOR_NOW = frozenset(
+    [
+        "test_investigation_edges",
+        "test_scoliosis_figures",
+        "test_tracking_figures",
+        "test_posterior_job",
+        "test_cohort_analysis",
+        "test_identification_figures",
+        "test_sensitivity_figures",
+        "test_tracking_findings",
+        "test_tracking_checks",
+        "test_figures",
+        "test_tracking_page",
+        "test_cohort_figures",
+        "test_trunk_figures",
+        "test_discrepancy_page",
+        "test_nuisances",
+        "test_against_gould_2024a",
+    ]
+)
+"""Files of 50 s and more: `full` until each is made light. The list must become empty."""
+
+
+SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
+"""Long files whose tests share nothing: each test may go to another worker."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Starts of Snakemake are counted."""
+    config.pluginmanager.register(SnakemakeStarts())
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first. Those that share projects go to any worker, all others file by file."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Slow tests and long files first, so that none of them runs alone at the end.
+
+    Tests that share projects, and those of long files, go to any worker, all others file by file.
+    """
+
+    def short(item: pytest.Item) -> bool:
+        return item.get_closest_marker("slow") is None and item.path.stem not in SPREAD
+
+    items.sort(key=short)
     for item in items:
-        if "shared" not in getattr(item, "fixturenames", ()):
+        if item.path.stem in FULL_FOR_NOW:
+            item.add_marker(pytest.mark.full)
+        if "shared" not in getattr(item, "fixturenames", ()) and item.path.stem not in SPREAD:
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line that says what could not be tested here, and why."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(one.longrepr[2].removeprefix("Skipped: ") for one in skipped)
+    told = "; ".join(f"{count} ({reason})" for reason, count in sorted(reasons.items()))
+    terminalreporter.write_line(f"not tested here: {told or 'nothing was skipped'}")
 
 
 @pytest.fixture(scope="session")
@@ -33,32 +84,35 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
     projects.check()
 
 
-@pytest.fixture
-def new_project(tmp_path: Path) -> Callable[[int], Project]:
-    """Makes a project without results, its study `small` with so many poses."""
-
-    def make(poses: int) -> Project:
-        project = copy_project(tmp_path / "project")
-        project.write_study("small", poses)
-        return project
-
-    return make
-
-
 @pytest.fixture(scope="session")
-def finished(shared: Shared) -> Project:
-    """A project whose study `small` (6 poses) has been computed; not to be changed."""
+def eight(shared: Shared) -> Project:
+    """A project whose studies, one of each kind, have been computed at once; not to be changed."""
 
     def build(folder: Path) -> Project:
-        project = copy_project(folder)
-        project.write_study("small", poses=6)
+        from small_studies import eight_kinds
+
+        project = eight_kinds(folder)
         project.run()
         return project
 
-    return shared.project("finished", build)
+    return shared.project("eight", build)
+
+
+@pytest.fixture(scope="session")
+def toy(shared: Shared) -> Project:
+    """A project with a kind more than there are, its study computed; not to be changed."""
+
+    def build(folder: Path) -> Project:
+        from toy import toy_project
+
+        project = toy_project(folder)
+        project.run()
+        return project
+
+    return shared.project("toy", build)
 
 
 @pytest.fixture
-def project(finished: Project, tmp_path: Path) -> Project:
+def toy_copy(toy: Project, tmp_path: Path) -> Project:
     """The same, for one test to change."""
-    return finished.copy(tmp_path / "project")
+    return toy.copy(tmp_path / "project")

@@ -1,4 +1,8 @@
-"""Digest of a module's code by its meaning, with everything of spinepipe that it imports.
+"""Digest of a module's code by its meaning, with what it uses of spinepipe.
+
+Imports are followed where they are written. Of a file that declares result tables only the tables
+that are imported count, and of these no wording. An effect counts where its name is written, or
+where all of them are asked for.
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -8,7 +12,9 @@ import ast
 import atexit
 import hashlib
 import json
+import re
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -18,19 +24,21 @@ from spinepipe.files import appearing, stamp
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = "spinepipe"
+_EFFECTS = "spinepipe.effects"
+_ALL_EFFECTS = f"{_EFFECTS}.registered"
+_SCHEMA = "spinepipe.tables.schema"
 _DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json", ".html", ".css")
-_KEPT = _ROOT / ".snakemake" / "spinepipe-code.json"
+_KEPT = _ROOT / ".snakemake" / "spinepipe-used-code.json"
 """What is known of files; may be deleted at any time."""
 
 
 @cache
 def code_digest(module: str) -> str:
-    """sha256 over a module and everything of spinepipe that it imports, directly or not.
+    """sha256 over a module and everything of spinepipe that it uses, directly or not.
 
     Comments, docstrings, layout and the version number do not count. The data files that lie
-    beside an imported module (published values) do. Imports are followed where they are written,
-    also inside functions; of modules loaded by a computed name only those are seen that a package
-    takes in by going through its own folder.
+    beside a module (published values) do. Imports inside functions are followed too; modules loaded
+    by a computed name are not seen.
 
     Parameters
     ----------
@@ -45,21 +53,21 @@ def code_digest(module: str) -> str:
     if _source(module) is None:
         raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
     found = closure(module)
-    lines = [f"{name} {_file(name).meaning}" for name in sorted(found)]
+    lines = [f"{name} {_piece(name).meaning}" for name in sorted(found)]
     lines += [_bytes_digest(path) for path in _data_files(found)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 @cache
 def closure(module: str) -> frozenset[str]:
-    """The module, its packages and all spinepipe modules they import in turn."""
+    """All that a module uses, itself too; of files that declare tables, parts (``module.NAME``)."""
     found: set[str] = set()
     waiting = [module]
     while waiting:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting.extend(_imports(name))
+            waiting.extend(_used(name))
     return frozenset(found)
 
 
@@ -73,58 +81,147 @@ def _source(module: str) -> Path | None:
     return None
 
 
-class _File(NamedTuple):
-    """What a file imports, by full names that need not exist, and a digest of what it means."""
+class _Piece(NamedTuple):
+    """A file or a part: full names that it uses, words that may name effects, and a digest."""
 
-    imports: tuple[str, ...]
+    uses: list[str]
     meaning: str
 
 
+class _File(NamedTuple):
+    """A file as a whole, and where it declares tables its parts, by the names they bind."""
+
+    whole: _Piece
+    parts: dict[str, _Piece]
+
+
+def _piece(name: str) -> _Piece:
+    base, _, part = name.rpartition(".")
+    return _file(name).whole if _source(name) else _file(base).parts[part]
+
+
 @cache
-def _imports(module: str) -> frozenset[str]:
-    """Modules of spinepipe named in the import statements of one module, and its packages."""
-    names = {*_parents(module), *_file(module).imports}
-    if "*" in names:
-        names.update(_modules_of(module))
-    ours = {name for name in names if name.split(".")[0] == _PACKAGE}
-    with_packages = ours | {parent for name in ours for parent in _parents(name)}
-    return frozenset(name for name in with_packages if _source(name))
+def _used(name: str) -> frozenset[str]:
+    """What a module or a declared table uses of spinepipe, and the packages these are in."""
+    found: set[str] = set()
+    for used in _piece(name).uses:
+        base, _, last = used.rpartition(".")
+        if used == _ALL_EFFECTS:
+            found.update(effect_modules().values())
+        elif not base:
+            found.update([effect_modules()[used]] if used in effect_modules() else [])
+        elif _source(used):
+            found.add(used)
+        elif _source(base):
+            found.add(used if last in _file(base).parts else base)
+    packages = {parent for used in (name, *found) for parent in _parents(used)}
+    return frozenset(found | {package for package in packages if not _file(package).parts})
+
+
+@cache
+def effect_modules() -> dict[str, str]:
+    """Module of each effect, by the name of its file."""
+    folder = _ROOT.joinpath(*_EFFECTS.split("."))
+    return {file.stem: f"{_EFFECTS}.{file.stem}" for file in sorted(folder.glob("[!_]*.py"))}
 
 
 @cache
 def _file(module: str) -> _File:
     path = _source(module)
     if path is None:
-        return _File((), "")
+        return _File(_Piece([], ""), {})
     _, size, time = stamp(path)
     place, state = path.relative_to(_ROOT).as_posix(), [size, time]
     kept = _known().get(place)
     if kept is None or kept[0] != state:
         kept = _known()[place] = [state, *_read(module, path)]
         _keep_at_exit()
-    return _File(tuple(kept[1]), kept[2])
+    return _File(_Piece(*kept[1]), {name: _Piece(*part) for name, part in kept[2].items()})
 
 
 def _read(module: str, path: Path) -> _File:
-    """A file's imports (`*` for all of its own folder) and its meaning, from its syntax tree.
-
-    Docstrings, comments, layout and version number have none.
-    """
+    """A file from its syntax tree: docstrings, comments, layout and version number mean nothing."""
     tree = ast.parse(path.read_bytes())
-    names: set[str] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = _absolute(module, node)
-            names.update((base, *(f"{base}.{alias.name}" for alias in node.names)))
-        elif isinstance(node, ast.Name) and node.id == "__path__":
-            names.add("*")
         body = getattr(node, "body", None)
         if isinstance(body, list):
             node.body = [entry for entry in body if not _is_cosmetic(entry)]  # type: ignore[attr-defined]
-    ours = sorted(name for name in names if name == "*" or name.split(".")[0] == _PACKAGE)
-    return _File(tuple(ours), hashlib.sha256(ast.dump(tree).encode()).hexdigest())
+    imported = {
+        alias.asname or alias.name: f"{_absolute(module, node)}.{alias.name}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    parts = {}
+    if not {f"{_SCHEMA}.Column", f"{_SCHEMA}.Table"}.isdisjoint(imported.values()):
+        tree = _WithoutWording().visit(tree)
+        local = {name: entry for entry in tree.body for name in _bound(entry)}
+        places = {**imported, **{name: f"{module}.{name}" for name in local}}
+        parts = {name: _digested(entry, places) for name, entry in local.items()}
+    return _File(_digested(tree, imported), parts)
+
+
+def _digested(tree: ast.AST, places: Mapping[str, str]) -> _Piece:
+    """Code with what it uses: modules, names of `places`, and words that may name effects."""
+    used: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            used.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            used.update(places[alias.asname or alias.name] for alias in node.names)
+        elif isinstance(node, ast.Name) and node.id in places:
+            used.add(places[node.id])
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            used.update(_NAME.findall(node.value))
+    ours = sorted(name for name in used if "." not in name or name.split(".")[0] == _PACKAGE)
+    return _Piece(ours, hashlib.sha256(ast.dump(tree).encode()).hexdigest())
+
+
+_NAME = re.compile(r"\A[a-z]+(?:_[a-z]+)*\Z")
+"""How names of effects look."""
+
+_FEWEST_WORDS = 4
+"""In a declaration of tables, a text of so many words is wording whatever is called with it."""
+
+
+class _WithoutWording(ast.NodeTransformer):
+    """Tables without what a reader is told; names, types, units and keys stay."""
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Column: no meaning, of `null` only whether it is there; Table: no `about`."""
+        self.generic_visit(node)
+        called = node.func.id if isinstance(node.func, ast.Name) else ""
+        wording = {"Column": ("meaning", 2), "Table": ("about", 1)}.get(called)
+        if wording:
+            name, place = wording
+            node.args[place : place + 1] = [ast.Constant("")] * (len(node.args) > place)
+            node.keywords = [one for one in node.keywords if one.arg != name]
+        nulls = [one for one in node.keywords if one.arg == "null"]
+        for one in nulls:
+            one.value = ast.Constant(not _is_none(one.value))
+        if called == "Column" and len(node.args) > _PLACE_OF_NULL:
+            node.args[_PLACE_OF_NULL] = ast.Constant(not _is_none(node.args[_PLACE_OF_NULL]))
+        return node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        """No text of several words."""
+        long = isinstance(node.value, str) and len(node.value.split()) >= _FEWEST_WORDS
+        return ast.Constant("") if long else node
+
+
+_PLACE_OF_NULL = 4
+
+
+def _is_none(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def _bound(entry: ast.stmt) -> list[str]:
+    """Names that a statement binds: constants, functions and classes."""
+    if isinstance(entry, ast.FunctionDef | ast.ClassDef):
+        return [entry.name]
+    targets = entry.targets if isinstance(entry, ast.Assign) else []
+    return [to.id for to in targets if isinstance(to, ast.Name)]
 
 
 @cache
@@ -147,13 +244,6 @@ def _keep() -> None:
     if _KEPT.parent.is_dir():
         with suppress(OSError), appearing(_KEPT) as temporary:
             temporary.write_text(json.dumps({"python": sys.version, "files": _known()}), "utf-8")
-
-
-def _modules_of(package: str) -> list[str]:
-    """The modules in the folder of a package."""
-    path = _source(package)
-    assert path is not None
-    return [f"{package}.{file.stem}" for file in sorted(path.parent.glob("[!_]*.py"))]
 
 
 def _parents(module: str) -> list[str]:
@@ -182,10 +272,12 @@ def _is_cosmetic(node: ast.stmt) -> bool:
     )
 
 
-def _data_files(modules: frozenset[str]) -> list[Path]:
+def _data_files(names: frozenset[str]) -> list[Path]:
     """Data files beside the modules, in a fixed order."""
-    folders = {path.parent for name in modules if (path := _source(name))}
-    files = (file for folder in folders for file in folder.iterdir())
+    sources = (_source(name) or _source(name.rpartition(".")[0]) for name in names)
+    files = (
+        file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
+    )
     return sorted(file for file in files if file.suffix in _DATA_SUFFIXES)
 
 

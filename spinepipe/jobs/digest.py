@@ -80,12 +80,12 @@ def figure_digest(figure: str, study: Study, cohort: Cohort) -> str:
     return value_digest(code, settings_of(study, ignored), cohort.digest)
 
 
-def report_digest(study: Study, cohort: Cohort) -> str:
-    """The mark of a report, which prints all settings."""
+def report_digest(page: str, study: Study, cohort: Cohort) -> str:
+    """The mark of a page (`report` or `full`), which prints all settings."""
     module = f"{PACKAGE}.{study.kind}.page"
     titles = [figure.title for figure in kind_of(study.kind).figures]
     code = [code_digest("spinepipe.jobs.report"), code_digest(module), titles]
-    return value_digest(code, settings_of(study, {}), cohort.digest)
+    return value_digest(page, code, settings_of(study, {}), cohort.digest)
 
 
 def provenance(

@@ -74,9 +74,9 @@ class Expected:
         """The mark of a figure."""
         return figure_digest(figure, self.study, self.cohort)
 
-    def of_report(self) -> str:
-        """The mark of the report."""
-        return report_digest(self.study, self.cohort)
+    def of_report(self, page: str) -> str:
+        """The mark of a page: `report`, or `full`."""
+        return report_digest(page, self.study, self.cohort)
 
     def _specimens(self, job: Job, place: Place) -> tuple[str, ...] | None:
         if job.header_alone:

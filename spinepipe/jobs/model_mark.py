@@ -3,14 +3,15 @@
 from hashlib import sha256
 from pathlib import Path
 
+from spinepipe.jobs.code import code_digest, effect_modules
 from spinepipe.marks import read_mark
 from spinepipe.studies.base_model import made_by
 
 
 def base_marks(root: str, model: str | None) -> list[str]:
-    """The mark of a model file among a study's results, else the digest of its bytes.
+    """The mark of a model file among a study's results, else digests of its bytes and its effects.
 
-    Nothing without a file.
+    Nothing without a file. The mark of a result covers the code of the effects in it already.
 
     Parameters
     ----------
@@ -20,4 +21,9 @@ def base_marks(root: str, model: str | None) -> list[str]:
         return []
     path = Path(root) / model
     mark = read_mark(path) if made_by(path, Path(root)) else ""
-    return [mark or sha256(path.read_bytes()).hexdigest()]
+    if mark:
+        return [mark]
+    raw = path.read_bytes()
+    named = effect_modules()
+    used = sorted(name for name in named if name.encode() in raw)
+    return [sha256(raw).hexdigest(), *(code_digest(named[name]) for name in used)]

@@ -1,6 +1,7 @@
-"""Job: the report of a study of any kind, one HTML file."""
+"""Job: a page of a study of any kind, one HTML file: its report, or what `full` makes of it."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -8,26 +9,32 @@ from spinepipe.jobs.digest import report_digest
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
 from spinepipe.report.page.document import Picture, Results
-from spinepipe.studies.registry import PACKAGE, kind_of
+from spinepipe.report.words import listed
+from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.tables import Tables, read_metadata
 
 
 def run(
     root: str,
     study: str,
+    page: str,
     tables: list[str],
     figures: list[str],
     captions: list[str],
     output: str,
     **others: str,
 ) -> None:
-    """Write the page from the files of all tables, pictures (SVG), captions and ``others``."""
+    """Write a page from the files of all tables, pictures (SVG), captions and ``others``."""
     settings, cohort = study_of(root, study)
-    page = import_module(f"{PACKAGE}.{settings.kind}.page")
+    kind_page = import_module(f"{PACKAGE}.{settings.kind}.page")
     titles = {figure.name: figure.title for figure in kind_of(settings.kind).figures}
-    results = results_of(page.READ, titles, tables, figures, captions, others)
-    document = page.document(settings, cohort, results)
-    write_marked(document.html(settings, cohort), output, report_digest(settings, cohort))
+    results = results_of(kind_page.READ, titles, tables, figures, captions, others)
+    document = kind_page.document(settings, cohort, results)
+    added = files_of(settings, cohort).adds
+    if page == "report" and added:
+        more = f"{listed(added)} (`make full` makes them and the page full.html, which shows them)"
+        document = replace(document, left_out=(*document.left_out, more))
+    write_marked(document.html(settings, cohort), output, report_digest(page, settings, cohort))
 
 
 def results_of(

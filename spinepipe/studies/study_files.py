@@ -60,6 +60,9 @@ class StudyFiles(ABC):
     joined: ClassVar[tuple[str, ...]] = ()
     """Tables that studies of this kind join from job files."""
 
+    full: ClassVar[tuple[str, ...]] = ()
+    """Tables that `full` alone makes, with the figures drawn from them and a page, full.html."""
+
     told_in_report: ClassVar[tuple[str, ...]] = ()
     """Files other than tables and figures that the report reads."""
 
@@ -111,32 +114,27 @@ class StudyFiles(ABC):
         """Results that are neither tables nor figures nor the report."""
         return ()
 
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """The figures that this study has."""
-        return tuple(
-            drawing.name for drawing in self.drawings if set(drawing.tables) <= set(self.tables)
-        )
+    def tables_of(self, full: bool) -> tuple[str, ...]:
+        """The tables that this study has, with those of `full` or without."""
+        return tuple(name for name in self.tables if full or name not in self.full)
 
-    def table_files(self, names: tuple[str, ...]) -> list[str]:
-        """Files of tables, of those that the study has."""
-        return [f"{self.folder}/{name}.parquet" for name in names if name in self.tables]
+    def figures(self, full: bool = True) -> tuple[str, ...]:
+        """The figures that this study has, with those of `full` or without."""
+        tables = set(self.tables_of(full))
+        return tuple(drawing.name for drawing in self.drawings if set(drawing.tables) <= tables)
+
+    @property
+    def adds(self) -> tuple[str, ...]:
+        """The tables that `full` adds to this study."""
+        return tuple(name for name in self.tables if name in self.full)
+
+    def table_files(self, names: tuple[str, ...], full: bool = True) -> list[str]:
+        """Files of tables, of those that the study has, with those of `full` or without."""
+        return [f"{self.folder}/{name}.parquet" for name in names if name in self.tables_of(full)]
 
     def other_files(self, names: tuple[str, ...]) -> dict[str, str]:
         """Files that are no tables (a name with a dot), by their names without the ending."""
         return {name.partition(".")[0]: f"{self.folder}/{name}" for name in names if "." in name}
-
-    def report_tables(self) -> list[str]:
-        """The tables that the report shows or speaks of."""
-        return self.table_files(self.tables)
-
-    def figure_files(self) -> list[str]:
-        """The figures that the report holds."""
-        return [f"{self.folder}/figures/{figure}.svg" for figure in self.figures]
-
-    def captions(self) -> list[str]:
-        """What is said below each figure."""
-        return [self.caption(figure) for figure in self.figures]
 
     def caption(self, figure: str) -> str:
         """The file of what is said below a figure."""
@@ -160,22 +158,26 @@ class StudyFiles(ABC):
         """The job file of a specimen, of a table that has one for each."""
         return f"{self.folder}/{table}/specimen={specimen}.parquet"
 
-    def results(self) -> list[str]:
+    def results(self, full: bool = False) -> list[str]:
         """What a reader of the study wants to have: report, tables, figures and the rest."""
-        files = [*(f"{table}.parquet" for table in self.tables), *self.others]
-        files += [f"figures/{figure}.{kind}" for figure in self.figures for kind in ("svg", "png")]
-        return [f"{self.folder}/{file}" for file in [*files, "report.html"]]
+        files = [*(f"{table}.parquet" for table in self.tables_of(full)), *self.others]
+        drawn = self.figures(full)
+        files += [f"figures/{figure}.{kind}" for figure in drawn for kind in ("svg", "png")]
+        pages = ["report.html", *(["full.html"] if full and self.adds else [])]
+        return [f"{self.folder}/{file}" for file in [*files, *pages]]
 
-    def lost(self) -> list[str]:
+    def lost(self, full: bool = False) -> list[str]:
         """Job files that are missing although a table or block holds their rows.
 
         Snakemake does not miss a deleted file once the table made of it exists.
         """
-        lost = [file for table in self.made_of_jobs for file in self.absent(table, joined=True)]
+        tables = self.tables_of(full)
+        made_of_jobs = [table for table in self.made_of_jobs if table in tables]
+        lost = [file for table in made_of_jobs for file in self.absent(table, joined=True)]
         return lost + [
             file
             for table in self.by_specimen
-            if os.path.exists(f"{self.folder}/{table}.parquet")
+            if table in tables and os.path.exists(f"{self.folder}/{table}.parquet")
             for file in self.block_files(table)
             if not os.path.exists(file)
         ]

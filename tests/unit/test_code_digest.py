@@ -1,4 +1,8 @@
-"""Digests of code: what is kept of files between processes changes none of them."""
+"""Digests of code: they change with what a job uses and with nothing else.
+
+Catches results that are believed though their code changed, and results that are thrown away for a
+reworded column, a new effect or a table of another job.
+"""
 
 import json
 from collections.abc import Iterator
@@ -6,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from sweeps import sweep
 
 from spinepipe.jobs import code
 
@@ -14,8 +19,9 @@ MODULE = "spinepipe.jobs.collect"
 
 def forget() -> None:
     """As a new process knows nothing."""
-    for known in (code._known, code._file, code._imports, code.closure, code.code_digest):
+    for known in (code._known, code._file, code._used, code.closure, code.code_digest):
         known.cache_clear()
+    code.effect_modules.cache_clear()
 
 
 @pytest.fixture
@@ -41,13 +47,13 @@ def test_a_file_that_has_changed_since_is_read_again(kept: Path) -> None:
     data = json.loads(kept.read_text("utf-8"))
     for state in data["files"].values():
         state[0][1] += 1
-        state[2] = "0" * 64
+        state[1][1] = "0" * 64
     kept.write_text(json.dumps(data), "utf-8")
     forget()
     assert code.code_digest(MODULE) == fresh
 
 
-@pytest.mark.parametrize("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
+@sweep("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
 def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
     fresh = code.code_digest(MODULE)
     kept.write_text(content, "utf-8")
@@ -59,7 +65,7 @@ def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path:
     """A made-up package in the place of this one: `spinepipe.own` imports `spinepipe.used.it`."""
     monkeypatch.setattr(code, "_ROOT", tmp_path)
-    for known in (code._source, code._bytes_digest):
+    for known in (code._source, code._bytes_digest, code.effect_modules):
         monkeypatch.setattr(code, known.__name__, cache(known.__wrapped__))
     for folder in ("used", "other"):
         (tmp_path / "spinepipe" / folder).mkdir(parents=True)
@@ -70,8 +76,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path
     return tmp_path / "spinepipe"
 
 
-@pytest.mark.parametrize(
-    ("name", "counts"),
+@sweep(
+    "name, counts",
     [
         *((f"used/published{suffix}", True) for suffix in code._DATA_SUFFIXES),
         ("published.csv", True),
@@ -96,8 +102,8 @@ def test_data_beside_imported_modules_counts(package: Path, name: str, counts: b
     assert (digest() != one) is counts
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
+@sweep(
+    "one, other, same",
     [
         ('"""Doc."""\nx = 1  # why\n', "x = 1\n", True),
         ("def f():\n    '''Doc.'''\n    return 1\n", "def f():\n\n    return 1\n", True),
@@ -112,3 +118,69 @@ def test_only_meaning_counts(tmp_path: Path, one: str, other: str, same: bool) -
         path.write_text(text, "utf-8")
     first, second = (code._read("spinepipe.made_up", path) for path in files)
     assert (first == second) is same
+
+
+TABLES = """from spinepipe.tables.schema import Column, Table
+
+KEY = ("specimen",)
+ONE = Table("one", "About it.", KEY, (Column("a_mm", "number", "what a is", "mm", "was not read"),))
+OTHER = Table("other", "About it.", (), (Column("b", "text", meaning="what b is", null="none"),))
+"""
+
+
+@sweep(
+    "was, becomes, counts",
+    [
+        ("what a is", "what it is", False),
+        ("was not read", "nobody read it", False),
+        ("About it.", "All about it", False),
+        ('"what b is", null="none"', '"what b is"', False),
+        ('"b", "text"', '"c", "text"', False),
+        ("a_mm", "a_m", True),
+        ('"mm"', '"m"', True),
+        ('"number"', '"integer"', True),
+        (', "was not read"', "", True),
+        ('("specimen",)', '("specimen", "joint")', True),
+    ],
+)
+def test_of_tables_the_imported_ones_count_without_wording(
+    package: Path, was: str, becomes: str, counts: bool
+) -> None:
+    (package / "tables").mkdir()
+    (package / "tables/__init__.py").write_text("", "utf-8")
+    (package / "tables/schema.py").write_text("class Column: ...\nclass Table: ...\n", "utf-8")
+    (package / "own.py").write_text("from spinepipe.used.it import ONE\n", "utf-8")
+
+    def digest(text: str) -> str:
+        (package / "used/it.py").write_text(text, "utf-8")
+        forget()
+        return code.code_digest("spinepipe.own")
+
+    assert was in TABLES
+    assert (digest(TABLES) != digest(TABLES.replace(was, becomes))) is counts
+
+
+@sweep(
+    "own, counts",
+    [
+        ("from spinepipe.effects import create\n", False),
+        ("from spinepipe.effects import create\ncreate('creep')\n", True),
+        ("from spinepipe.effects import registered\n", True),
+    ],
+)
+def test_effects_count_where_they_are_named_or_all_are_asked_for(
+    package: Path, own: str, counts: bool
+) -> None:
+    (package / "effects").mkdir()
+    (package / "effects/__init__.py").write_text("def create(name): ...\n", "utf-8")
+    (package / "own.py").write_text(own, "utf-8")
+
+    def digest() -> str:
+        forget()
+        return code.code_digest("spinepipe.own")
+
+    without = digest()
+    (package / "effects/creep.py").write_text("rate = 1\n", "utf-8")
+    one = digest()
+    (package / "effects/creep.py").write_text("rate = 22\n", "utf-8")
+    assert (one != without, digest() != one) == (counts, counts)

@@ -1,4 +1,7 @@
-"""The published way of fitting: its runs, its derivatives, and the rows of fits that fail."""
+"""The published way of fitting: its runs, its derivatives, and the rows of fits that fail.
+
+Catches an emulation of the published fit that hides a failed fit or differs from its own runs.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -76,7 +79,7 @@ def test_a_run_ends_where_settling_ends(duration_s: float) -> None:
         np.testing.assert_allclose(here, there, rtol=0, atol=2e-3 * np.abs(there).max())
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_noiseless_motion_and_a_sane_step_give_the_truth() -> None:
     """Most of the time: one fit in some is stopped early by the noise of the runs."""
     off = []

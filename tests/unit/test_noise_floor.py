@@ -2,6 +2,8 @@
 
 Beside the dummy each design has another factor without effect, ``inert``, of which the floor knows
 nothing: its indices must lie in the floor about as often as the interval says.
+
+Catches a factor called negligible, or important, by noise alone.
 """
 
 from collections.abc import Sequence
@@ -51,6 +53,7 @@ CASES = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("method", "samples", "wanted", "seeds"), CASES)
 def test_a_factor_without_effect_lies_in_the_floor(
     method: str, samples: int, wanted: tuple[str, ...], seeds: int

@@ -56,10 +56,12 @@ def stop(message):
     raise SystemExit(f"Nothing was run. {message}")
 
 
-def everything(names):
-    """All results of these studies, and job files of theirs that got lost."""
+def everything(names, full=False):
+    """Results of these studies, with those of `full` or without, and their job files that got lost."""
     return [
-        file for name in names for file in layout(name).results() + layout(name).lost()
+        file
+        for name in names
+        for file in layout(name).results(full) + layout(name).lost(full)
     ]
 
 
@@ -87,17 +89,20 @@ def expected(name):
     return Expected(ROOT, *load(name))
 
 
-def tables(*names):
+def tables(*names, full):
     """Input function: files of these tables, of those that the study at hand has."""
-    return lambda wildcards: layout(wildcards.study).table_files(names)
+    return lambda wildcards: layout(wildcards.study).table_files(names, full)
 
 
-def inputs_of(kind, names):
+def inputs_of(kind, job):
     """Input of a job that reads tables; a name with a dot is a file with a name of its own."""
     folder = f"{RESULTS}/{kind.files.subfolder}"
+    full = set(job.writes) <= set(kind.files.full)
+    names = [name for name in job.reads if "." not in name]
+    others = [name for name in job.reads if "." in name]
     return {
-        "tables": tables(*(name for name in names if "." not in name)),
-        **{name.split(".")[0]: f"{folder}{name}" for name in names if "." in name},
+        "tables": tables(*names, full=full),
+        **{name.split(".")[0]: f"{folder}{name}" for name in others},
     }
 
 
@@ -112,16 +117,19 @@ def outputs_of(place, kind, job):
 def inputs_of_figure(wildcards):
     files = layout(wildcards.study)
     figure = files.figure(wildcards.figure)
-    tables = files.table_files((*figure.reads, *figure.also))
+    full = bool(set(figure.tables) & set(files.full))
+    tables = files.table_files((*figure.reads, *figure.also), full)
     return {"tables": tables, **files.other_files(figure.reads)}
 
 
-def inputs_of_report(wildcards):
+def inputs_of_page(wildcards):
     files = layout(wildcards.study)
+    full = wildcards.page == "full"
+    figures = files.figures(full)
     return {
-        "tables": files.report_tables(),
-        "figures": files.figure_files(),
-        "captions": files.captions(),
+        "tables": files.table_files(files.tables, full),
+        "figures": [f"{files.folder}/figures/{figure}.svg" for figure in figures],
+        "captions": [files.caption(figure) for figure in figures],
         **files.other_files(files.told_in_report),
     }
 
@@ -155,7 +163,7 @@ def figure_digest(wildcards):
 
 def report_digest(wildcards):
     """Params function: the mark of a report."""
-    return expected(wildcards.study).of_report()
+    return expected(wildcards.study).of_report(wildcards.page)
 
 
 def blocks_of_table(wildcards):

@@ -47,7 +47,7 @@ for kind in KINDS_IN_USE:
             name:
                 f"{kind}_{job.name}"
             input:
-                **inputs_of(made, job.reads),
+                **inputs_of(made, job),
             output:
                 **outputs_of(place, made, job),
             log:
@@ -84,11 +84,11 @@ for kind in KINDS_IN_USE:
         name:
             f"{kind}_report"
         input:
-            unpack(inputs_of_report),
+            unpack(inputs_of_page),
         output:
-            output=f"{place}/{made.files.subfolder}report.html",
+            output=f"{place}/{made.files.subfolder}{{page,report|full}}.html",
         log:
-            f"{LOGS}/report.log",
+            f"{LOGS}/{{page}}.log",
         params:
             digest=report_digest,
         run:

@@ -391,7 +391,7 @@ def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
 
 def test_every_figure_has_a_caption_and_a_title(tmp_path: Path) -> None:
     files = DiscrepancyFiles.of(*study_of(tmp_path))
-    assert list(files.figures) == FIGURES
+    assert list(files.figures()) == FIGURES
     assert all((ROOT / path).read_text().strip() for path in files.captions())
     assert all(figure.title for figure in KIND.figures)
 

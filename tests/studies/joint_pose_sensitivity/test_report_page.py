@@ -81,7 +81,8 @@ def made(root: Path, size: Size) -> tuple[str, list[Path]]:
         [str(folder / f"{name}.{kind}") for name in pictures] for kind in ("svg", "rst")
     )
     report.run(
-        str(root), STUDY, [str(file) for file in files], svgs, captions, str(folder / "report.html")
+        *(str(root), STUDY, "report", [str(file) for file in files]),
+        *(svgs, captions, str(folder / "report.html")),
     )
     return (folder / "report.html").read_text(encoding="utf-8"), files
 

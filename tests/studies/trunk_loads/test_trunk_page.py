@@ -163,10 +163,10 @@ def test_names_cannot_end_the_script() -> None:
 def test_a_figure_is_there_without_the_tables_that_it_shows_besides() -> None:
     without = Size(1, samples=False)
     files = KIND.files.of(study_of(without), cohort_of(without))
-    assert "pressure_against_measured" in files.figures
-    assert "drivers" not in files.figures
+    assert "pressure_against_measured" in files.figures()
+    assert "drivers" not in files.figures()
     sampled = KIND.files.of(study_of(Size(1)), cohort_of(Size(1)))
-    assert set(sampled.figures) == {figure.name for figure in KIND.figures}
+    assert set(sampled.figures()) == {figure.name for figure in KIND.figures}
 
 
 def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
