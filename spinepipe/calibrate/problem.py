@@ -204,7 +204,9 @@ class Evaluator:
         """
         found, problem = self.at(x), self.problem
         model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
-        poses = held_against(self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE)
+        poses = held_against(
+            self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE
+        )
         if poses is None:
             return None
         chain = self._systems[0].chain

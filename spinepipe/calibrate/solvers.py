@@ -181,7 +181,9 @@ class Settling:
         models = models or [self._model] * len(points)
         bases = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
         steps = STEP * np.eye(len(self._free))
-        runs = [one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))]
+        runs = [
+            one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))
+        ]
         count, each = len(self._cases), 1 + len(steps)
         stack = self._stacks.of([model for model in models for _ in range(each)], runs)
         leads = np.arange(len(runs) * count).reshape(len(points), each, count)
@@ -190,7 +192,10 @@ class Settling:
         every = ends.q.reshape(len(points), each, count, -1, 6)
         result: list[Seen | str] = []
         for base, model, (_, x), lanes, q in zip(bases, models, points, leads, every, strict=True):
-            trouble = min(set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble), default=None)
+            trouble = min(
+                set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble),
+                default=None,
+            )
             self._sizes[id(model), x.tobytes()] = [ends.sizes[lane] for lane in lanes[0].tolist()]
             result.append(self._seen(base, model, q) if trouble is None else ends.trouble[trouble])
         return result

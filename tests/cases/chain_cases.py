@@ -146,13 +146,13 @@ class Written:
         own, kept = {}, {}
         for name in specimens:
             own[name] = self.fit(name, representation, fitted_to)
-            kept[name] = str((self.root / "stiffness.parquet").rename(self.root / f"{name}.parquet"))
+            kept[name] = str(
+                (self.root / "stiffness.parquet").rename(self.root / f"{name}.parquet")
+            )
         found = {}
         for name in specimens:
             others, files = [kept[n] for n in specimens if n != name], self._files(*LEFT_OUT)
-            left_out.run(
-                str(self.root), STUDY, others, name, representation, fitted_to, **files
-            )
+            left_out.run(str(self.root), STUDY, others, name, representation, fitted_to, **files)
             found[name] = own[name], _read(files)
         return found
 

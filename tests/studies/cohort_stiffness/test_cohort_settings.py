@@ -28,7 +28,6 @@ from cohort_edge_cases import TESTS, TRUTH, A, made_of_jobs, no_nan
 from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
-from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness import findings, mae, pool, ranking
 from spinepipe.studies.cohort_stiffness import significance as statistics
 from spinepipe.studies.cohort_stiffness.kind import KIND, CohortLayout

@@ -292,7 +292,8 @@ REFUSED = (
 
 def test_what_priors_cannot_be_used_with_is_refused(tmp_path: Path) -> None:
     found = {
-        told: problems(tmp_path / str(number), study) for number, (study, told) in enumerate(REFUSED)
+        told: problems(tmp_path / str(number), study)
+        for number, (study, told) in enumerate(REFUSED)
     }
     assert not {told: said for told, said in found.items() if told not in said}
 

@@ -96,7 +96,9 @@ def frames(project: Written) -> Frames:
         keep(project.literature(name), specimen=name)
     for described, label in product(FITTED, (*TESTS, "all")):
         where = {"representation": described, "fitted_to": label}
-        for name, (own, predicted) in project.fit_all(list(TRUE_N_PER_MM), described, label).items():
+        for name, (own, predicted) in project.fit_all(
+            list(TRUE_N_PER_MM), described, label
+        ).items():
             keep(own, specimen=name, **where)
             keep(predicted, specimen=name, **where)
     for label in (*TESTS, "all"):
