@@ -11,22 +11,25 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: all full test test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
+.PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
-	$(BIN)/snakemake -j$(CORES) all
+	$(BIN)/python -m spinepipe.jobs.if_changed all $(BIN)/snakemake -j$(CORES) all
 
-full: env  ## build the long studies too
-	$(BIN)/snakemake -j$(CORES) full
+full: env  ## build the long studies too, and what takes long of the others
+	$(BIN)/python -m spinepipe.jobs.if_changed full $(BIN)/snakemake -j$(CORES) full
 
-test: dev-env  ## run all tests
+test: dev-env  ## run the tests that a change must pass
+	$(PYTEST) -m "not full"
+
+test-full: dev-env  ## run all tests, those that are too slow for make test too
 	$(PYTEST)
 
 test-fast: dev-env  ## run unit and property tests, in a minute
-	$(PYTEST) tests/unit tests/properties -m "not slow"
+	$(PYTEST) tests/unit tests/properties -m "not slow and not full"
 
 test-kernels: dev-env  ## numeric tests under each kernel of the linear algebra that this processor can run
-	$(BIN)/python -m tests.kernels -n $(CORES) --dist loadfile
+	$(BIN)/python -m tests.kernels $(KERNELS) -n $(CORES) --dist loadfile
 
 lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 	$(BIN)/ruff format --check .

@@ -56,13 +56,14 @@ onstart:
     lift_rate_limit()
     look_at_few()
     keep_the_graph()
+    tell_what_is_ahead()
     logger.addFilter(to_the_point)
 
 
 onsuccess:
     tell_how_many_lost()
     sweep_logs()
-    say_where()
+    keep_costs()
 
 
 onerror:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import statistics
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
@@ -12,6 +13,7 @@ from typing import Any
 
 from benchmarks import (
     cohort,
+    commands,
     discrepancy,
     engine,
     films,
@@ -51,12 +53,15 @@ def main() -> None:
         "summary": lambda: summary.write(RESULTS),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("part", nargs="*", help=", ".join(parts))
+    parser.add_argument("part", nargs="*", help=f"{', '.join(parts)}; or: commands OLD")
     given = os.environ.get(real_geometry.COHORT_VARIABLE)
     parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
     small = "discrepancy: the small cohort alone, and no file is written"
     parser.add_argument("--small", action="store_true", help=small)
     options = parser.parse_args()
+    if options.part[:1] == ["commands"]:
+        commands_part(*options.part[1:])
+        return
     for name in options.part or parts:
         if name not in parts:
             sys.exit(f"no benchmark {name!r}: {', '.join(parts)}")
@@ -127,6 +132,22 @@ def whole_study() -> None:
     lines = _head("The whole study", about)
     rows = _study_rows(lines, study.whole_runs())
     _write("whole_study", lines, {"machine": about, "study": rows})
+
+
+def commands_part(old: str) -> None:
+    """The commands of a newcomer at HEAD and at an older commit, in turn."""
+    lines = [*_head("Commands", _about()), "", f"Wall seconds at HEAD beside {old}, medians.", ""]
+    lines += ["| command | HEAD s | MiB | older s | MiB | ratio |", "|---|---|---|---|---|---|"]
+    found = commands.measure(old)
+    for step, sides in found.items():
+        cells = []
+        for runs in reversed(sides.values()):
+            wall = statistics.median(one["wall_s"] for one in runs)
+            cells += [f"{wall:.1f}", f"{max(one.get('peak_mib', 0.0) for one in runs):.0f}"]
+        if len(cells) == 4:
+            cells.append(f"{float(cells[0]) / float(cells[2]):.2f}")
+        lines.append(f"| {step} | {' | '.join(cells)} |")
+    _write("commands", lines, {"machine": _about(), "older": old, "runs": found})
 
 
 def cohort_parts() -> None:

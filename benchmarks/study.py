@@ -102,7 +102,7 @@ def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Ru
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    watch = _Watch(process.pid)
+    watch = Watch(process.pid)
     watch.start()
     _, errors = process.communicate()
     wall = time.perf_counter() - start
@@ -111,7 +111,7 @@ def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Ru
     return Run(what, wall, watch.peak_mib, watch.engine_s, goal)
 
 
-class _Watch(threading.Thread):
+class Watch(threading.Thread):
     """Looks at a process and its descendants until it ends."""
 
     def __init__(self, pid: int) -> None:

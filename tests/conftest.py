@@ -1,6 +1,7 @@
-"""What holds for all tests: in which order they run, and projects that several look at."""
+"""What holds for all tests: in which order they run, shared projects, what the last line says."""
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,13 +20,50 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(SnakemakeStarts())
 
 
+FULL_FOR_NOW = frozenset(
+    [
+        "test_investigation_edges",
+        "test_scoliosis_figures",
+        "test_tracking_figures",
+        "test_posterior_job",
+        "test_cohort_analysis",
+        "test_posterior",
+        "test_identification_figures",
+        "test_hidden_data",
+        "test_sensitivity_figures",
+        "test_tracking_findings",
+        "test_tracking_checks",
+        "test_figures",
+        "test_tracking_page",
+        "test_cohort_figures",
+        "test_trunk_figures",
+        "test_discrepancy_page",
+        "test_wrong_inputs",
+        "test_nuisances",
+        "test_against_gould_2024a",
+        "test_cli",
+    ]
+)
+"""Files of 50 s and more: `full` until each is made light. The list must become empty."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Slow tests first. Those that share projects go to any worker, all others file by file."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
+        if item.path.stem in FULL_FOR_NOW:
+            item.add_marker(pytest.mark.full)
         if "shared" not in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line that says what could not be tested here, and why."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(one.longrepr[2].removeprefix("Skipped: ") for one in skipped)
+    told = "; ".join(f"{count} ({reason})" for reason, count in sorted(reasons.items()))
+    terminalreporter.write_line(f"not tested here: {told or 'nothing was skipped'}")
 
 
 @pytest.fixture(scope="session")

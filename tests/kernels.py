@@ -3,7 +3,9 @@
 OpenBLAS chooses its kernel by the processor, and results differ by it in rounding; numpy and scipy
 bring an OpenBLAS each. `OPENBLAS_CORETYPE` chooses another; a name that the library does not know
 is ignored by it, and one that the processor cannot run ends in an illegal instruction. So flags are
-asked first, and what took effect afterwards.
+asked first, and what took effect afterwards. `--one` asks for a kernel beside the newest that
+the processor can run, under which `make test` has run, and leaves out tests marked `full`; all
+other options are pytest's.
 """
 
 import json
@@ -22,7 +24,7 @@ KERNELS: Mapping[str, frozenset[str]] = {
     "Sandybridge": frozenset({"avx"}),
     "Nehalem": frozenset({"sse4_2"}),
 }
-"""Kernels of the OpenBLAS in the wheels of numpy and scipy, and the flags that they need.
+"""Kernels of the OpenBLAS in the wheels of numpy and scipy, newest first, and the flags they need.
 
 Processors by AMD use Haswell (from Zen on) or older ones, newer ones by Intel SkylakeX."""
 
@@ -77,8 +79,15 @@ def main(options: list[str]) -> int:
     if platform.machine() not in ("x86_64", "AMD64") or not source.exists():
         print(f"no kernels are known for {platform.system()} on {platform.machine()}: none run")
         return 0
+    kernels = runnable(flags(source.read_text()))
+    numeric = "numeric"
+    if options[:1] == ["--one"]:
+        options, numeric = options[1:], "numeric and not full"
+        kernels = dict([one for one in kernels.items() if one[1]][1:2])
+        if not kernels:
+            print("this processor can run no further kernel")
     failed = []
-    for kernel, can in runnable(flags(source.read_text())).items():
+    for kernel, can in kernels.items():
         if not can:
             print(f"{kernel}: not run, this processor cannot", flush=True)
             continue
@@ -93,7 +102,7 @@ def main(options: list[str]) -> int:
             "-m",
             "pytest",
             "-m",
-            "numeric",
+            numeric,
             *marked(),
             *options,
         ]

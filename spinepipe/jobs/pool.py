@@ -6,8 +6,6 @@ job that killed it is known, and jobs in other workers go on undisturbed.
 
 Workers are forked from a server that has imported the job modules already: a new one costs
 milliseconds. They end with the process that started them, even when that one is killed outright.
-
-One short line every two seconds about a run with thousands of jobs.
 """
 
 import contextlib
@@ -17,23 +15,25 @@ import importlib
 import multiprocessing
 import os
 import queue
+import resource
 import signal
 import sys
 import threading
-import time
 import traceback
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TextIO
+from typing import Any
 
 _JOBS = Path(__file__).resolve().parent
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
+_MOST_MEMORY_KB = 500_000
+"""A worker that once held more than this serves no further job: its memory would stay taken."""
+
 _REMEDIES = {
     errno.ENOSPC: "no space is left on the disk of {folder}; free some space",
     errno.EDQUOT: "your disk quota is used up in {folder}; free some space",
@@ -103,10 +103,13 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
     try:
         worker.connection.send((function, arguments))
         wait([worker.connection, worker.process.sentinel])
-        failure = worker.connection.recv()
+        failure, memory_kb = worker.connection.recv()
     except (EOFError, OSError):
         _fail(job, log, _fate(worker))
-    _idle.put(worker)
+    if memory_kb < _MOST_MEMORY_KB:
+        _idle.put(worker)
+    else:
+        worker.connection.close()  # at which it ends: what a large job left behind goes with it
     if failure is not None:
         written = arguments.get("output") or arguments.get("svg") or ""
         folder = os.path.dirname(failure.path or str(written)) or "."
@@ -122,7 +125,9 @@ def warm_up(modules: Sequence[str] = ()) -> None:
     """
     with _starting, _environment():
         if modules:
-            _CONTEXT.set_forkserver_preload(["spinepipe.jobs.collect", *modules])
+            _CONTEXT.set_forkserver_preload(
+                ["spinepipe.jobs.collect", "spinepipe.jobs.draw", *modules]
+            )
         forkserver.ensure_running()
 
 
@@ -187,7 +192,8 @@ def _serve(connection: Connection) -> None:
             function, arguments = connection.recv()
         except EOFError:
             return
-        connection.send(_answer(function, arguments))
+        failure = _answer(function, arguments)
+        connection.send((failure, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 
 def _end_with_parent() -> None:
@@ -248,73 +254,3 @@ def _fail(job: str, log: str, message: str, trace: str = "") -> None:
     except OSError:
         raise JobFailed(text) from None
     raise JobFailed(f"{text}\n  log: {log}") from None
-
-
-_SECONDS_BETWEEN_LINES = 2.0
-_JOBS_IN_RATE = 400
-
-
-class Progress:
-    """Counts finished jobs and writes a line with an estimate of the time left.
-
-    The estimate is the pace of a rule's latest few hundred jobs, applied to those of the rule
-    that are left: jobs of other rules may take ten times as long or as short.
-
-    Parameters
-    ----------
-    totals
-        Returns how many jobs of each rule the run needs, as far as is known by now.
-    stream
-        Where the lines go; standard error unless told.
-    clock
-        Seconds, monotonic.
-    """
-
-    def __init__(
-        self,
-        totals: Callable[[], Mapping[str, int]],
-        stream: TextIO | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._totals = totals
-        self._stream = stream or sys.stderr
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._done: Counter[str] = Counter()
-        self._finished_at: dict[str, deque[float]] = {}
-        self._printed_at = clock()
-
-    def finish(self, rule: str) -> None:
-        """Count one finished job of this rule and print a line when one is due."""
-        with self._lock:
-            self._done[rule] += 1
-            now = self._clock()
-            times = self._finished_at.setdefault(rule, deque(maxlen=_JOBS_IN_RATE))
-            times.append(now)
-            if now - self._printed_at >= _SECONDS_BETWEEN_LINES:
-                self._printed_at = now
-                print(self._line(rule), file=self._stream, flush=True)
-
-    def _line(self, rule: str) -> str:
-        try:
-            totals = self._totals()
-        except RuntimeError:  # Snakemake changed its table of jobs while we were counting
-            totals = {}
-        done, all_done = self._done[rule], sum(self._done.values())
-        total = max(totals.get(rule, 0), done)
-        everything = max(sum(totals.values()), all_done)
-        line = f"{rule}  {done}/{total}"
-        times = self._finished_at[rule]
-        if len(times) > 1 and totals:
-            pace = (times[-1] - times[0]) / (len(times) - 1)
-            line += f"  ·  {duration(pace * (total - done))} left of these"
-        return f"{line}  ·  {all_done}/{everything} jobs in all"
-
-
-def duration(seconds: float) -> str:
-    """Seconds as people say them: `34 s`, `12 min`, `3.5 h`."""
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    if seconds < 6000:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"

@@ -103,6 +103,7 @@ def picture(figure: Figure, kind: str) -> bytes:
     """A figure as the bytes of an ``svg``, ``png`` or ``pdf``, always the same."""
     content = io.BytesIO()
     figure.savefig(content, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
+    figure.set_layout_engine("none")  # solved once: the next kind has the same layout
     return content.getvalue()
 
 

@@ -10,7 +10,6 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
-from statsmodels.stats.diagnostic import lilliefors
 
 from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite
 
@@ -108,6 +107,9 @@ def _kolmogorov_smirnov(values: Array) -> Outcome:
 
 
 def _lilliefors(values: Array) -> Outcome:
+    # Loaded here: it takes 0.6 s, and most who load this file test no normality.
+    from statsmodels.stats.diagnostic import lilliefors
+
     statistic, p = lilliefors(values, dist="norm", pvalmethod="table")
     low, high = LILLIEFORS_RANGE
     message = f"p at most {low}" if p <= low else f"p at least {high}" if p >= high else ""

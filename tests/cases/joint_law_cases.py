@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects import JointLaw, create, registered
 from spinepipe.effects.contract import Array
@@ -27,8 +27,8 @@ def title(variant: tuple[str, dict[str, Any]]) -> str:
     return "-".join([name, *map(str, options.values())])
 
 
-EVERY = pytest.mark.parametrize("variant", VARIANTS, ids=title)
-DEFAULT = pytest.mark.parametrize("name", NAMES)
+EVERY = sweep("variant", VARIANTS, title)
+DEFAULT = sweep("name", NAMES)
 
 
 def law_of(variant: tuple[str, dict[str, Any]]) -> JointLaw:

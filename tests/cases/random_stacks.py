@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from sweeps import one_of_each
 
 from spinepipe.effects import Effect, Kind, create, registered
 from spinepipe.effects.contract import Array
@@ -22,6 +23,11 @@ def variants() -> list[Effect]:
         options = trial.variants if trial else ({},)
         found += [create(name, dict(one)) for one in options]
     return [effect for effect in found if effect.name != "linear_bushing"]
+
+
+def few() -> list[Effect]:
+    """Every effect and every form of it, at one place each."""
+    return one_of_each(variants(), lambda effect: (effect.name, vars(effect)))
 
 
 def values(effect: Effect, rows: int, rng: np.random.Generator) -> Array:

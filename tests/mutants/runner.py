@@ -31,6 +31,9 @@ WAITING = 20
 TIME = "time"
 """Said of a run that was stopped."""
 
+OF_MAKE_TEST = ("-m", "not full")
+"""A fault counts as seen where `make test` sees it."""
+
 SHARED = ""
 """What no test does alone: fixtures of a whole file, and loading it."""
 
@@ -135,9 +138,9 @@ def _run(tests: Sequence[str], most_s: int, told: int, kept: str) -> int:
     try:
         first = First(told, tests)
         if not kept:
-            return int(pytest.main(["-x", "-q", *tests], plugins=[first]))
+            return int(pytest.main(["-x", "-q", *OF_MAKE_TEST, *tests], plugins=[first]))
         followed = Followed(Path(kept))
-        ended = int(pytest.main(["-q", *tests], plugins=[first, followed]))
+        ended = int(pytest.main(["-q", *OF_MAKE_TEST, *tests], plugins=[first, followed]))
         followed.save()
         return ended
     except BaseException as broken:

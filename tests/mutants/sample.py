@@ -27,6 +27,11 @@ AREAS = {
     "films": ("spinepipe/studies/scoliosis",),
     "trunk": ("spinepipe/muscles",),
     "tracking": ("spinepipe/motion",),
+    "cohort": ("spinepipe/cohort",),
+    "testing_machine": ("spinepipe/testing_machine",),
+    "documents": ("spinepipe/documents",),
+    "jobs": ("spinepipe/jobs",),
+    "report": ("spinepipe/report",),
 }
 """Folders of each area that must be safe."""
 

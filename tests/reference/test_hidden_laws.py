@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from tests.generators.hidden import CATALOGUE, KNOWN, Hidden
 from tests.generators.hidden.anatomy import Bones
@@ -75,7 +76,7 @@ LAWS: dict[str, tuple[float, dict[str, object], Callable[[float], float]]] = {
 }
 
 
-@pytest.mark.parametrize("law", LAWS)
+@sweep("law", LAWS)
 def test_stiffening_holds_the_moment(law: str) -> None:
     rate, shape, load = LAWS[law]
     expected = brentq(lambda q: load(q) - M, 0.0, 0.15, xtol=1e-14)
@@ -218,7 +219,7 @@ ZONES: dict[str, Callable[[float], float]] = {
 }
 
 
-@pytest.mark.parametrize("formula", ZONES)
+@sweep("formula", ZONES)
 def test_a_smooth_zone_takes_off_a_saturating_load(formula: str) -> None:
     lost = ZONES[formula]
     expected = brentq(lambda q: K * q - 0.8 * K * 0.03 * lost(q / 0.03) - M, 0.0, 0.3, xtol=1e-14)
@@ -292,7 +293,7 @@ def test_bouc_and_wen_as_an_equation_of_motion() -> None:
     assert bouc_wen(np.array(0.4), np.array(0.0)) == 0.4
 
 
-@pytest.mark.parametrize("formula", ["stretched", "logarithmic", "power"])
+@sweep("formula", ["stretched", "logarithmic", "power"])
 def test_a_chain_creeps_as_its_formula(formula: str) -> None:
     """Under one constant load, from 3 s to 20 minutes; seven units are within 2 % of the whole."""
     shares, times = chain(formula, 60.0)

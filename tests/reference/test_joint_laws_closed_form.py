@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from sweeps import sweep
 
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -73,7 +74,7 @@ class TestOneJoint:
         expected = moment / K if beyond < 0.0 else np.sign(moment) * (0.08 + beyond)
         assert found[3] == pytest.approx(expected, abs=1e-14)
 
-    @pytest.mark.parametrize("sharpness", [2.0, 2.7, 6.0, 30.0])
+    @sweep("sharpness", [2.0, 2.7, 6.0, 30.0])
     def test_neutral_zone(self, moment: float, sharpness: float) -> None:
         found = angle(moment, "neutral_zone", {}, 0.4, 0.06, sharpness)
 
@@ -100,7 +101,7 @@ class TestOneJoint:
         expected = brentq(left, -0.5, 0.5, xtol=1e-15)
         assert found[3] == pytest.approx(expected, abs=0.02 * 0.6 * 0.04 / 0.4)
 
-    @pytest.mark.parametrize("offset", [-0.8, 0.3, 0.8])
+    @sweep("offset", [-0.8, 0.3, 0.8])
     def test_neutral_zone_off_centre(self, moment: float, offset: float) -> None:
         values = (0.4, 0.06, 2.7, offset)
         found = angle(moment, "neutral_zone", {"zone": "off_centre"}, *values)
@@ -120,7 +121,7 @@ class TestOneJoint:
         # tanh of 0.017 / 0.0017 is 1 - 4e-9
         assert found[3] == pytest.approx(expected, abs=1e-10)
 
-    @pytest.mark.parametrize(("side", "way"), [("positive", 1.0), ("negative", -1.0)])
+    @sweep("side, way", [("positive", 1.0), ("negative", -1.0)])
     def test_stop(self, moment: float, side: str, way: float) -> None:
         found = angle(moment, "facet_contact", {"side": side}, 100.0, 0.05, 1.0)
         free, stopped = moment / K, (moment + way * 100.0 * 0.05) / (K + 100.0)
@@ -151,7 +152,7 @@ class TestOneJoint:
         expected = np.linalg.solve([[1e5, 900.0], [900.0, K]], [0.0, moment])
         np.testing.assert_allclose(found[[0, 3]], expected, rtol=0, atol=1e-14)
 
-    @pytest.mark.parametrize("compression", [400.0, -200.0])
+    @sweep("compression", [400.0, -200.0])
     def test_preload(self, moment: float, compression: float) -> None:
         """A force through the joint's origin stays there, so it compresses and does not turn."""
         found = angle(moment, "preload_stiffening", {}, 1e-3, compression=compression)

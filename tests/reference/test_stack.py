@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import random_stacks as draw
 from example_effects import ExtraWeight
+from sweeps import sweep
 
 from spinepipe.effects import Effect, Kind, Parameter
 from spinepipe.effects.contract import Array
@@ -44,7 +45,13 @@ pytestmark = pytest.mark.numeric
 AGREEMENT = 1e-10
 """m and rad; of derivatives, of the largest by each unknown."""
 
-VARIANTS = draw.variants()
+VARIANTS, FEW = draw.variants(), draw.few()
+EVERY = pytest.mark.parametrize(
+    "effects",
+    [pytest.param(FEW, id="few"), pytest.param(VARIANTS, id="every", marks=pytest.mark.full)],
+)
+"""All forms at one place each; laws at every place are in `tests/unit/test_joint_law_slopes`."""
+
 Run = tuple[SpineModel, LoadCase]
 
 
@@ -114,13 +121,17 @@ def compare(runs: Sequence[Run]) -> None:
             assert not one[lanes][..., m:].any()
 
 
-@pytest.mark.parametrize("effect", VARIANTS, ids=str)
-def test_each_effect_alone(effect: Effect) -> None:
-    rng = np.random.default_rng(len(str(effect)))
-    runs, by_engine = standing([draw.model(rng, 3, [effect], 0.5) for _ in range(5)])
-    assert len(runs) >= 3
-    assert not by_engine.all()
-    compare(runs[:3])
+@EVERY
+def test_each_effect_alone(effects: Sequence[Effect]) -> None:
+    @sweep("effect", effects, str)
+    def alone(effect: Effect) -> None:
+        rng = np.random.default_rng(len(str(effect)))
+        runs, by_engine = standing([draw.model(rng, 3, [effect], 0.5) for _ in range(5)])
+        assert len(runs) >= 3
+        assert not by_engine.all()
+        compare(runs[:2])
+
+    alone()
 
 
 @pytest.mark.parametrize("n_joints", [1, 2, 4, 8, 17])
@@ -209,9 +220,6 @@ def test_an_effect_that_takes_no_stack_is_solved_by_the_engine() -> None:
     np.testing.assert_array_equal(poses.q[: len(expected)], expected)
 
 
-IDLE = [effect for effect in VARIANTS if isinstance(effect, Acting)]
-
-
 BEFORE = (
     "nonlinear_stiffening",
     "axes_tilt",
@@ -227,16 +235,26 @@ def named(*names: str) -> list[Effect]:
 
 
 @pytest.mark.parametrize("before", [("nonlinear_stiffening",), BEFORE], ids=["laws", "every kind"])
-@pytest.mark.parametrize("effect", IDLE, ids=str)
-def test_what_idle_effects_would_do(effect: Effect, before: tuple[str, ...]) -> None:
+@EVERY
+def test_what_idle_effects_would_do(effects: Sequence[Effect], before: tuple[str, ...]) -> None:
     """Without solving anew: as the derivatives of a model that has them, switched off."""
     rng = np.random.default_rng(8)
-    (model, case), _ = draw.model(rng, 3, named(*before), 0.5), None
-    plain = stack_of([(model, case)])
+    run = draw.model(rng, 3, named(*before), 0.5)
+    plain = stack_of([run])
     q = plain.solve().q
     answering = Answering.of(plain, q)
     assert answering is not None
-    parameters = effect.parameters
+
+    @sweep("effect", [effect for effect in effects if isinstance(effect, Acting)], str)
+    def idle(effect: Effect) -> None:
+        as_switched_off(run, q, answering, effect)
+
+    idle()
+
+
+def as_switched_off(run: Run, q: Array, answering: Answering, effect: Effect) -> None:
+    """What an effect would do in a stack of one run, against a stack that has it, off."""
+    (model, case), parameters = run, effect.parameters
     off = np.array([p.default if p.off is None else p.off for p in parameters])
     values = np.stack([off, [_elsewhere(p, x) for p, x in zip(parameters, off, strict=True)]])
     strengths = [number for number, p in enumerate(parameters) if p.off is not None]
@@ -278,7 +296,7 @@ def test_runs_for_the_engine_are_not_answered() -> None:
 
 def test_derivatives_by_loads_and_joint_poses() -> None:
     rng = np.random.default_rng(6)
-    shapes = [effect for effect in VARIANTS if effect.name in ("axes_tilt", "neutral_zone")]
+    shapes = [effect for effect in FEW if effect.name in ("axes_tilt", "neutral_zone")]
     runs, _ = standing([draw.model(rng, 4, [effect], 0.5) for effect in shapes])
     stack = stack_of(runs)
     q = stack.solve().q
@@ -302,7 +320,7 @@ def test_derivatives_by_loads_and_joint_poses() -> None:
 HANGING = [effect for effect in VARIANTS if effect.kind in (Kind.LOAD, Kind.PATH)]
 
 
-@pytest.mark.parametrize("effect", HANGING, ids=lambda effect: effect.name)
+@sweep("effect", HANGING, str)
 def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it(effect: Effect) -> None:
     rng = np.random.default_rng(7)
     stack = stack_of([draw.model(rng, 2, [effect])])

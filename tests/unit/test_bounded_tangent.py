@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from example_effects import NOWHERE, scoped, slope, spine
+from sweeps import sweep
 
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -27,7 +28,7 @@ def load(q: float, stretch: float, lower: float, upper: float) -> float:
     return float(response.load[0, BENDING])
 
 
-@pytest.mark.parametrize("ends", ENDS)
+@sweep("ends", ENDS)
 def test_it_carries_nothing_at_the_neutral_pose(ends: tuple[float, float]) -> None:
     assert load(0.0, 7.0, *ends) == 0.0
 
@@ -41,7 +42,7 @@ def test_bending_by_five_sixths_of_the_way_takes_what_jalalian_s_ends_imply() ->
     assert load(bent, stretch, *ends) / bent / first == pytest.approx(2.85, abs=5e-3)
 
 
-@pytest.mark.parametrize("ends", ENDS)
+@sweep("ends", ENDS)
 def test_load_grows_without_limit_towards_both_ends_and_is_infinite_beyond(
     ends: tuple[float, float],
 ) -> None:
@@ -53,7 +54,7 @@ def test_load_grows_without_limit_towards_both_ends_and_is_infinite_beyond(
         assert load(1.0001 * end, 0.0, *ends) == 0.0
 
 
-@pytest.mark.parametrize("ends", ENDS)
+@sweep("ends", ENDS)
 def test_derivatives_are_those_of_the_load(ends: tuple[float, float]) -> None:
     for share in (-0.9, -0.3, 0.2, 0.85):
         q = share * (ends[1] if share > 0.0 else -ends[0])
@@ -96,8 +97,8 @@ def expected(moment_nm: float, lower: float, upper: float) -> float:
     return float((np.arctan(moment_nm / 6.0 + np.tan(c)) - c) / b)
 
 
-@pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("moment_nm", [-3000.0, -40.0, 2.0, 60.0, 5000.0])
+@sweep("ends", ENDS)
+@sweep("moment_nm", [-3000.0, -40.0, 2.0, 60.0, 5000.0])
 def test_a_joint_under_any_moment_stays_between_its_ends(
     moment_nm: float, ends: tuple[float, float]
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Kind, Spread, create, registered
 from spinepipe.effects.contract import Parameter
@@ -147,7 +148,7 @@ SIZES: list[tuple[str, dict[str, Any], str, str, str, float, float, float, float
 ]
 
 
-@pytest.mark.parametrize("row", SIZES, ids=lambda row: "-".join(map(str, (row[0], row[1], row[2]))))
+@sweep("row", SIZES, lambda row: "-".join(map(str, (row[0], row[1], row[2]))))
 def test_sizes_and_bounds(row: tuple[Any, ...]) -> None:
     effect, options, name, people, si, low, usual, high, sd = row
     found = parameter(effect, options, name)
@@ -157,8 +158,8 @@ def test_sizes_and_bounds(row: tuple[Any, ...]) -> None:
     assert found.unit == si
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "of", "usual", "unit"),
+@sweep(
+    "coordinate, of, usual, unit",
     [
         ("extension", ("extension", "extension"), 500.0, "N m/rad^2"),  # 5 N m at 6 deg
         ("anterior", ("extension",), 1000.0, "N/rad"),
@@ -176,8 +177,8 @@ def test_a_power_term_is_as_large_as_its_motions_make_it(
     assert found.unit == unit
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "over", "usual", "unit"),
+@sweep(
+    "coordinate, over, usual, unit",
     [
         ("extension", "itself", 50.0, "N m/rad"),
         ("anterior", "itself", 1e5, "N/m"),
@@ -200,7 +201,7 @@ def test_a_table_has_stretches_of_any_sign(
     assert law.parameters[4].meaning.endswith("0 to 25 % of the reach")
 
 
-@pytest.mark.parametrize(("coordinate", "most"), [("extension", 1.0), ("right", 0.01)])
+@sweep("coordinate, most", [("extension", 1.0), ("right", 0.01)])
 def test_a_table_reaches_ten_usual_reaches_at_most(coordinate: str, most: float) -> None:
     assert create("tabulated_law", {"coordinate": coordinate, "reach": most}).furthest == most  # type: ignore[attr-defined]
     for reach in (1.001 * most, -0.001):
@@ -288,8 +289,8 @@ def test_strengths_are_off_at_nothing_or_at_all_of_it() -> None:
                 assert one.off == (1.0 if whole else 0.0), f"{name} {one.name}"
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "off", "side"),
+@sweep(
+    "low, high, off, side",
     [(0.0, 1.0, 0.0, 1.0), (-1.0, 0.0, 0.0, -1.0), (-1.0, 1.0, 0.0, 0.0), (2.0, 3.0, None, 0.0)],
 )
 def test_a_strength_has_the_side_that_its_bounds_leave(

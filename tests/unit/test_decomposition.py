@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from sweeps import sweep
 
 from spinepipe.decomposition import (
     NotFiniteError,
@@ -143,7 +144,7 @@ def test_any_shape_rank_and_size(
     np.testing.assert_allclose(whole, matrix, rtol=0, atol=LEAST * (1 + np.abs(matrix).max()))
 
 
-@pytest.mark.parametrize("shape", [(30, 12), (12, 30), (12, 12), (378, 109), (5, 12, 12)])
+@sweep("shape", [(30, 12), (12, 30), (12, 12), (378, 109), (5, 12, 12)])
 def test_without_zero_columns_results_are_numpys_to_the_last_bit(shape: tuple[int, ...]) -> None:
     matrix = np.random.default_rng(1).normal(size=shape)
     for found, expected in zip(
@@ -217,7 +218,7 @@ def test_where_qr_gives_up_too_it_is_said(monkeypatch: pytest.MonkeyPatch) -> No
 
 @either_way
 @of_each_shape
-@pytest.mark.parametrize("width", [(), (3,)])
+@sweep("width", [(), (3,)])
 def test_least_squares_is_the_normal_equations_at_least_norm(
     matrix: Array, lapack: Callable[[], Iterator[list[str]]], width: tuple[int, ...]
 ) -> None:
@@ -262,7 +263,7 @@ def test_a_pseudo_inverse_meets_the_conditions_of_penrose(
 
 
 @either_way
-@pytest.mark.parametrize("size", [1, 3, 60])
+@sweep("size", [1, 3, 60])
 def test_eigenvectors_are_orthonormal_and_make_the_matrix(
     size: int, lapack: Callable[[], Iterator[list[str]]]
 ) -> None:
@@ -291,7 +292,7 @@ def test_eigenvalues_of_a_stack_are_those_of_each(
 # Inside bounds -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bound", [10.0, 0.3])
+@sweep("bound", [10.0, 0.3])
 def test_bounded_least_squares_ends_in_the_same_place_either_way(bound: float) -> None:
     """A curved problem of a zero and two like columns; with the narrow bounds, on some of them."""
     rng = np.random.default_rng(6)
@@ -338,8 +339,8 @@ def test_bounded_lstsq_ends_in_the_same_place_either_way() -> None:
 # What is refused ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize(
+@sweep("bad", [np.nan, np.inf, -np.inf])
+@sweep(
     "decompose",
     [
         svd,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.calibrate.descent import Settled, damped_step, descend, descend_along, once
 from spinepipe.effects.contract import Array
@@ -13,8 +14,8 @@ FAR = (np.full(1, -1e3), np.full(1, 1e3))
 ONE = np.ones(1)
 
 
-@pytest.mark.parametrize("damping", [1e-3, 0.5, 4.0])
-@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@sweep("damping", [1e-3, 0.5, 4.0])
+@sweep("size", [1e-6, 1.0, 1e6])
 def test_a_damped_step_is_a_share_of_the_whole_one_in_any_unit(damping: float, size: float) -> None:
     """(r + a s)^2 + d (a s)^2 is least where s = -r / (a (1 + d))."""
     step = damped_step(
@@ -97,7 +98,7 @@ def test_a_scale_is_the_unit_in_which_steps_are_taken() -> None:
         assert (len(point.looks), ended.arrived, ended.evaluations) == (looks, True, looks)
 
 
-@pytest.mark.parametrize(("tolerance", "looks"), [(0.19, 2), (0.21, 1)])
+@sweep("tolerance, looks", [(0.19, 2), (0.21, 1)])
 def test_a_gain_that_is_a_small_share_of_the_cost_is_none(tolerance: float, looks: int) -> None:
     """1 of 5 is to be gained at first; then next to nothing."""
     point = Looked(constant=2.0)
@@ -107,7 +108,7 @@ def test_a_gain_that_is_a_small_share_of_the_cost_is_none(tolerance: float, look
     assert ended.half_cost == pytest.approx(2.5 if looks == 1 else 2.0, rel=1e-5)
 
 
-@pytest.mark.parametrize(("share", "taken"), [(2e-3, True), (0.5e-3, False), (-0.1, False)])
+@sweep("share, taken", [(2e-3, True), (0.5e-3, False), (-0.1, False)])
 def test_a_step_that_breaks_its_promise_is_not_taken(share: float, taken: bool) -> None:
     """At least a thousandth of the gain that the slope promises."""
 
@@ -119,7 +120,7 @@ def test_a_step_that_breaks_its_promise_is_not_taken(share: float, taken: bool) 
     assert ended.half_cost == pytest.approx(0.5 * (1.0 - share if taken else 1.0))
 
 
-@pytest.mark.parametrize(("low", "high", "end"), [(-1.0, 0.25, 0.25), (1.5, 4.0, 1.5)])
+@sweep("low, high, end", [(-1.0, 0.25, 0.25), (1.5, 4.0, 1.5)])
 def test_it_stops_at_a_bound_from_either_side(low: float, high: float, end: float) -> None:
     for scale in (0.2, 5.0):
         start, bounds = np.array([0.5 * (low + high)]), (np.array([low]), np.array([high]))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Parameter, create, registered
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
@@ -29,11 +30,7 @@ def variants() -> Iterator[tuple[str, dict[str, Any]]]:
             yield name, dict(options)
 
 
-EVERY = pytest.mark.parametrize(
-    ("name", "options"),
-    tuple(variants()),
-    ids=lambda one: one if isinstance(one, str) else str(one),
-)
+EVERY = sweep("name, options", variants)
 
 
 def of(name: str, **options: Any) -> dict[str, Parameter]:
@@ -99,8 +96,8 @@ def test_translations_are_told_in_metres_and_rotations_in_radians(
         assert one.unit.removeprefix("N m/") not in wrong
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "off", "side"),
+@sweep(
+    "low, high, off, side",
     [
         (0.0, 2.0, 0.0, 1.0),
         (0.5, 2.0, 0.0, 1.0),
@@ -127,8 +124,8 @@ def told(one: Parameter) -> tuple[float, float, float, float]:
     return one.default, one.prior_scale, one.low, one.high
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "gap", "stiffness"),
+@sweep(
+    "coordinate, gap, stiffness",
     [
         ("extension", 2.0 * DEG, 50.0),
         ("right_bending", 2.0 * DEG, 70.0),
@@ -150,8 +147,8 @@ def test_stops_of_facets(coordinate: str, gap: float, stiffness: float) -> None:
         assert found["exponent"].in_a_file == 1.0  # a linear stop, as before there were others
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "width"),
+@sweep(
+    "coordinate, width",
     [
         ("extension", 1.5 * DEG),
         ("right_bending", 1.5 * DEG),
@@ -177,8 +174,8 @@ def test_neutral_zones(coordinate: str, width: float) -> None:
     assert found["offset"].tried == (-1.0, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "at", "least"),
+@sweep(
+    "coordinate, at, least",
     [
         ("extension", 4.0 * DEG, 3.0 * DEG),
         ("right_bending", 4.0 * DEG, 3.0 * DEG),
@@ -199,8 +196,8 @@ def test_breaks_of_stiffening(coordinate: str, at: float, least: float) -> None:
     assert least == pytest.approx(2.0 * width)
 
 
-@pytest.mark.parametrize(
-    ("shape", "name", "turning", "moving"),
+@sweep(
+    "shape, name, turning, moving",
     [
         ("exponential", "rate", (10.0, 100.0), (5e2, 5e4)),
         ("tangent", "growth", (75.0, 5e3), (5e5, 5e9)),
@@ -236,7 +233,7 @@ def test_friction_of_joints() -> None:
     assert found["spread"].tried == (0.0,)
 
 
-@pytest.mark.parametrize("number", range(3))
+@sweep("number", range(3))
 def test_coupling_by_how_many_of_the_pair_are_translations(number: int) -> None:
     """A fifth of the stiffness in lateral bending, and the like of forces."""
     unit, usual, most = (("N m/rad", 15.0, 1e4), ("N/rad", 1e3, 1e7), ("N/m", 3e4, 1e9))[number]

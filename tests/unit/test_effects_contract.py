@@ -20,6 +20,7 @@ from example_effects import (
     slope,
     spine,
 )
+from sweeps import sweep
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.effects import (
@@ -88,6 +89,14 @@ TOGETHER = (
 CASES = [
     *(pytest.param(effects, id=name) for name, effects in ALONE.items()),
     pytest.param(TOGETHER, id="all together"),
+    *(
+        pytest.param((effect,), id=f"one row for all joints: {effect.effect.kind}")
+        for effect in (
+            scoped(CubicStiffening(per_joint=False), (0, 1, 2)),
+            scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),
+            scoped(MarkerError(per_joint=False), (0, 1, 2), (1.1, 0.02)),
+        )
+    ),
 ]
 
 
@@ -115,14 +124,14 @@ def reported(system: System, free: tuple[FreeParameter, ...], x: Array) -> Array
     return np.stack([observe(other, step.equilibrium.q) for step in follow(other)])
 
 
-@pytest.mark.parametrize("effects", CASES)
+@sweep("effects", CASES)
 def test_examples_satisfy_exactly_their_own_protocol(effects) -> None:
     for scope in effects:
         kinds = [kind for kind, protocol in PROTOCOLS.items() if isinstance(scope.effect, protocol)]
         assert kinds == [scope.effect.kind]
 
 
-@pytest.mark.parametrize("effects", CASES)
+@sweep("effects", CASES)
 def test_tangent_is_the_slope_of_the_residual(effects) -> None:
     system, rng = system_of(effects), np.random.default_rng(1)
     q = np.tile([1e-3] * 3 + [0.15] * 3, 3) * rng.normal(size=18)
@@ -141,7 +150,7 @@ def test_tangent_is_the_slope_of_the_residual(effects) -> None:
         np.testing.assert_allclose(tangent[:, column], expected, rtol=1e-7, atol=1e-4)
 
 
-@pytest.mark.parametrize("effects", CASES)
+@sweep("effects", CASES)
 def test_parameter_sensitivities_are_slopes_of_solved_motion(effects) -> None:
     system = system_of(effects)
     free = every_parameter(system.model)
@@ -221,22 +230,6 @@ def test_effects_out_of_a_tests_scope_do_nothing() -> None:
         assert not by_x.any()
 
 
-@pytest.mark.parametrize(
-    "effects",
-    [
-        pytest.param((scoped(CubicStiffening(per_joint=False), (0, 1, 2)),), id="joint law"),
-        pytest.param(
-            (scoped(JointCentreOffset(False), (0, 1, 2), (0.008, -0.006)),), id="geometry"
-        ),
-        pytest.param(
-            (scoped(MarkerError(per_joint=False), (0, 1, 2), (1.1, 0.02)),), id="measurement"
-        ),
-    ],
-)
-def test_one_row_of_parameters_for_all_joints(effects) -> None:
-    test_parameter_sensitivities_are_slopes_of_solved_motion(effects)
-
-
 MOVED = {
     "joint law": 0.5,
     "law on carried load": 0.1,
@@ -249,7 +242,7 @@ MOVED = {
 }
 
 
-@pytest.mark.parametrize("name", MOVED)
+@sweep("name", MOVED)
 def test_calibration_finds_an_effects_parameters_back(name: str) -> None:
     model = spine(3, effects=ALONE[name])
     free = free_parameters(

@@ -78,11 +78,10 @@ def problem_of(effects: tuple[ScopedEffect, ...], zeroed: bool, correlated: bool
     return Problem(model, readings, free, WEIGHTS, -bounds, bounds, correlated=correlated)
 
 
-@pytest.mark.parametrize("on", [True, False], ids=["acting", "off"])
 @pytest.mark.parametrize(
-    ("zeroed", "correlated"),
-    [(False, False), (True, False), (True, True)],
-    ids=["as read", "zeroed", "whitened"],
+    ("on", "zeroed", "correlated"),
+    [(True, False, False), (False, True, False), (True, True, True)],
+    ids=["acting, as read", "off, zeroed", "acting, whitened"],
 )
 def test_the_jacobian_is_the_slope_of_the_residuals(
     on: bool, zeroed: bool, correlated: bool
@@ -99,7 +98,7 @@ def test_the_jacobian_is_the_slope_of_the_residuals(
     # all unknowns alike in what they do, inwards: most strengths are off at the end of what is
     # allowed; differences of fourth order
     reach = np.minimum(0.02 * problem.scale, 0.5 / np.maximum(size, 1e-9))
-    for mixture in np.random.default_rng(7).uniform(0.2, 1.0, (3, m)) * reach:
+    for mixture in np.random.default_rng(7).uniform(0.2, 1.0, (2, m)) * reach:
         at = [evaluator.at(number * mixture).residual for number in range(5)]
         expected = np.tensordot([-25.0, 48.0, -36.0, 16.0, -3.0], at, 1) / 12.0
         scale = np.abs(expected).max()
@@ -131,8 +130,21 @@ def friction_problem(start: SpineModel, truth: SpineModel, noise: Array) -> Prob
     return Problem(start, (MeasuredCase(case, measured),), free, WEIGHTS, -bounds, bounds)
 
 
-@pytest.mark.parametrize("start", [(0.5, 1.0), (0.05, 1.0), (3.0, 0.2)])
-@pytest.mark.parametrize("truth", [(0.8, 0.6), (0.3, 2.0)])
+STARTS = [(0.5, 1.0), (0.05, 1.0), (3.0, 0.2)]
+TRUTHS = [(0.8, 0.6), (0.3, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("truth", "start"),
+    [
+        (TRUTHS[1], STARTS[1]),
+        *(
+            pytest.param(truth, start, marks=pytest.mark.full)
+            for truth in TRUTHS
+            for start in STARTS
+        ),
+    ],
+)
 def test_stiffness_and_friction_come_back_from_loading_and_unloading(truth, start) -> None:
     there = with_friction(*truth)
     found = fit(friction_problem(with_friction(*start, stiffer=1.6), there, np.zeros(6)))

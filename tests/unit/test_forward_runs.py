@@ -76,7 +76,7 @@ def test_a_run_ends_where_settling_ends(duration_s: float) -> None:
         np.testing.assert_allclose(here, there, rtol=0, atol=2e-3 * np.abs(there).max())
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_noiseless_motion_and_a_sane_step_give_the_truth() -> None:
     """Most of the time: one fit in some is stopped early by the noise of the runs."""
     off = []

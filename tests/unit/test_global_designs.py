@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import erf, erfinv
 from scipy.stats import spearmanr
+from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import DUMMY, design_problems, draw
 from spinepipe.sensitivity.global_indices.spread import (
@@ -19,7 +20,7 @@ GROUPS = ("left", None, "left", None)
 SIZES = {"sobol": 8, "latin_hypercube": 20, "morris": 6, "fast": 193}
 
 
-@pytest.mark.parametrize("method", SIZES)
+@sweep("method", SIZES)
 def test_the_same_seed_gives_the_same_design_and_another_another(method: str) -> None:
     first, again, other = (draw(method, FACTORS, SIZES[method], seed) for seed in (0, 0, 1))
     assert first.unit.tobytes() == again.unit.tobytes()
@@ -30,7 +31,7 @@ BLOCKS = {"sobol": 2 * 4 + 2, "latin_hypercube": 1, "morris": 4 + 1, "fast": 193
 """Runs that stand or fall together, of four factors."""
 
 
-@pytest.mark.parametrize("method", SIZES)
+@sweep("method", SIZES)
 def test_as_many_runs_as_the_methods_need(method: str) -> None:
     design = draw(method, FACTORS, SIZES[method], 3)
     assert design.block == BLOCKS[method]
@@ -38,8 +39,8 @@ def test_as_many_runs_as_the_methods_need(method: str) -> None:
     assert design.factors == design.inputs == FACTORS
 
 
-@pytest.mark.parametrize("method", SIZES)
-@pytest.mark.parametrize("dummy", [False, True])
+@sweep("method", SIZES)
+@sweep("dummy", [False, True])
 def test_a_dummy_is_a_factor_like_others(method: str, dummy: bool) -> None:
     samples = 257 if method == "fast" else SIZES[method]
     design = draw(method, FACTORS, samples, 3, dummy=dummy)
@@ -49,7 +50,7 @@ def test_a_dummy_is_a_factor_like_others(method: str, dummy: bool) -> None:
     assert design.unit.max() <= 1.0
 
 
-@pytest.mark.parametrize(("second_order", "runs"), [(True, 8 * 8), (False, 8 * 5)])
+@sweep("second_order, runs", [(True, 8 * 8), (False, 8 * 5)])
 def test_a_sobol_block_exchanges_one_group_at_a_time(second_order: bool, runs: int) -> None:
     design = draw("sobol", FACTORS, 8, 3, groups=GROUPS, second_order=second_order)
     assert design.inputs == ("left", "b", "d")
@@ -94,8 +95,8 @@ def test_fast_factors_of_a_curve_do_not_move_as_one() -> None:
         draw("fast", FACTORS, 192, 3)
 
 
-@pytest.mark.parametrize(
-    ("method", "samples", "groups", "said"),
+@sweep(
+    "method, samples, groups, said",
     [
         ("sobol", 100, None, "power of two"),
         ("morris", 1, None, "at least 2 samples"),
@@ -121,8 +122,8 @@ def test_all_problems_are_told_at_once() -> None:
         draw("best", FACTORS, 8, 3)
 
 
-@pytest.mark.parametrize(
-    ("method", "factors", "least"),
+@sweep(
+    "method, factors, least",
     [
         ("sobol", 4, 2),
         ("latin_hypercube", 4, 2),
@@ -141,12 +142,12 @@ def test_the_fewest_samples_of_a_method(method: str, factors: int, least: int) -
     assert len(np.unique(drawn.unit.round(9), axis=0)) > 1
 
 
-@pytest.mark.parametrize(("levels", "wrong"), [(0, 1), (1, 1), (2, 0), (3, 1), (4, 0), (7, 1)])
+@sweep("levels, wrong", [(0, 1), (1, 1), (2, 0), (3, 1), (4, 0), (7, 1)])
 def test_levels_of_morris_are_even(levels: int, wrong: int) -> None:
     assert len(design_problems("morris", FACTORS, (None,) * 4, 10, levels=levels)) == wrong
 
 
-@pytest.mark.parametrize(("harmonics", "least"), [(1, 13), (6, 433)])
+@sweep("harmonics, least", [(1, 13), (6, 433)])
 def test_more_harmonics_need_more_samples(harmonics: int, least: int) -> None:
     for samples, wrong in ((least, 0), (least - 1, 1)):
         found = design_problems("fast", FACTORS, (None,) * 4, samples, harmonics=harmonics)
@@ -181,8 +182,8 @@ def test_a_part_is_the_first_blocks() -> None:
         draw("fast", FACTORS, 193, 3).first(100)
 
 
-@pytest.mark.parametrize(
-    ("spread", "share", "value"),
+@sweep(
+    "spread, share, value",
     [
         (Uniform(-5.0, 5.0), 0.75, 2.5),
         (LogUniform(0.5, 2.0), 0.5, 1.0),
@@ -198,7 +199,7 @@ def test_quantiles(spread: Uniform | Normal, share: float, value: float) -> None
     np.testing.assert_allclose(spread.values(np.array([share])), value, rtol=1e-6)
 
 
-@pytest.mark.parametrize("spread", [Normal(0.0, 1.0), LogNormal(1.0, 1.0), Normal(0.0, 1.0, low=0)])
+@sweep("spread", [Normal(0.0, 1.0), LogNormal(1.0, 1.0), Normal(0.0, 1.0, low=0)])
 def test_endless_spreads_stay_finite_at_the_ends(spread: Normal | LogNormal) -> None:
     ends = spread.values(np.array([0.0, 1.0]))
     assert np.isfinite(ends).all()
@@ -215,7 +216,7 @@ def test_levels_of_morris_reach_the_ends_or_the_stated_quantiles() -> None:
         values_of(design, spreads[:2])
 
 
-@pytest.mark.parametrize(
+@sweep(
     "make",
     [
         lambda: Uniform(1.0, 1.0),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.statistics import (
     Ended,
@@ -47,8 +48,8 @@ def test_kruskal_wallis_gives_the_published_result_with_ties() -> None:
     assert found.message == "H_c 5.99 (df 2); chi-squared p; ties: 14 of 18 values"
 
 
-@pytest.mark.parametrize(
-    ("groups", "h", "p"),
+@sweep(
+    "groups, h, p",
     [
         ([[1, 2], [3, 4], [5, 6]], 4.5714, 0.067),
         ([[1, 2, 3], [4, 5, 6], [7, 8, 9]], 7.2, 0.004),
@@ -134,9 +135,7 @@ def test_critical_h_is_that_of_the_degrees_of_freedom() -> None:
         critical_h(1)
 
 
-@pytest.mark.parametrize(
-    "groups", [[], [[1, 2, 3]], [[1, 2], []], [[1], [2], [3]]], ids=["none", "one", "empty", "ones"]
-)
+@sweep("groups", [[], [[1, 2, 3]], [[1, 2], []], [[1], [2], [3]]])
 def test_groups_that_cannot_be_compared(groups) -> None:
     found = kruskal_wallis(groups)
     assert (found.status, found.statistic, found.p) == (Ended.TOO_FEW, None, None)
@@ -166,7 +165,7 @@ def test_wilcoxon_gives_the_published_maize_result() -> None:
     assert found.p == pytest.approx(0.041259765625, abs=1e-12)
 
 
-@pytest.mark.parametrize("n", [20, 50])
+@sweep("n", [20, 50])
 def test_wilcoxon_without_ties_agrees_with_another_library(n: int) -> None:
     x, y = np.random.default_rng(n).normal((0.3, 0.0), 1.0, size=(n, 2)).T
     found = stats.wilcoxon(x - y, method="exact")
@@ -231,7 +230,7 @@ def test_exchanging_the_two_turns_the_effect() -> None:
     assert other.p == pytest.approx(one.p, rel=1e-12)
 
 
-@pytest.mark.parametrize("values", [[1.0, 2.0, 3.0, 4.0], [0.0, 0.0]])
+@sweep("values", [[1.0, 2.0, 3.0, 4.0], [0.0, 0.0]])
 def test_pairs_without_a_difference(values) -> None:
     found = wilcoxon_signed_rank(values, values)
     assert (found.status, found.p, found.n) == (Ended.CONSTANT, None, len(values))
@@ -293,7 +292,7 @@ def test_fits_without_residual_have_no_test() -> None:
     assert (none_left.status, none_left.p) == (Ended.TOO_FEW, None)
 
 
-@pytest.mark.parametrize("bad", [(1.0, 10, 0.5, 10), (-1.0, 10, 0.5, 8), (1.0, 10, math.nan, 8)])
+@sweep("bad", [(1.0, 10, 0.5, 10), (-1.0, 10, 0.5, 8), (1.0, 10, math.nan, 8)])
 def test_what_can_be_no_nested_fits_is_refused(bad) -> None:
     with pytest.raises(ValueError, match=r"degrees of freedom|not negative"):
         f_test_nested(*bad)

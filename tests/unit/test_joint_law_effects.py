@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from joint_law_cases import DEFAULT, EVERY, law_of
+from sweeps import sweep
 
 from spinepipe.effects import JointLaw, Kind, Spread, create, registered
 from spinepipe.units import COORDINATES
@@ -93,9 +94,8 @@ def test_a_spring_with_a_break() -> None:
     assert of_a_spring(law, 0.08, 1.5, 0.08) == pytest.approx(4.0 + 75.0 * 0.0020)
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "widest_deg"),
-    [("extension", 7.5), ("right_bending", 7.5), ("left_rotation", 2.5)],
+@sweep(
+    "coordinate, widest_deg", [("extension", 7.5), ("right_bending", 7.5), ("left_rotation", 2.5)]
 )
 def test_a_neutral_zone_is_no_wider_than_five_usual_ones(
     coordinate: str, widest_deg: float
@@ -127,7 +127,7 @@ def test_a_stop_beyond_a_gap() -> None:
     assert added(other, "extension", 0.1, 3.0, *stop) == 0.0
 
 
-@pytest.mark.parametrize("exponent", [1.0, 1.5, 3.0])
+@sweep("exponent", [1.0, 1.5, 3.0])
 def test_stops_of_any_exponent_meet_two_degrees_beyond_the_gap(exponent: float) -> None:
     law = law_of(("facet_contact", {"side": "positive"}))
     two = np.deg2rad(2.0)
@@ -142,8 +142,8 @@ def test_a_level_of_another_stiffness_and_a_lax_one() -> None:
     assert of_a_spring(law_of(("local_laxity", {})), 0.1, 0.3) == pytest.approx(3.5)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "share"),
+@sweep(
+    "name, value, share",
     [
         ("level_dependence", 1.3, 0.3),
         ("local_laxity", 0.3, -0.3),
@@ -158,7 +158,7 @@ def test_all_rotations_at_once(name: str, value: float, share: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["level_dependence", "local_laxity"])
+@sweep("name", ["level_dependence", "local_laxity"])
 def test_all_coordinates_at_once(name: str) -> None:
     carried = np.array([[7.0, -400.0, 9.0, 5.0, -3.0, 2.0]])
     law = law_of((name, {"coordinate": "all"}))
@@ -182,7 +182,7 @@ def test_coupling_loads_each_by_the_other() -> None:
     assert response.by_carried is None
 
 
-@pytest.mark.parametrize("shape", ["exponential", "tangent"])
+@sweep("shape", ["exponential", "tangent"])
 def test_steepest_laws_stay_finite_and_rising_far_out(shape: str) -> None:
     """Newton may ask for a whole turn on its way."""
     law = create("nonlinear_stiffening", {"shape": shape})
@@ -227,8 +227,8 @@ def test_declared_numbers_make_sense(variant) -> None:
             assert not parameter.logarithmic or parameter.off == 1.0
 
 
-@pytest.mark.parametrize(
-    ("name", "options", "message"),
+@sweep(
+    "name, options, message",
     [
         (
             "nonlinear_stiffening",

@@ -5,7 +5,6 @@ from fractions import Fraction
 from math import factorial
 
 import numpy as np
-import pytest
 from example_effects import slope
 from joint_law_cases import (
     EVERY,
@@ -15,6 +14,7 @@ from joint_law_cases import (
     off,
     title,
 )
+from sweeps import sweep
 
 from spinepipe.effects import JointLaw, Parameter, create, knee
 from spinepipe.effects.contract import Array
@@ -88,7 +88,7 @@ def test_by_carried_is_the_slope_by_the_carried_load(variant) -> None:
         close(found[:, :, at], slope(load, 1.0))
 
 
-@pytest.mark.parametrize("where", [defaults, off])
+@sweep("where", [defaults, off])
 @EVERY
 def test_by_parameter_is_the_slope_by_the_parameters(variant, where: Callable) -> None:
     law = law_of(variant)
@@ -114,7 +114,7 @@ def close(found: Array, expected: Array) -> None:
     np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-7 * size)
 
 
-@pytest.mark.parametrize("shape", ["exponential", "tangent"])
+@sweep("shape", ["exponential", "tangent"])
 def test_laws_near_zero_are_as_exact_as_elsewhere(shape: str) -> None:
     """The laws again in extended precision, where differences of nearly equal numbers matter."""
     law = law_of(("nonlinear_stiffening", {"shape": shape}))
@@ -187,10 +187,10 @@ def test_off_is_exactly_nothing_but_says_what_it_would_do(variant) -> None:
     assert touched.any() if late else touched.all()
 
 
-@pytest.mark.parametrize(
+@sweep(
     "variant",
     [v for v in VARIANTS if v[0] not in ("facet_contact", "preload_stiffening")],
-    ids=title,
+    title,
 )
 def test_the_mirrored_joint_has_the_mirrored_law(variant) -> None:
     law = law_of(variant)
@@ -201,7 +201,7 @@ def test_the_mirrored_joint_has_the_mirrored_law(variant) -> None:
     np.testing.assert_array_equal(there.tangent, -parity * here.tangent)
 
 
-@pytest.mark.parametrize("coordinate", COORDINATES)
+@sweep("coordinate", COORDINATES)
 def test_the_two_stops_mirror_each_other(coordinate: str) -> None:
     q, carried = anywhere(30)
     one, other = (
@@ -216,8 +216,8 @@ def test_the_two_stops_mirror_each_other(coordinate: str) -> None:
     np.testing.assert_array_equal(there.tangent, here.tangent)
 
 
-@pytest.mark.parametrize("sharpness", [2.0, 2.7, 12.0, 50.0])
-@pytest.mark.parametrize("offset", [-0.8, 0.0, 0.5])
+@sweep("sharpness", [2.0, 2.7, 12.0, 50.0])
+@sweep("offset", [-0.8, 0.0, 0.5])
 def test_short_chords_of_a_knee_join_long_ones(sharpness: float, offset: float) -> None:
     """Where the mean of slopes takes over from the difference, in value and derivatives."""
     n, at = np.array([sharpness]), np.array([offset])

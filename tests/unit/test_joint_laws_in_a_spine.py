@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from example_effects import loaded, scoped, slope, spine
+from example_effects import loaded, scoped, spine
 from joint_law_cases import DEFAULT, VARIANTS, defaults, law_of, off, title
+from sweeps import one_of_each, sweep
 
 from spinepipe.effects import JointLaw
 from spinepipe.effects.contract import Array
@@ -25,18 +26,22 @@ from spinepipe.world import Chain
 
 NONE = np.zeros(0)
 
-REACHED = pytest.mark.parametrize(
-    "variant",
-    [
-        (name, options)
-        for name, options in VARIANTS
-        if options.get("coordinate") not in TRANSLATIONS
-        or (name != "facet_contact" and options.get("shape") != "bilinear")
-    ],
-    ids=title,
-)
+REACHED = [
+    (name, options)
+    for name, options in VARIANTS
+    if options.get("coordinate") not in TRANSLATIONS
+    or (name != "facet_contact" and options.get("shape") != "bilinear")
+]
 """Without gaps and breaks of translations: these loads shift joints by less. Their slopes by
-themselves are in `test_joint_law_slopes`."""
+themselves, at every place, are in `test_joint_law_slopes`."""
+
+EVERY = pytest.mark.parametrize(
+    "variants",
+    [
+        pytest.param(one_of_each(REACHED, lambda variant: variant), id="few"),
+        pytest.param(REACHED, id="every", marks=pytest.mark.full),
+    ],
+)
 
 
 def both_ways(case: LoadCase) -> LoadCase:
@@ -72,32 +77,29 @@ def inward_slope(function: Callable[[float], Array], step: float) -> Array:
     return np.tensordot(weights, np.stack([function(n * step) for n in range(5)]), axes=1)
 
 
-def check_sensitivities(system: System) -> None:
-    """Derivatives of the solved poses against re-solved ones, one unknown at a time."""
+def check_sensitivities(system: System, mixtures: int = 2) -> None:
+    """Derivatives of the solved poses against re-solved ones, along mixtures of all unknowns."""
     free = unknowns(system)
     found = np.stack(by_parameters(system, follow(system), free))
-    for at, (along, unknown) in enumerate(zip(np.eye(len(free)), free, strict=True)):
-        size, difference = step_of(system, unknown)
+    for mixed in np.random.default_rng(7).uniform(0.3, 1.0, (mixtures, len(free))):
+        along = mixed * [inward(system, unknown) for unknown in free]
 
         def motion(h: float, along: Array = along) -> Array:
             return poses(system, free, h * along)
 
-        expected = difference(motion, size)
+        expected = inward_slope(motion, 1e-4)
         # poses are good to 1e-14 m and rad
-        limit = 1e-14 / abs(size) + 3e-6 * np.abs(expected).max()
-        np.testing.assert_allclose(found[..., at], expected, rtol=0, atol=limit)
+        limit = 1e-14 / 1e-4 + 3e-6 * np.abs(expected).max()
+        np.testing.assert_allclose(found @ along, expected, rtol=0, atol=limit)
     strengths = found[..., : len(system.model.joints)]
     assert np.abs(strengths).max(axis=(0, 1)).all()
 
 
-def step_of(system: System, unknown: FreeParameter) -> tuple[float, Callable]:
-    """1e-4 of a prior SD, away from a bound: no corner is stepped over by much."""
+def inward(system: System, unknown: FreeParameter) -> float:
+    """A prior SD, away from a bound: 1e-4 of it steps over no corner by much."""
     parameter = declared(system.model, unknown)
-    size = 1e-4 * parameter.prior_scale
     here = system.model.effects[1].values[unknown.rows[0], unknown.column]
-    if parameter.low < here < parameter.high:
-        return size, slope
-    return (size if here == parameter.low else -size), inward_slope
+    return parameter.prior_scale * (-1.0 if here == parameter.high else 1.0)
 
 
 def narrowed(law: JointLaw, values: Array) -> Array:
@@ -109,18 +111,28 @@ def narrowed(law: JointLaw, values: Array) -> Array:
     return narrow
 
 
-@REACHED
-def test_sensitivities_are_slopes_of_solved_motion(variant) -> None:
-    law = law_of(variant)
-    check_sensitivities(system_with(scoped(law, (0, 1, 2), *narrowed(law, defaults(law, 3)))))
+@EVERY
+def test_sensitivities_are_slopes_of_solved_motion(variants) -> None:
+    @sweep("variant", variants, title)
+    def slopes(variant) -> None:
+        law = law_of(variant)
+        check_sensitivities(system_with(scoped(law, (0, 1, 2), *narrowed(law, defaults(law, 3)))))
+
+    slopes()
 
 
-@REACHED
-def test_what_an_effect_would_do_is_known_while_it_is_off(variant) -> None:
-    law, plain = law_of(variant), poses(system_with())
-    system = system_with(scoped(law, (0, 1, 2), *narrowed(law, off(law, 3))))
-    np.testing.assert_array_equal(poses(system), plain)
-    check_sensitivities(system)
+@EVERY
+def test_what_an_effect_would_do_is_known_while_it_is_off(variants) -> None:
+    plain = poses(system_with())
+
+    @sweep("variant", variants, title)
+    def off_but_known(variant) -> None:
+        law = law_of(variant)
+        system = system_with(scoped(law, (0, 1, 2), *narrowed(law, off(law, 3))))
+        np.testing.assert_array_equal(poses(system), plain)
+        check_sensitivities(system)
+
+    off_but_known()
 
 
 @DEFAULT

@@ -10,6 +10,8 @@ from tests import kernels
 AVX2 = "processor\t: 0\nflags\t\t: fpu sse4_2 avx avx2 fma\n\nprocessor\t: 1\nflags\t: fpu\n"
 AVX512 = AVX2.replace("fma", "fma avx512f avx512dq avx512cd avx512bw avx512vl")
 
+REAL_FLAGS = kernels.flags
+
 
 @pytest.mark.parametrize(
     ("cpuinfo", "expected"),
@@ -60,6 +62,22 @@ def test_what_was_not_run_is_said_and_what_failed_fails(
         "Nehalem: tests marked numeric",
         "failed: Haswell, Nehalem",
     ]
+
+
+def test_one_is_the_next_after_the_processors_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = []
+
+    def run(command: list[str], env: dict[str, str], check: bool) -> object:
+        ran.append((env["OPENBLAS_CORETYPE"], "numeric and not full" in command, "-x" in command))
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(kernels.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(kernels, "in_effect", lambda kernel: [kernel] * 2)
+    monkeypatch.setattr(kernels.subprocess, "run", run)
+    for there in (AVX512, AVX2, "flags: sse4_2"):
+        monkeypatch.setattr(kernels, "flags", lambda _, there=there: REAL_FLAGS(there))
+        assert kernels.main(["--one", "-x"]) == 0
+    assert ran == [("Haswell", True, True), ("Sandybridge", True, True)]
 
 
 def test_other_processors_run_none_and_it_is_said(

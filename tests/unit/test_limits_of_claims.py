@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe.comparison.claim import (
     Claim,
@@ -59,7 +60,7 @@ def by_hand(row: Mapping[str, Any]) -> str:
     return "chosen" if "chosen here" in row["reason"].split(";")[0] else "two_sided"
 
 
-@pytest.mark.parametrize("paper", PAPERS)
+@sweep("paper", PAPERS)
 def test_limit_follows_from_the_row(paper: str) -> None:
     rows = [judge(claim, NOTHING) for claim in claims(paper)]
     compared = [row for row in rows if row["verdict"] != "contradicted"]  # tells no range
@@ -68,7 +69,7 @@ def test_limit_follows_from_the_row(paper: str) -> None:
     }
 
 
-@pytest.mark.parametrize("paper", PAPERS)
+@sweep("paper", PAPERS)
 def test_a_sign_alone_is_never_called_contradicted(paper: str) -> None:
     """Where the paper's sign is known, ours agrees with it or does not."""
     signs = [claim for claim in claims(paper) if 0.0 in (claim.range.low, claim.range.high)]
@@ -76,7 +77,7 @@ def test_a_sign_alone_is_never_called_contradicted(paper: str) -> None:
     assert hidden == []
 
 
-@pytest.mark.parametrize("paper", PAPERS)
+@sweep("paper", PAPERS)
 def test_a_contradicted_number_of_a_run_is_compared_with_all_that_is_printed(paper: str) -> None:
     for claim in claims(paper):
         if not claim.contradicted or claim.also or claim.id in NO_OTHER_NUMBER:
@@ -87,9 +88,7 @@ def test_a_contradicted_number_of_a_run_is_compared_with_all_that_is_printed(pap
             pytest.fail(f"{claim.id}: our value is not held against the paper's other numbers")
 
 
-@pytest.mark.parametrize(
-    ("value", "verdict"), [(1.0, "contradicted"), (20.0, "contradicted"), (5.0, "outside")]
-)
+@sweep("value, verdict", [(1.0, "contradicted"), (20.0, "contradicted"), (5.0, "outside")])
 def test_ours_outside_all_that_the_paper_prints_disagrees(value: float, verdict: str) -> None:
     """Printed are 1 (0.5 to 2) and 20 (10 to 40)."""
     claim = Claim(
@@ -104,8 +103,8 @@ def test_ours_outside_all_that_the_paper_prints_disagrees(value: float, verdict:
     assert "A1: 1 is not 20" in row["reason"]
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "chosen", "limit"),
+@sweep(
+    "low, high, chosen, limit",
     [
         (1.0, 2.0, False, "two_sided"),
         (1.0, 2.0, True, "chosen"),
@@ -179,7 +178,7 @@ def test_documents_tell_the_counts() -> None:
     assert f"sets {len(claims('gould_2024a'))} published numbers beside ours" in readme
 
 
-@pytest.mark.parametrize("study", ["l1l4_joint_pose", "t12s1_as_published"])
+@sweep("study", ["l1l4_joint_pose", "t12s1_as_published"])
 def test_counts_by_hand_where_the_study_was_run(study: str) -> None:
     paths = sorted((ROOT / "results" / study).glob("against_*.parquet"))
     if not paths:

@@ -14,6 +14,7 @@ from effect_slopes import (
 )
 from example_effects import NOWHERE, loaded, scoped, slope, spine
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import Spread, Wrench, create
 from spinepipe.effects.contract import Array
@@ -75,15 +76,15 @@ def assert_same_motion(name: str, *, instead: System, case: LoadCase | None = No
     assert np.rad2deg(np.abs(found - plain)[..., 3:].max()) > 0.02
 
 
-@pytest.mark.parametrize("on", [True, False], ids=["on", "off"])
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("on", [True, False])
+@sweep("name", EFFECTS)
 def test_tangents_and_sensitivities_of_whole_spines(name: str, on: bool) -> None:
     system = system_with(effect_of(name, on))
     assert_tangent(system)
     assert_sensitivities(system)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("name", EFFECTS)
 def test_part_of_the_joints_in_scope(name: str) -> None:
     system = system_with(effect_of(name, joints=(1,)))
     assert_tangent(system)
@@ -96,7 +97,7 @@ def test_all_load_effects_at_once() -> None:
     assert_sensitivities(system)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("name", EFFECTS)
 def test_off_leaves_the_motion_alone(name: str) -> None:
     effect = effect_of(name).effect
     assert {p.off for p in effect.parameters} <= {0.0, None}
@@ -166,8 +167,8 @@ def cable_lengths(model: SpineModel, q: Array, name: str) -> Array:
     return np.linalg.norm(np.diff(guides, axis=0), axis=1)
 
 
-@pytest.mark.parametrize("name", [name for name in EFFECTS if name.startswith("follower")])
-@pytest.mark.parametrize("joints", [(0, 1, 2), (0,), (1, 2)])
+@sweep("name", [name for name in EFFECTS if name.startswith("follower")])
+@sweep("joints", [(0, 1, 2), (0,), (1, 2)])
 def test_follower_load_does_the_work_of_a_cable(joints: tuple[int, ...], name: str) -> None:
     """80 N times what each coordinate shortens the cable by."""
     model, q = spine(3), pose()
@@ -319,7 +320,7 @@ def test_a_force_offset_is_one_more_force_at_the_centre_of_the_top() -> None:
         create("load_offset", {"coordinate": "extension"})
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("name", EFFECTS)
 def test_each_test_has_its_own_values(name: str) -> None:
     """Two copies in scope of a test each: the one acts and is felt, the other is not there."""
     mine = replace(effect_of(name), tests=("all ways",))

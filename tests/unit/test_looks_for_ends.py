@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.calibrate.profile import Best, Profile, _next, _one_step, profile_in_turn
 from spinepipe.effects.contract import Array
@@ -46,8 +47,8 @@ def looked(
     return looks, profile_in_turn(best, point, [0], limit=2.0)
 
 
-@pytest.mark.parametrize(
-    ("ahead", "ways"),
+@sweep(
+    "ahead, ways",
     [
         (1.02, [1.02]),  # an end a little beyond is one
         (1.1, [1.1, 1.0]),  # too far: back to where a straight root has it
@@ -67,11 +68,7 @@ def test_looks_at_a_cost_that_is_a_square(ahead: float, ways: list[float]) -> No
     assert not found.lower_cost
 
 
-@pytest.mark.parametrize(
-    ("bound", "looks"),
-    [(1.9, [1.9]), (0.3, [0.3]), (0.0, [])],
-    ids=["before its end", "near", "at the optimum"],
-)
+@sweep("bound, looks", [(1.9, [1.9]), (0.3, [0.3]), (0.0, [])])
 def test_a_region_that_reaches_its_bound_is_open(bound: float, looks: list[float]) -> None:
     seen, found = looked(as_is, bound=bound)
     np.testing.assert_allclose(seen, looks, rtol=1e-12)
@@ -131,7 +128,7 @@ def test_a_side_that_changes_is_not_halved() -> None:
     np.testing.assert_allclose(looks[:5], 2.0 * np.array([1.0, short, beyond, again, last]))
 
 
-@pytest.mark.parametrize(("dip", "lower"), [(0.04, False), (0.06, True), (0.5, True)])
+@sweep("dip, lower", [(0.04, False), (0.06, True), (0.5, True)])
 def test_a_cost_below_the_optimums_is_said(dip: float, lower: bool) -> None:
     """By more than an end is known to; shares of the rise allowed, at the second look of four."""
 
@@ -169,8 +166,8 @@ def test_a_way_below_what_an_optimum_is_known_to_is_not_looked_at() -> None:
     assert short.high[0] == 3.0 + 1e-7
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-@pytest.mark.parametrize(("ahead", "ways"), [(1.02, [1.02]), (1.1, [1.1, 1.0]), (0.9, [0.9, 1.02])])
+@sweep("side", [-1.0, 1.0])
+@sweep("ahead, ways", [(1.02, [1.02]), (1.1, [1.1, 1.0]), (0.9, [0.9, 1.02])])
 def test_the_same_looks_at_a_logarithm_are_straight_in_one_over_the_stiffness(
     side: float, ahead: float, ways: list[float]
 ) -> None:
@@ -211,7 +208,7 @@ def test_a_logarithm_whose_stiffness_would_be_beyond_all_is_looked_for_at_its_bo
     assert found.open_above[0]
 
 
-@pytest.mark.parametrize("unseen", [False, True])
+@sweep("unseen", [False, True])
 def test_ends_of_two_that_make_up_for_one_another(unseen: bool) -> None:
     """Of straight readings each end is at SD times limit, and the other is fitted there."""
     matrix = np.array([[1.0, 0.9], [0.0, 0.5], [2.0, 2.1], [1.0, -0.3]])
@@ -259,7 +256,7 @@ def test_a_start_where_nothing_stands_gives_way_to_that_of_the_last_fit() -> Non
     assert found.high[0] <= 1.02
 
 
-@pytest.mark.parametrize("along", [False, True])
+@sweep("along", [False, True])
 def test_the_others_stay_inside_their_bounds(along: bool) -> None:
     """x + y and x are read, y is 0.3 at most in size: beyond, the cost is x^2 + (x - 0.3)^2."""
     matrix, far = np.array([[1.0, 1.0], [1.0, 0.0]]), np.array([9.0, 0.3])
@@ -276,9 +273,7 @@ def test_the_others_stay_inside_their_bounds(along: bool) -> None:
     assert (found.high[0], -found.low[0]) == pytest.approx((end, end), rel=0.03)
 
 
-@pytest.mark.parametrize(
-    ("pull", "looks", "end"), [(0.2, 1, 1.0), (0.6, None, 0.8602)], ids=["little", "much"]
-)
+@sweep("pull, looks, end", [(0.2, 1, 1.0), (0.6, None, 0.8602)])
 def test_one_linear_step_is_believed_where_it_gains_little(
     pull: float, looks: int | None, end: float
 ) -> None:
@@ -323,7 +318,7 @@ def test_one_linear_step_ends_where_the_cost_is_least_within_bounds() -> None:
     assert (cost, len(there)) == (25.0, 0)
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
+@sweep("side", [-1.0, 1.0])
 def test_the_next_look_mirrors_on_the_other_side(side: float) -> None:
     at = 5.0
     steps = [

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.statistics import bland_altman, mean_of
 from spinepipe.statistics.normality import _pooled
@@ -20,14 +21,14 @@ def test_a_mean_of_three_has_the_interval_of_student() -> None:
     assert found.p == pytest.approx(1.0 - t / np.sqrt(2.0 + t**2))
 
 
-@pytest.mark.parametrize("values", [[], [2.0], [2.0, 2.0], [2.0, 2.0 + 1e-9], [0.0, 0.0]])
+@sweep("values", [[], [2.0], [2.0, 2.0], [2.0, 2.0 + 1e-9], [0.0, 0.0]])
 def test_what_does_not_vary_has_no_interval(values: list[float]) -> None:
     found = mean_of(np.array(values))
     assert (found.n, found.interval, found.p) == (len(values), None, None)
     assert found.value == (pytest.approx(values[0]) if values else None)
 
 
-@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@sweep("unit", [1e-6, 1.0, 1e6])
 def test_a_small_scatter_is_one_whatever_the_unit(unit: float) -> None:
     found = mean_of(unit * np.array([-2.0, -2.0 - 1e-8]))
     assert found.interval is not None
@@ -35,7 +36,7 @@ def test_a_small_scatter_is_one_whatever_the_unit(unit: float) -> None:
     assert low < found.value < high < 0.0  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@sweep("unit", [1e-9, 1.0, 1e9])
 def test_curves_are_as_alike_in_any_unit(unit: float) -> None:
     """Of 0 1 2 and 0 1 4: apart 2 in 3, whole 34/3 in 5; 1 - (2/3) / (34/15) = 12/17."""
     found = multiple_correlation(unit * np.array([[0.0, 1.0, 2.0], [0.0, 1.0, 4.0]]))
@@ -43,7 +44,7 @@ def test_curves_are_as_alike_in_any_unit(unit: float) -> None:
     assert found.value == pytest.approx(np.sqrt(12.0 / 17.0))
 
 
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@sweep("unit", [1e-9, 1.0, 1e9])
 def test_rounding_is_no_variation(unit: float) -> None:
     curves = unit * np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]])
     found = multiple_correlation(curves)
@@ -62,8 +63,8 @@ def test_opposite_curves_have_no_coefficient_and_one_curve_too_few() -> None:
     assert multiple_correlation(np.array([[0.0, 1.0]] * 2)).value == 1.0
 
 
-@pytest.mark.parametrize(
-    ("expected", "pooled"),
+@sweep(
+    "expected, pooled",
     [
         ([6.0, 7.0, 8.0, 4.0, 6.0], [6.0, 7.0, 8.0, 10.0]),  # beside the upper tail
         ([6.0, 4.0, 8.0, 7.0, 9.0], [10.0, 8.0, 7.0, 9.0]),  # beside the lower one

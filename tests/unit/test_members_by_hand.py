@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.calibrate.hierarchy import (
     Hierarchy,
@@ -52,8 +53,8 @@ def around(own: float, scatter: float = 1.0, size: int = 1) -> Any:
     return SimpleNamespace(common=np.zeros(size), own=own * np.eye(size), spreads=spreads)
 
 
-@pytest.mark.parametrize(
-    ("target", "step"),
+@sweep(
+    "target, step",
     [([0.5, -0.3], [0.5, -0.3]), ([3.0, -1.5], [1.0, -0.5]), ([0.4, -2.0], [0.2, -1.0])],
 )
 def test_a_step_is_as_long_as_one_linearisation_is_trusted(
@@ -66,8 +67,8 @@ def test_a_step_is_as_long_as_one_linearisation_is_trusted(
     assert not one.at_rest
 
 
-@pytest.mark.parametrize(
-    ("way", "deviation", "arrived"),
+@sweep(
+    "way, deviation, arrived",
     [
         *((0.9e-4, 1e-3, True), (1.1e-4, 1e-3, False), (-1.1e-4, 1e-3, False)),
         *((0.009, 1.0, True), (0.011, 1.0, False), (-0.009, 1.0, True)),
@@ -97,7 +98,7 @@ def test_beyond_a_bound_the_best_inside_is_aimed_at() -> None:
         np.testing.assert_allclose(one.step, np.array(target) / max(1.0, np.abs(target).max()))
 
 
-@pytest.mark.parametrize(("most", "looks"), [(2.0, [1.0]), (0.6, [1.0, 0.5]), (0.5, [1.0, 0.5])])
+@sweep("most, looks", [(2.0, [1.0]), (0.6, [1.0, 0.5]), (0.5, [1.0, 0.5])])
 def test_of_a_step_half_is_tried_where_nothing_stands(most: float, looks: list[float]) -> None:
     one = member(most=most)
     one.try_share(1.0)
@@ -120,9 +121,7 @@ def test_without_a_way_on_it_stays_and_is_stuck() -> None:
     assert (one.x[0], one.stuck, one.at_rest) == (0.0, True, True)
 
 
-@pytest.mark.parametrize(
-    ("own", "scatter", "end"), [(1e6, 1.0, 0.5), (0.01, 1.0, 2.0**-8), (0.01, 0.1, 0.25)]
-)
+@sweep("own, scatter, end", [(1e6, 1.0, 0.5), (0.01, 1.0, 2.0**-8), (0.01, 0.1, 0.25)])
 def test_alone_it_goes_as_far_as_lowers_its_own_cost(
     own: float, scatter: float, end: float
 ) -> None:
@@ -146,7 +145,7 @@ def readings(design: Array, left_over: float = 0.0, count: int = 0) -> LinearRea
     return LinearReadings(design, np.zeros(design.shape[:2]), left_over, count)
 
 
-@pytest.mark.parametrize(("share", "told"), [(1.2e-4, True), (0.8e-4, False)])
+@sweep("share, told", [(1.2e-4, True), (0.8e-4, False)])
 def test_less_than_a_hundred_millionth_of_the_information_is_no_reading(
     share: float, told: bool
 ) -> None:

@@ -81,6 +81,7 @@ def test_shares_do_not_hang_on_unit_or_origin() -> None:
         assert a.low <= a.estimate <= a.high
 
 
+@pytest.mark.full
 def test_intervals_cover_the_shares_under_the_same_treatments() -> None:
     """Treatments are fixed; specimens and draws are new in every grid. Binomial limits of 95 %."""
     rng = np.random.default_rng(4)

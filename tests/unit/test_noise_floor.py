@@ -51,6 +51,7 @@ CASES = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("method", "samples", "wanted", "seeds"), CASES)
 def test_a_factor_without_effect_lies_in_the_floor(
     method: str, samples: int, wanted: tuple[str, ...], seeds: int

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Beside
@@ -56,7 +57,7 @@ LAWS: list[tuple[str, str | None, dict[str, Any], float, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "coordinate", "shape", "strength", "options"), LAWS)
+@sweep("name, coordinate, shape, strength, options", LAWS)
 def test_joint_laws_carry_the_same_load(
     name: str,
     coordinate: str | None,
@@ -84,7 +85,7 @@ def test_friction_follows_the_same_path() -> None:
     assert np.abs(theirs - ours).max() < 5e-3 * 0.7  # corners are rounded by 1e-4 of the width
 
 
-@pytest.mark.parametrize("seconds", [0.1, 30.0])
+@sweep("seconds", [0.1, 30.0])
 def test_creep_relaxes_alike(seconds: float) -> None:
     hidden = Hidden("creep", "extension", shape={"time_s": 40.0}, strength=0.5)
     effect, values = mapped(hidden, {})
@@ -165,8 +166,8 @@ def test_skin_and_a_moving_zero_read_alike() -> None:
             )
 
 
-@pytest.mark.parametrize(
-    ("test", "main", "first", "second"),
+@sweep(
+    "test, main, first, second",
     [
         ("flexion_extension", 2, 0, 1),
         ("lateral_bending_preloaded", 0, 1, 2),

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.statics.equilibrium import (
     STEP_TOLERANCE,
@@ -32,8 +33,8 @@ from spinepipe.statics.system import Loading
 # Factors of a tangent
 
 
-@pytest.mark.parametrize(
-    ("matrix", "sign"),
+@sweep(
+    "matrix, sign",
     [
         (np.eye(3), 1),
         (np.diag([1.0, -2.0, 3.0]), -1),
@@ -57,10 +58,7 @@ def test_signs_are_those_of_determinants() -> None:
         assert factor(matrix).sign == np.sign(np.linalg.det(matrix))
 
 
-@pytest.mark.parametrize(
-    ("matrix", "why"),
-    [(np.diag([1.0, 0.0]), "singular"), (np.diag([1.0, np.inf]), "not finite")],
-)
+@sweep("matrix, why", [(np.diag([1.0, 0.0]), "singular"), (np.diag([1.0, np.inf]), "not finite")])
 def test_a_tangent_without_an_inverse_has_no_factors(matrix: np.ndarray, why: str) -> None:
     with pytest.raises(SingularTangent, match=why):
         factor(matrix)
@@ -82,8 +80,8 @@ def test_the_bound_of_the_smallest_eigenvalue_is_one() -> None:
     assert _smallest_eigenvalue_bound(np.diag([5.0, -1e-9])) == 0.0
 
 
-@pytest.mark.parametrize("share", [0.99, 1.01])
-@pytest.mark.parametrize("mass", [0.5, 2.0])
+@sweep("share", [0.99, 1.01])
+@sweep("mass", [0.5, 2.0])
 def test_a_twisted_mode_decays_below_the_root_of_stiffness_over_mass(
     mass: float, share: float
 ) -> None:
@@ -94,7 +92,7 @@ def test_a_twisted_mode_decays_below_the_root_of_stiffness_over_mass(
     assert decays(mass * np.eye(2), matrix) is (share < 1.0)
 
 
-@pytest.mark.parametrize("mass", [0.0, 1.0, 1e-12])
+@sweep("mass", [0.0, 1.0, 1e-12])
 def test_stiffness_decides_without_a_twist(mass: float) -> None:
     assert decays(mass * np.eye(2), np.diag([2.0, 1e-3]))
     assert not decays(mass * np.eye(2), np.diag([2.0, -1e-3]))
@@ -134,8 +132,8 @@ def test_the_method_forgets_the_stiffest_modes() -> None:
     assert abs(factor_of(-0.01) - np.exp(-0.01)) < 0.01**4
 
 
-@pytest.mark.parametrize(
-    ("error", "growth"),
+@sweep(
+    "error, growth",
     [
         *((1.0, 0.9), (1.0 / 8.0, 1.8), (8.0, 0.45), (0.9**3, 1.0)),
         *((1e-2, 0.9 * 100.0 ** (1.0 / 3.0)), (1e-3, 6.0), (0.0, 6.0)),
@@ -190,7 +188,7 @@ def test_a_ramp_is_given_so_many_times_a_second() -> None:
 # Newton's steps
 
 
-@pytest.mark.parametrize(("beyond", "arrives"), [(-0.01, True), (0.01, False)])
+@sweep("beyond, arrives", [(-0.01, True), (0.01, False)])
 def test_twelve_steps_are_taken_at_most(beyond: float, arrives: bool) -> None:
     """Towards a root of third order each step is two thirds of the one before.
 

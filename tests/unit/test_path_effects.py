@@ -28,6 +28,7 @@ from path_effect_cases import (
     turning,
 )
 from scipy.integrate import simpson
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
@@ -104,7 +105,7 @@ def system_of(effects, steps: int = 6) -> System:
     return System(Chain(model), model, loaded(model, steps))
 
 
-@pytest.mark.parametrize("name", PATHS)
+@sweep("name", PATHS)
 def test_sensitivities_along_a_path_are_slopes_of_solved_motion(name: str) -> None:
     system, step = system_of(PATHS[name]), 1e-3 if name == "friction of elements" else 0.02
     free = unknowns(system)
@@ -112,7 +113,7 @@ def test_sensitivities_along_a_path_are_slopes_of_solved_motion(name: str) -> No
     sizes = np.array(
         [0.2 if u.logarithmic else 0.3 * declared(system.model, u).prior_scale for u in free]
     )
-    for mixture in np.random.default_rng(3).choice([-1.0, 1.0], (3, len(free))) * sizes:
+    for mixture in np.random.default_rng(3).choice([-1.0, 1.0], (2, len(free))) * sizes:
 
         def motion(h: float, along: Array = mixture) -> Array:
             return poses(system, free, h * along)
@@ -123,7 +124,7 @@ def test_sensitivities_along_a_path_are_slopes_of_solved_motion(name: str) -> No
         np.testing.assert_allclose(found @ mixture, expected, rtol=0, atol=1e-6 * scale)
 
 
-@pytest.mark.parametrize("effects", OFF.values(), ids=OFF)
+@sweep("effects", OFF.values())
 def test_a_strength_that_is_off_shows_how_it_would_act(effects) -> None:
     plain = np.stack([step.equilibrium.q for step in follow(system_of(()))])
     system = system_of(effects)
@@ -132,12 +133,12 @@ def test_a_strength_that_is_off_shows_how_it_would_act(effects) -> None:
     found = np.stack(by_parameters(system, solved, free))
     still = np.stack([step.equilibrium.q for step in solved])
     np.testing.assert_allclose(still, plain, rtol=0, atol=1e-13)
-    for column, unknown in enumerate(np.eye(len(free))):
-        at = [poses(system, free, h * unknown) for h in 0.004 * np.arange(5)]
+    assert np.abs(found).max(axis=(0, 1)).all()
+    for along in np.random.default_rng(3).uniform(0.3, 1.0, (2, len(free))):
+        at = [poses(system, free, h * along) for h in 0.004 * np.arange(5)]
         expected = np.tensordot([-25.0, 48.0, -36.0, 16.0, -3.0], at, 1) / (12.0 * 0.004)
         scale = np.abs(expected).max()
-        assert scale > 0.0
-        np.testing.assert_allclose(found[..., column], expected, rtol=0, atol=1e-5 * scale)
+        np.testing.assert_allclose(found @ along, expected, rtol=0, atol=1e-5 * scale)
 
 
 def test_parameters_of_shape_say_nothing_while_the_strength_is_off() -> None:
@@ -230,8 +231,8 @@ def drift(fraction: float, per_time: float, load: str) -> tuple[Array, Array]:
     return found, 2.0 / EXTENSION_SPRING * exact
 
 
-@pytest.mark.parametrize("load", ["held", "ramped"])
-@pytest.mark.parametrize("fraction", [0.2, 0.5, 0.9])
+@sweep("load", ["held", "ramped"])
+@sweep("fraction", [0.2, 0.5, 0.9])
 def test_a_held_load_creeps_by_the_closed_form(fraction: float, load: str) -> None:
     """A ramp that stands still is a held load, in steps of any length."""
     for per_time in (0.05, 0.5, 2.5):
@@ -265,20 +266,20 @@ def test_each_cycle_starts_without_a_memory(effect: str) -> None:
         assert np.abs(later.equilibrium.q - one.equilibrium.q).max() > np.deg2rad(0.05)
 
 
-SECONDS = pytest.mark.parametrize("seconds", [1e-7, 1e-3, 0.0299, 0.0301, 2.0, 300.0])
+SECONDS = sweep("seconds", [1e-7, 1e-3, 0.0299, 0.0301, 2.0, 300.0])
 
 
 @SECONDS
-@pytest.mark.parametrize("spread", [0.0, 1.2])
-@pytest.mark.parametrize("load", ["held", "ramped"])
+@sweep("spread", [0.0, 1.2])
+@sweep("load", ["held", "ramped"])
 def test_creep_states_its_derivatives_at_any_length_of_step(load, spread, seconds) -> None:
     rng = np.random.default_rng(4)
     values = np.array([0.3, 3.0, spread])
     assert_slopes("creep", {"load": load}, values, rng.normal(size=6), seconds, 2.5)
 
 
-@pytest.mark.parametrize("turned", [-3.0, -1e-3, -1e-5, 0.0, 1e-5, 1e-3, 0.4, 3.0])
-@pytest.mark.parametrize("law", ["dahl", "jenkins"])
+@sweep("turned", [-3.0, -1e-3, -1e-5, 0.0, 1e-5, 1e-3, 0.4, 3.0])
+@sweep("law", ["dahl", "jenkins"])
 def test_friction_states_its_derivatives_at_any_length_of_step(law: str, turned: float) -> None:
     """Elements that have yielded, that have not, and steps far shorter than what is rounded."""
     yield_angle = 0.02
@@ -369,7 +370,7 @@ def test_options_that_cannot_be_are_refused() -> None:
     assert create("creep", {"coordinate": "superior"}).coordinate == "superior"
 
 
-@pytest.mark.parametrize("x", [1e-9, 1e-6, 1e-3, 9.9e-3, 1.01e-2, 0.5])
+@sweep("x", [1e-9, 1e-6, 1e-3, 9.9e-3, 1.01e-2, 0.5])
 def test_a_short_ramp_of_creep_moves_with_its_time_as_exact_sums_say(x: float) -> None:
     """With a carried load C that comes on over x relaxation times, one element holds
     M = C / (1 + l (1 - m)), m = sum of (-x)^k / (k + 1)!; x falls with the time as 1 / T."""

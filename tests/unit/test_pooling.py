@@ -224,6 +224,7 @@ def test_two_specimens_that_share_no_level_tell_no_level() -> None:
     assert tellable(known_exactly(table), np.zeros(4, dtype=int))[:, 0].tolist() == [0, 1, 1]
 
 
+@pytest.mark.full
 def test_true_spreads_come_back_and_newcomers_are_where_expected() -> None:
     """At 0.5 the prior has its mode and pulls neither way; variances are then unbiased."""
     rng, truth, dof = np.random.default_rng(7), one_dof(0.5, 0.5, 0.5, 0.1), np.zeros(10, dtype=int)
@@ -257,6 +258,7 @@ def newcomers(seeds: int, n: int, j: int) -> Array:
     return np.abs(off)
 
 
+@pytest.mark.full
 def test_a_newcomer_to_five_needs_students_t() -> None:
     """Normal intervals are too short, at 95 %, by more than chance; those of t are not."""
     off = newcomers(120, 5, 6)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from example_effects import NOWHERE, scoped, slope, spine
+from sweeps import sweep
 
 from spinepipe.effects import JointLaw, Wrench, create
 from spinepipe.effects.contract import Array
@@ -37,7 +38,7 @@ def poses() -> Array:
     return moved
 
 
-@pytest.mark.parametrize("options", TERMS, ids=str)
+@sweep("options", TERMS, str)
 def test_it_is_the_product(options: dict[str, Any]) -> None:
     law, q = term(options), poses()
     of = options.get("of", ("extension", "extension"))
@@ -52,7 +53,7 @@ def test_it_is_the_product(options: dict[str, Any]) -> None:
     assert not np.delete(load, at, axis=1).any()
 
 
-@pytest.mark.parametrize("options", TERMS, ids=str)
+@sweep("options", TERMS, str)
 def test_derivatives_are_those_of_the_load(options: dict[str, Any]) -> None:
     law, q = term(options), poses()
     size = law.parameters[0].prior_scale
@@ -82,7 +83,7 @@ def test_units_are_those_of_the_product() -> None:
     assert units[4:] == ["N/m^2", "N m/rad^3", "N m/(m rad)"]
 
 
-@pytest.mark.parametrize("moment_nm", [-6.0, 7.5])
+@sweep("moment_nm", [-6.0, 7.5])
 def test_a_joint_turns_as_a_cubic_says(moment_nm: float) -> None:
     """k q + c q^3 = M by Cardano: one root, as both are positive."""
     law, coefficient = term({"of": ("extension",) * 3}), 9e3
@@ -106,8 +107,8 @@ def test_a_model_file_carries_it(tmp_path: Any) -> None:
     assert found.effect == create("power_term", options)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
+@sweep(
+    "options, message",
     [
         ({"coordinate": "flexion"}, "coordinate 'flexion' is not one of"),
         ({"of": ["flexion"]}, "of 'flexion' is not one of"),

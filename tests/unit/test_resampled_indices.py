@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from SALib.analyze import delta, rbd_fast
 from scipy.stats import ks_2samp
+from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices import estimates, given_data, structured
 from spinepipe.sensitivity.global_indices.design import draw
@@ -71,14 +72,14 @@ def test_under_a_mask_there_is_nothing() -> None:
     assert found.data.tolist() == [1.0, 0.0, 3.0]
 
 
-@pytest.mark.parametrize("change", [{"bootstraps": 1}, {"delta_bootstraps": 1}])
+@sweep("change", [{"bootstraps": 1}, {"delta_bootstraps": 1}])
 def test_one_resample_is_no_interval(change: dict[str, int]) -> None:
     with pytest.raises(ValueError, match="at least 2 bootstraps"):
         Settings(**change)
     assert Settings(**{name: count + 1 for name, count in change.items()})
 
 
-@pytest.mark.parametrize("confidence", [0.0, 1.0])
+@sweep("confidence", [0.0, 1.0])
 def test_nothing_is_sure_or_unsure_altogether(confidence: float) -> None:
     with pytest.raises(ValueError, match="a confidence between"):
         Settings(confidence=confidence)
@@ -126,7 +127,7 @@ def test_resamples_all_in_or_out_of_a_part_are_no_distance_away() -> None:
     np.testing.assert_allclose(given_data._from_rest(ordered, part), [0.0, 0.0, 0.5])
 
 
-@pytest.mark.parametrize("n", [50, 51])
+@sweep("n", [50, 51])
 def test_rbd_fast_of_weights_is_salibs_of_repeated_rows(n: int) -> None:
     unit, output, weights = sample(n, 20005)
     found = given_data.rbd_fast_resampled(unit, output[:, None], weights)
@@ -215,7 +216,7 @@ def test_weighted_effects_are_those_of_repeated_trajectories() -> None:
         np.testing.assert_allclose(found[r, :, 2], some.std(axis=0, ddof=1))
 
 
-@pytest.mark.parametrize("of", [structured.sobol_indices, structured.morris_indices])
+@sweep("of", [structured.sobol_indices, structured.morris_indices])
 def test_intervals_of_structured_designs_are_of_what_is_asked(of: Callable[..., object]) -> None:
     """A wider confidence has wider ends, and all resamples lie within that of nearly 1."""
     method = "sobol" if of is structured.sobol_indices else "morris"

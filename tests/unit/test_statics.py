@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from example_effects import NOWHERE, bushing, loaded, spine
 from scipy.optimize import brentq
+from sweeps import sweep
 
 from spinepipe.effects import Wrench
 from spinepipe.frames import Pose
@@ -54,7 +55,7 @@ def moment(body: int, *components: float) -> Wrench:
     return Wrench(body, NOWHERE, NOWHERE, np.array(components))
 
 
-@pytest.mark.parametrize("coordinate", range(6))
+@sweep("coordinate", range(6))
 def test_one_coordinate_moves_by_load_over_stiffness(coordinate: int) -> None:
     model = spine(1, gravity=False)
     axis = model.frames[0].rotation[:, (0, 1, 2, 2, 0, 1)[coordinate]]
@@ -66,7 +67,7 @@ def test_one_coordinate_moves_by_load_over_stiffness(coordinate: int) -> None:
     np.testing.assert_allclose(solved.equilibrium.q, expected, rtol=0, atol=ROUND_OFF)
 
 
-@pytest.mark.parametrize("n", [6, 20])
+@sweep("n", [6, 20])
 def test_a_pure_flexion_moment_bends_every_level_alike(n: int) -> None:
     solved = under(upright(n, SPRINGS), moment(n - 1, 0.0, 0.0, -7.5))
     expected = np.zeros((n, 6))
@@ -122,8 +123,8 @@ TIPPING = {
 }
 
 
-@pytest.mark.parametrize("inertia", [0.0, 1e-5, 1e-3])
-@pytest.mark.parametrize("springs", TIPPING.values(), ids=TIPPING)
+@sweep("inertia", [0.0, 1e-5, 1e-3])
+@sweep("springs", TIPPING.values(), TIPPING)
 def test_a_weight_that_tips_the_upright_pose(springs, inertia: float) -> None:
     """m g h = 9.81 N m/rad against 5: upright is an equilibrium, but not a stable one."""
     solved = under(upright(1, springs, 10.0, (0.0, 0.1, 0.0), inertia))
@@ -191,8 +192,8 @@ def test_no_and_too_many_joints_are_refused() -> None:
         spoiled(joints=(), frames=(), bodies=(), damping=np.zeros((0, 6)), effects=())
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
+@sweep(
+    "changes, said",
     [
         ({"frames": spine(1).frames}, "differ in number"),
         ({"frames": (Pose(np.eye(3), np.full(3, np.nan)),) * 2}, "L2L3 is not finite"),
@@ -207,8 +208,8 @@ def test_models_no_solver_should_see_are_refused(changes, said) -> None:
         spoiled(**changes)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
+@sweep(
+    "changes, said",
     [
         ({"mass": -1.0}, "not negative"),
         ({"com": np.full(3, np.inf)}, "finite"),
@@ -222,7 +223,7 @@ def test_bodies_that_cannot_be_are_refused(changes, said) -> None:
         replace(spine(1).bodies[0], **changes)
 
 
-@pytest.mark.parametrize(
+@sweep(
     "changes",
     [
         {"gravity": np.array([0.0, np.nan, 0.0])},
@@ -232,14 +233,13 @@ def test_bodies_that_cannot_be_are_refused(changes, said) -> None:
         {"frames": (Pose(2.0 * np.eye(3), np.zeros(3)),) * 2},
         {"effects": (ScopedEffect(bushing(2).effect, (0, 5), bushing(2).values),)},
     ],
-    ids=["gravity", "no damping", "damping", "mirrored frame", "long axes", "joint"],
 )
 def test_these_models_should_be_refused_too(changes) -> None:
     with pytest.raises(RefusedModel):
         spoiled(**changes)
 
 
-@pytest.mark.parametrize(("moment", "warned"), [(7.5, False), (12.0, True)])
+@sweep("moment, warned", [(7.5, False), (12.0, True)])
 def test_a_symmetric_part_that_is_not_positive_is_a_warning(moment: float, warned: bool) -> None:
     """Six joints of 20 N m/rad: it turns between 10 and 10.5 N m, the pose stays stable."""
     model = upright(6, (1.5e5, 1.9e6, 1.4e5, 20.0, 20.0, 20.0))

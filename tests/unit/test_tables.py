@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from sweeps import sweep
 
 from spinepipe.status import Status
 from spinepipe.studies.registry import every_kind
@@ -60,8 +61,8 @@ def test_good_rows_become_a_table_with_empty_cells_as_null() -> None:
     assert not TABLE.schema.field("width_mm").nullable
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "said"),
+@sweep(
+    "column, value, said",
     [
         ("specimen", None, "empty"),
         ("pose", None, "empty"),
@@ -85,8 +86,8 @@ def test_bad_cells_are_refused_with_their_column(column, value, said) -> None:
         to_arrow(TABLE, spoiled(column, value))
 
 
-@pytest.mark.parametrize(
-    ("column", "value"),
+@sweep(
+    "column, value",
     [("pose", np.nan), ("pose", 2**40), ("specimen", 3), ("specimen", np.nan), ("sure", "yes")],
 )
 def test_cells_of_the_wrong_kind_are_refused_with_their_column(column, value) -> None:
@@ -164,7 +165,7 @@ def test_joining_finds_rows_that_repeat_a_key(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
+@sweep("table", TABLES.values(), TABLES)
 def test_every_result_table_is_complete(table: Table) -> None:
     names = [column.name for column in table.columns]
     assert len(set(names)) == len(names)

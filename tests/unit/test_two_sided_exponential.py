@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from example_effects import NOWHERE, scoped, slope, spine
+from sweeps import sweep
 
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -35,7 +36,7 @@ def tangent(q: float, values: Array = VALUES) -> float:
     return float(response.tangent[0, EXTENSION, EXTENSION])
 
 
-@pytest.mark.parametrize("q", [1e-7, 2e-5, 9e-5, 0.004, 0.1, 0.3])
+@sweep("q", [1e-7, 2e-5, 9e-5, 0.004, 0.1, 0.3])
 def test_each_side_is_an_exponential_of_its_own(q: float) -> None:
     """A (exp(B q) - 1) with A = k / B, in extended precision where numbers are nearly equal."""
     for sign, rate in ((1.0, FORWARDS), (-1.0, BACKWARDS)):
@@ -73,7 +74,7 @@ def test_without_a_rate_it_is_a_spring() -> None:
         assert tangent(q, spring) == pytest.approx(STIFFNESS, rel=1e-15)
 
 
-@pytest.mark.parametrize("coordinate", COORDINATES)
+@sweep("coordinate", COORDINATES)
 def test_derivatives_are_those_of_the_load(coordinate: str) -> None:
     """At rest, bent to both sides, near zero and beyond the straight end."""
     law = create("two_sided_exponential", {"coordinate": coordinate})
@@ -120,7 +121,7 @@ def bent(moment_nm: float, joints: int = 1) -> tuple[SpineModel, LoadCase]:
     return model, LoadCase("bent", 1, (step,))
 
 
-@pytest.mark.parametrize("moment_nm", [-60.0, -7.5, 0.1, 7.5, 200.0])
+@sweep("moment_nm", [-60.0, -7.5, 0.1, 7.5, 200.0])
 def test_a_joint_turns_as_far_as_the_law_says(moment_nm: float) -> None:
     """q = log(1 + M / A) / B."""
     model, case = bent(moment_nm)

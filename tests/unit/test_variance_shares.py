@@ -7,6 +7,7 @@ from scipy.special import expit, logit
 from scipy.stats import t
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
+from sweeps import sweep
 
 from spinepipe.sensitivity.shares import mean_squares, share_intervals, variance_shares
 from spinepipe.statistics import Ended
@@ -78,7 +79,7 @@ def test_shares_and_intervals_by_the_long_way() -> None:
     np.testing.assert_allclose(ends(found)[:, 1], expit(logit(whole) + half), rtol=1e-8)
 
 
-@pytest.mark.parametrize("edge", [0.0, 1.0])
+@sweep("edge", [0.0, 1.0])
 def test_a_share_that_comes_to_an_end_has_a_plain_interval(edge: float) -> None:
     """Three rows, SD 0.01, and columns that say nothing: variance (3 - 1)^2 / 3 x 0.01^2, freedom
     3 - 1. The other share stays on the logit scale."""
@@ -108,7 +109,7 @@ def test_known_shares_are_found_without_bias() -> None:
     np.testing.assert_allclose(np.mean(found, axis=0), expected, rtol=0, atol=0.02)
 
 
-@pytest.mark.parametrize("truth", [(0.5, 0.3, 0.2), (0.2, 0.2, 0.6)])
+@sweep("truth", [(0.5, 0.3, 0.2), (0.2, 0.2, 0.6)])
 def test_the_intervals_cover_what_they_say(truth) -> None:
     rng = np.random.default_rng(4)
     row, column, rest = truth
@@ -153,7 +154,7 @@ def test_a_transposed_grid_exchanges_rows_and_columns() -> None:
     np.testing.assert_allclose(ends(other), ends(one)[swap], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e150, 0.0), (1e-3, 5.0), (1.0, 1e6)])
+@sweep("scale, shift", [(1e-9, 0.0), (-1e150, 0.0), (1e-3, 5.0), (1.0, 1e6)])
 def test_unit_and_zero_do_not_matter(scale: float, shift: float) -> None:
     grid = normal_grid(np.random.default_rng(6), 20, 8, (0.3, 0.3, 0.4))
     one, other = variance_shares(grid), variance_shares(scale * grid + shift)
@@ -182,7 +183,7 @@ def test_a_constant_grid_has_no_shares() -> None:
     assert (found.n_rows, found.n_columns) == (5, 4)
 
 
-@pytest.mark.parametrize("where", [(0, 0), (4, 2), (slice(None), 1), (2, slice(None))])
+@sweep("where", [(0, 0), (4, 2), (slice(None), 1), (2, slice(None))])
 def test_variance_in_one_row_or_column_only_cannot_be_shared(where) -> None:
     grid = np.full((5, 4), 0.1)
     grid[where] += np.arange(1.0, 1.0 + grid[where].size).reshape(np.shape(grid[where]))
@@ -194,7 +195,7 @@ def test_variance_in_one_row_or_column_only_cannot_be_shared(where) -> None:
     assert variance_shares(grid).status is Ended.DONE
 
 
-@pytest.mark.parametrize("shape", [(2, 10), (10, 2)])
+@sweep("shape", [(2, 10), (10, 2)])
 def test_two_rows_or_columns_are_too_few(shape) -> None:
     found = variance_shares(np.random.default_rng(8).normal(size=shape))
     assert (found.status, found.interaction) == (Ended.TOO_FEW, None)
@@ -207,7 +208,7 @@ def test_three_by_three_are_enough() -> None:
     assert variance_shares(grid).status is Ended.DONE
 
 
-@pytest.mark.parametrize("grid", [np.ones(5), np.full((4, 4), np.nan)])
+@sweep("grid", [np.ones(5), np.full((4, 4), np.nan)])
 def test_what_is_no_full_grid_is_refused(grid) -> None:
     with pytest.raises(ValueError, match="full grid"):
         variance_shares(grid)

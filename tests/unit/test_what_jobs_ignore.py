@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
+from sweeps import sweep
 
 from spinepipe.studies.registry import every_kind, place_of
 
@@ -22,12 +22,6 @@ OF_OTHERS = {
 }
 """Asked for by functions that the job shares with others, and only for them."""
 
-JOBS = [
-    pytest.param(name, job.name, id=f"{name}-{job.name}")
-    for name, kind in every_kind().items()
-    for job in kind.jobs
-    if job.ignores
-]
 Function = tuple[str, str]
 """Module and name of a function or class."""
 
@@ -52,9 +46,25 @@ def names_in(module: str) -> tuple[dict[str, _Defined], dict[str, Function]]:
     return defined, imported
 
 
-def reached(module: str, name: str) -> Iterator[_Defined]:
-    """The function, and all that it names in its own and other files, and so on."""
+@cache
+def named_and_asked(module: str, name: str) -> tuple[frozenset[str], frozenset[str]]:
+    """Names in a function or class, and attributes of the study that it asks for."""
+    nodes = list(ast.walk(names_in(module)[0][name]))
+    attributes = [
+        node.attr
+        for node in nodes
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id in ASKED
+    ]
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    return frozenset(names), frozenset(attributes)
+
+
+def asked_of(module: str, name: str) -> set[str]:
+    """What is asked for by a function, and by all that it names in its own and other files."""
     known: set[Function] = set()
+    found: set[str] = set()
     waiting = [(module, name)]
     while waiting:
         place, one = waiting.pop()
@@ -65,24 +75,19 @@ def reached(module: str, name: str) -> Iterator[_Defined]:
         if one in imported and one not in defined:
             waiting.append(imported[one])
         elif one in defined:
-            yield defined[one]
-            inside = (node.id for node in ast.walk(defined[one]) if isinstance(node, ast.Name))
-            waiting += [(place, used) for used in inside]
+            names, asked = named_and_asked(place, one)
+            found |= asked
+            waiting += [(place, used) for used in names]
+    return found
 
 
-def asked_of(module: str, function: str) -> set[str]:
-    """Attributes of the study that are asked for on the way of a job."""
-    return {
-        node.attr
-        for one in reached(module, function)
-        for node in ast.walk(one)
-        if isinstance(node, ast.Attribute)
-        and isinstance(node.value, ast.Name)
-        and node.value.id in ASKED
-    }
+def jobs() -> Iterator[tuple[str, str]]:
+    """Kind and name of every job that ignores something."""
+    for name, kind in every_kind().items():
+        yield from ((name, job.name) for job in kind.jobs if job.ignores)
 
 
-@pytest.mark.parametrize(("kind", "job"), JOBS)
+@sweep("kind, job", jobs)
 def test_what_a_job_asks_for_it_does_not_ignore(kind: str, job: str) -> None:
     declared = every_kind()[kind].job(job)
     whole = {name for name, what in declared.ignores.items() if what is True}

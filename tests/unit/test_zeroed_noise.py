@@ -129,6 +129,7 @@ def test_unequal_noise_goes_through_the_estimate(gappy: Problem) -> None:
     )
 
 
+@pytest.mark.full
 def test_many_experiments_scatter_as_said() -> None:
     rng = np.random.default_rng(8)
     problems = [zeroed_problem(rng, 1, 4, ANGLES) for _ in range(120)]
@@ -170,6 +171,7 @@ def test_the_whitened_jacobian_is_the_slope_of_the_whitened_residuals(gappy: Pro
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.full
 def test_plain_least_squares_says_how_sure_it_is_of_zeroed_readings() -> None:
     """Errors of the estimates spread as told, though the cost takes readings for independent."""
     errors, told = [], []

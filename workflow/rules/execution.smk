@@ -1,6 +1,7 @@
 # How jobs are run: checks before the first one, the warm worker pool, and progress.
 import os
 import sys
+import time
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
-from spinepipe.jobs.pool import JobFailed, Progress, submit_and_wait, warm_up
+from spinepipe.jobs.pool import JobFailed, submit_and_wait, warm_up
+from spinepipe.jobs.time_left import TimeLeft, costs
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import place_of
 
@@ -95,13 +97,9 @@ def studies_at_work():
     )
 
 
-def say_where():
-    for name in studies_at_work():
-        print(
-            f"{name}: tables and figures in",
-            Path("results", name).resolve(),
-            file=sys.stderr,
-        )
+def keep_costs():
+    """What jobs took here, for the first line of the next run."""
+    time_left.keep(Path(ROOT))
 
 
 def sweep_logs():
@@ -131,7 +129,14 @@ def totals():
 
 # How many jobs are to come that Snakemake does not know yet, by names of rules; functions of jobs.
 FORESEEN = {}
-progress = Progress(totals)
+time_left = TimeLeft(totals, costs(Path(ROOT)), workflow.cores or 1)
+
+
+def tell_what_is_ahead():
+    """The first line of a run: what it will make, and how long that takes here."""
+    if workflow.is_main_process and (names := studies_at_work()):
+        what = f"{len(names)} studies" if len(names) > 1 else names[0]
+        print(f"{what}: {time_left.ahead()}", file=sys.stderr)
 
 
 def run_job(rule, job, wildcards, input, output, log, **others):
@@ -177,12 +182,16 @@ def plain(value):
 
 def execute(rule, function, wildcards, log, arguments):
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
+    begun = time.monotonic()
     try:
         submit_and_wait(name, function, str(log), **arguments)
     except JobFailed:
         FAILED.append(name)
         raise
-    progress.finish(rule)
+    time_left.finish(rule, time.monotonic() - begun)
+    page = arguments.get("output", "")
+    if str(page).endswith(".html"):
+        print(f"{wildcards.study}: {Path(ROOT, page).as_uri()}", file=sys.stderr)
 
 
 MOST_FAILED_NAMED = 5

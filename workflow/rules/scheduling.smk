@@ -25,24 +25,36 @@ class Unlisted(Sequence):
 class FewReady(JobScheduler):
     """A scheduler whose looks do not grow with the number of jobs.
 
-    Rules with a priority have jobs of minutes that hang on nothing: the first look starts with
-    them, so that no run waits for one of them alone at its end.
+    The first study of config.yaml goes first, so that a report is there soon, then rules with a
+    priority: their jobs take long and hang on nothing, and no run is to wait for one at its end.
     """
 
-    first_look = True
+    urgent = None
 
     @property
     def open_jobs(self):
         ready = self.workflow.dag.ready_jobs
-        if self.first_look:
-            self.first_look = False
-            if longest := [job for job in ready if job.rule.priority]:
-                return longest
-        return list(islice(ready, MOST_READY))
+        if self.urgent is None:
+            self.urgent = urgent_jobs(self.workflow.dag)
+        first = [job for job in self.urgent if job in ready]
+        if not first:
+            return list(islice(ready, MOST_READY))
+        free = self.workflow.cores - len(self.running) - len(first)
+        others = (job for job in ready if job not in first)
+        return [*first, *islice(others, max(0, free))]
 
     @property
     def remaining_jobs(self):
         return Unlisted(lambda: JobScheduler.remaining_jobs.fget(self))
+
+
+def urgent_jobs(dag):
+    """Jobs of the first study, unless it has very many, and of rules with a priority."""
+    jobs = list(dag.needrun_jobs())
+    chosen = SELECTION.studies[:1]
+    first = [job for job in jobs if job.wildcards.get("study") in chosen]
+    with_priority = [job for job in jobs if job.rule.priority and job not in first]
+    return [*(first if len(first) <= MOST_READY else []), *with_priority]
 
 
 def look_at_few():

@@ -1,0 +1,62 @@
+"""The time that a run still takes: catches an estimate of one rule told for the whole run, jobs
+that are counted twice, and a clock that stands at what another machine needed."""
+
+import io
+from pathlib import Path
+
+import pytest
+
+from spinepipe.jobs.time_left import MACHINE, TimeLeft, costs, duration
+
+TOTALS = {"fit": 10, "draw": 4}
+EXPECTED = {"fit": 2.0, "draw": 1.0}
+
+
+def left(cores: int = 2, stream: io.StringIO | None = None) -> TimeLeft:
+    ticks = iter(range(0, 1000, 10))
+    return TimeLeft(lambda: TOTALS, EXPECTED, cores, stream or io.StringIO(), lambda: next(ticks))
+
+
+def test_before_the_first_job_costs_of_all_rules_count() -> None:
+    assert left().seconds_left(TOTALS) == pytest.approx((10 * 2.0 + 4 * 1.0) / 2)
+    assert left(cores=1).ahead() == "14 jobs, about 24 s"
+
+
+def test_what_jobs_took_here_stands_for_the_rest_of_their_rule_and_scales_the_others() -> None:
+    run = left()
+    run.finish("fit", 6.0)
+    run.finish("fit", 2.0)
+    # Fits take 4 s, twice as long as expected, and so will the figures.
+    assert run.seconds_left(TOTALS) == pytest.approx((8 * 4.0 + 4 * 2.0) / 2)
+
+
+def test_a_line_tells_the_whole_run() -> None:
+    stream = io.StringIO()
+    run = left(stream=stream)
+    run.finish("fit", 2.0)
+    assert stream.getvalue() == "1 of 14 jobs  ·  11 s left  ·  fit\n"
+    for _ in range(9):
+        run.finish("fit", 2.0)
+    for _ in range(4):
+        run.finish("draw", 1.0)
+    assert stream.getvalue().endswith("14 of 14 jobs  ·  0 s left  ·  draw\n")
+
+
+def test_what_is_kept_is_what_the_next_run_expects(tmp_path: Path) -> None:
+    (tmp_path / ".snakemake").mkdir()
+    (tmp_path / "workflow").mkdir()
+    (tmp_path / "workflow/job_seconds.csv").write_text("rule,seconds\nfit,9.0\nother,3.0\n")
+    run = left()
+    run.finish("fit", 6.0)
+    run.finish("fit", 2.0)
+    run.keep(tmp_path)
+    known = costs(tmp_path)
+    assert (known["fit"], known["other"]) == (4.0, 3.0)
+    assert known[MACHINE] > 0
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(99.4, "99 s"), (100.0, "2 min"), (5999.0, "100 min"), (6000.0, "1.7 h")]
+)
+def test_seconds_as_people_say_them(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
