@@ -31,7 +31,6 @@ SCOLIOSIS = "study: small\nkind: scoliosis\ncohort: films\nmodels: [{models}]\n"
 TRUNK = (
     "study: small\nkind: trunk_loads\ncohort: trunk_volunteers\n"
     "drawn_tasks: [standing]\nsimplified_tasks: [flexion_50]\n"
-    "volunteer: {specimen: volunteer}\n"
     "uncertain: {tasks: [standing], samples: 32, samples_per_target: 8}\n"
 )
 
