@@ -15,11 +15,6 @@ settings.load_profile("same everywhere")
 """Drawn examples are the same on each machine, and a slow one fails none of them."""
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Starts of Snakemake are counted."""
-    config.pluginmanager.register(SnakemakeStarts())
-
-
 FULL_FOR_NOW = frozenset(
     [
         "test_investigation_edges",
@@ -27,9 +22,7 @@ FULL_FOR_NOW = frozenset(
         "test_tracking_figures",
         "test_posterior_job",
         "test_cohort_analysis",
-        "test_posterior",
         "test_identification_figures",
-        "test_hidden_data",
         "test_sensitivity_figures",
         "test_tracking_findings",
         "test_tracking_checks",
@@ -38,24 +31,40 @@ FULL_FOR_NOW = frozenset(
         "test_cohort_figures",
         "test_trunk_figures",
         "test_discrepancy_page",
-        "test_wrong_inputs",
         "test_nuisances",
         "test_against_gould_2024a",
-        "test_cli",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""
 
 
+SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
+"""Long files whose tests share nothing: each test may go to another worker."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Starts of Snakemake are counted."""
+    config.pluginmanager.register(SnakemakeStarts())
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first. Those that share projects go to any worker, all others file by file."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Slow tests and long files first, so that none of them runs alone at the end.
+
+    Those of long files go to any worker, all others file by file; who looks at one shared project
+    goes to one worker, so that no other waits until it is built.
+    """
+
+    def short(item: pytest.Item) -> bool:
+        return item.get_closest_marker("slow") is None and item.path.stem not in SPREAD
+
+    items.sort(key=short)
     for item in items:
         if item.path.stem in FULL_FOR_NOW:
             item.add_marker(pytest.mark.full)
-        if "shared" not in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        looks_at = {"eight", "toy"}.intersection(getattr(item, "fixturenames", ()))
+        if item.path.stem not in SPREAD:
+            item.add_marker(pytest.mark.xdist_group(min(looks_at, default=item.path.stem)))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -20,7 +20,7 @@ from tests.generators import ais_films
 
 ROOT = Path(__file__).parents[2]
 GRID = (
-    "poses: 2\nstiffness_sets: 4\n"
+    "poses: 4\nstiffness_sets: 4\n"
     "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
 )
 TRACKED = (

@@ -18,19 +18,23 @@ def sweep(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """As `pytest.mark.parametrize`, in one test; cases made by a function are made when it runs.
 
-    Fixtures are those of the one test: a test that changes what a fixture gave is no sweep.
+    Fixtures are those of the one test, but each case has a `tmp_path` of its own: a test that
+    changes what another fixture gave is no sweep.
     """
     arguments = names.replace(" ", "").split(",")
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         @wraps(function)
         def swept(*args: Any, **fixtures: Any) -> None:
-            failed, count = [], 0
+            failed, count, folder = [], 0, fixtures.get("tmp_path")
             for count, case in enumerate(cases() if callable(cases) else cases, start=1):
                 values = case if len(arguments) > 1 else (case,)
                 name = None
                 if isinstance(case, PARAM):
                     values, name = case.values, case.id
+                if folder is not None:
+                    fixtures["tmp_path"] = folder / str(count)
+                    fixtures["tmp_path"].mkdir()
                 try:
                     function(*args, **fixtures, **dict(zip(arguments, values, strict=True)))
                 except Exception as fault:

@@ -1,4 +1,7 @@
-"""Laws that the motion of every spine obeys, whatever its shape, springs and loads."""
+"""Laws that the motion of every spine obeys, whatever its shape, springs and loads.
+
+Catches motion that breaks symmetry, superposition or another law of all spines.
+"""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,7 @@
-"""Calibration on motion that OpenSim made: the stiffness it was made with comes back."""
+"""Calibration on motion that OpenSim made: the stiffness it was made with comes back.
+
+Catches a fit that does not find back stiffness of motion made elsewhere.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""The emulated forward run against OpenSim's own, which it stands for."""
+"""The emulated forward run against OpenSim's own, which it stands for.
+
+Catches an emulated run that ends elsewhere than OpenSim's own.
+"""
 
 import numpy as np
 import pytest

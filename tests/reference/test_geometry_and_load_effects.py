@@ -2,6 +2,8 @@
 
 A displaced joint centre is an OpenSim joint that stands there, a tilt of axes a joint tilted so, a
 left-out weight a heavier body, a follower load a path actuator under constant tension.
+
+Catches an effect that is not the real thing it stands for.
 """
 
 from collections.abc import Callable
@@ -11,6 +13,7 @@ import numpy as np
 import opensim
 import pytest
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
@@ -24,7 +27,7 @@ from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
 ROUND_OFF = 1e-13
 """m and rad; poses of order 0.1 from two engines, re-expressed."""
 
-SEEDS = pytest.mark.parametrize("seed", range(4))
+SEEDS = sweep("seed", range(4))
 
 
 def random_chain(seed: int, n_joints: int = 4) -> Chain:
@@ -90,7 +93,7 @@ def test_tilted_markers_report_the_motion_in_tilted_axes(seed: int) -> None:
 
 
 @SEEDS
-@pytest.mark.parametrize("where", ["each", "top"])
+@sweep("where", ["each", "top"])
 def test_a_weight_left_out_is_a_heavier_body(seed: int, where: str) -> None:
     chain = random_chain(seed)
     more = np.full(4, 2.0) if where == "each" else np.array([0.0, 0.0, 0.0, 2.0])
@@ -177,8 +180,8 @@ def with_cable(peer, chain: Chain, tension: float, guides: Array):
 
 
 @SEEDS
-@pytest.mark.parametrize("tension", [60.0, 300.0])
-@pytest.mark.parametrize(("guides", "anterior"), [*((g, 0.0) for g in CABLES), ("joints", -0.01)])
+@sweep("tension", [60.0, 300.0])
+@sweep("guides, anterior", [*((g, 0.0) for g in CABLES), ("joints", -0.01)])
 def test_a_follower_load_is_a_path_actuator(
     seed: int, tension: float, guides: str, anterior: float
 ) -> None:
@@ -218,8 +221,8 @@ def about_x_first(q: Array) -> Array:
 
 
 @SEEDS
-@pytest.mark.parametrize(
-    ("name", "values", "seen"),
+@sweep(
+    "name, values, seen",
     [
         pytest.param("joint_centre_migration", (0.04, -0.06), migrated, id="migration"),
         pytest.param("rotation_order", (1.0,), about_x_first, id="order"),

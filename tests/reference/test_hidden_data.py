@@ -1,4 +1,7 @@
-"""The cohorts with a hidden truth: spinepipe reads them, and without effects it moves like them."""
+"""The cohorts with a hidden truth: spinepipe reads them, and without effects it moves like them.
+
+Catches made-up cohorts whose truth is not what they say, so that tests on them prove nothing.
+"""
 
 import json
 from dataclasses import replace
@@ -157,7 +160,14 @@ def test_a_short_specimen_in_shear_is_read_in_one_coordinate(tmp_path: Path) -> 
     assert peak.item() == pytest.approx(60e3 / truth.stiffness[0, 0], rel=0.02)  # it also tilts
 
 
-@pytest.mark.parametrize("name", ["facet_contact", "follower_load", "marker_bias"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "follower_load",
+        pytest.param("facet_contact", marks=pytest.mark.full),
+        pytest.param("marker_bias", marks=pytest.mark.full),
+    ],
+)
 def test_the_gap_asked_for_is_what_a_refit_leaves(name: str) -> None:
     recipe = with_effect(name, replace(SMALL, gap=0.5), joint=None)
     truth, stage, _ = draw(recipe)
@@ -185,8 +195,10 @@ def _errors(logs, stage, number, spine, reported):
     return ((reported - q)[..., 3:] / SD_RAD).ravel()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize(
+    "name",
+    ["hysteresis", *(pytest.param(name, marks=pytest.mark.full) for name in CATALOGUE)],
+)
 def test_every_effect_makes_a_readable_cohort(tmp_path: Path, name: str) -> None:
     options = {"translations": True, "preload_n": 200.0, "unloading": True, "gap": 0.5}
     recipe = with_effect(name, replace(SMALL, **options))

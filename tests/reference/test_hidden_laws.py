@@ -1,4 +1,7 @@
-"""The hidden truths of tests/generators/hidden on one joint, against closed forms."""
+"""The hidden truths of tests/generators/hidden on one joint, against closed forms.
+
+Catches a hidden law that is not the one its name and formula say.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace

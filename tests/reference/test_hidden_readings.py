@@ -1,4 +1,7 @@
-"""How the hidden truth is told: other frames, other angles, skin; against scipy and differences."""
+"""How the hidden truth is told: other frames, other angles, skin; against scipy and differences.
+
+Catches a hidden truth told in other frames or angles than it says.
+"""
 
 from functools import partial
 

@@ -1,4 +1,7 @@
-"""The angle of one joint at which a joint law, as published, balances a moment."""
+"""The angle of one joint at which a joint law, as published, balances a moment.
+
+Catches a law that is not the published one.
+"""
 
 from typing import Any
 

@@ -1,4 +1,7 @@
-"""Many spines at once against the engine of record, spine by spine, on random chains."""
+"""Many spines at once against the engine of record, spine by spine, on random chains.
+
+Catches a stack that solves a spine otherwise than the engine of record.
+"""
 
 from dataclasses import replace
 

@@ -2,6 +2,8 @@
 
 Meshes, wrapping shapes and the head are taken out of the files, all else stays, so that MuJoCo
 makes of bodies, joints, points and paths what it makes of them. It has no joint at T12L1 or T11T12.
+
+Catches muscle paths read otherwise than MuJoCo compiles them.
 """
 
 import xml.etree.ElementTree as ET

@@ -1,4 +1,7 @@
-"""The exported .osim file, opened in OpenSim, against spinepipe and against pinocchio."""
+"""The exported .osim file, opened in OpenSim, against spinepipe and against pinocchio.
+
+Catches an exported model that OpenSim moves otherwise.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -6,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Kind, Parameter
 from spinepipe.model import LoadCase, RefusedModel, ScopedEffect
@@ -80,7 +84,7 @@ def test_loads_of_one_step_are_written_as_constants(tmp_path: Path, chain: Chain
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("recorded", [True, False])
+@sweep("recorded", [True, False])
 def test_loads_of_several_steps_follow_the_time(tmp_path: Path, recorded: bool) -> None:
     chain = chains.random_chain(np.random.default_rng(1), 2)
     case = bridge.load_case(chain, 0.0, 1.0, -0.5)

@@ -1,11 +1,14 @@
-"""Hysteresis and creep against their differential equations, solved by scipy for one joint."""
+"""Hysteresis and creep against their differential equations, solved by scipy for one joint.
+
+Catches hysteresis or creep that is not its differential equation's.
+"""
 
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import interp1d
 from scipy.optimize import brentq
 from scipy.stats import norm
+from sweeps import sweep
 
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -56,7 +59,7 @@ def steps_of(per_piece: int) -> tuple[Array, Array]:
     return interp1d(corners, TIMES)(where), interp1d(corners, MOMENTS)(where)
 
 
-@pytest.mark.parametrize("per_piece", [1, 10])
+@sweep("per_piece", [1, 10])
 def test_friction_is_dahls_differential_equation(per_piece: int) -> None:
     """k dq + m dh = dM with dh = (1 - h sign dq) dq / y; how finely it is stepped is the same."""
     moment, yield_angle = 0.9, np.deg2rad(1.2)
@@ -80,8 +83,8 @@ def test_friction_is_dahls_differential_equation(per_piece: int) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * moment / SPRING)
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.7, 2.0])
-@pytest.mark.parametrize("per_piece", [1, 7])
+@sweep("spread", [0.0, 0.7, 2.0])
+@sweep("per_piece", [1, 7])
 def test_friction_of_elements_is_springs_in_line_with_sliders(spread, per_piece) -> None:
     """Each h is cut at ±1, in 200 small moves of a step; corners here are rounded, there not."""
     moment, yield_angle = 0.9, np.deg2rad(0.6)
@@ -136,15 +139,15 @@ def crept(times: Array, moments: Array, spread: float) -> Array:
     return np.array(found)
 
 
-@pytest.mark.parametrize("spread", [0.0, 1.0, 2.5])
-@pytest.mark.parametrize("per_piece", [1, 4])
+@sweep("spread", [0.0, 1.0, 2.5])
+@sweep("per_piece", [1, 4])
 def test_creep_under_ramps_is_kelvin_voigt_elements(spread: float, per_piece: int) -> None:
     times, moments = steps_of(per_piece)
     found = extension(joint("creep", FRACTION, TIME, spread, load="ramped"), times, moments)
     np.testing.assert_allclose(found, crept(times, moments, spread), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("spread", [0.0, 1.0, 2.5])
+@sweep("spread", [0.0, 1.0, 2.5])
 def test_creep_under_held_loads_adds_up_what_each_load_does(spread: float) -> None:
     """Boltzmann: each change of load drifts by its own clock."""
     slow, lost = retardation_times(spread), FRACTION / (1.0 - FRACTION)

@@ -1,4 +1,7 @@
-"""The peers against closed forms and against each other, before anything is measured by them."""
+"""The peers against closed forms and against each other, before anything is measured by them.
+
+Catches a peer that is wrong itself, by which agreement would mean nothing.
+"""
 
 from dataclasses import replace
 
@@ -6,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from sweeps import sweep
 
 from tests.reference.peers import chain as chains
 from tests.reference.peers import newton, opensim_calibration, opensim_peer, pinocchio_peer
@@ -45,8 +49,8 @@ def case(request: pytest.FixtureRequest) -> tuple[Chain, Array, np.random.Genera
     return chain, random_pose(rng, chain), rng
 
 
-@pytest.mark.parametrize("peer", EQUILIBRIUM)
-@pytest.mark.parametrize("coordinate", range(6))
+@sweep("peer", EQUILIBRIUM)
+@sweep("coordinate", range(6))
 def test_one_coordinate_moves_by_load_over_stiffness(peer: str, coordinate: int) -> None:
     chain = one_joint(np.random.default_rng(coordinate))
     axis = chain.rotations[0][:, (0, 1, 2, 2, 0, 1)[coordinate]]
@@ -60,7 +64,7 @@ def test_one_coordinate_moves_by_load_over_stiffness(peer: str, coordinate: int)
     np.testing.assert_allclose(pose, expected, rtol=0, atol=ROUND_OFF)
 
 
-@pytest.mark.parametrize("peer", EQUILIBRIUM)
+@sweep("peer", EQUILIBRIUM)
 def test_pure_flexion_moment_bends_every_level_alike(peer: str) -> None:
     flexion = Load(5, moment=np.array([0.0, 0.0, -7.5]))
     chain = replace(chains.t12_s1_chain(), gravity=WEIGHTLESS).with_loads(flexion)
@@ -71,7 +75,7 @@ def test_pure_flexion_moment_bends_every_level_alike(peer: str) -> None:
     assert np.rad2deg(pose[0, 3]) == pytest.approx(-8.42585, abs=5e-6)
 
 
-@pytest.mark.parametrize("peer", EQUILIBRIUM)
+@sweep("peer", EQUILIBRIUM)
 def test_a_weight_in_front_of_one_joint(peer: str) -> None:
     """Moment balance k angle = -m g arm(angle); translations do not change the arm."""
     mass, weight_arm, stiffness = 8.0, np.array([0.05, 0.10, 0.0]), 51.0
@@ -122,7 +126,7 @@ def test_loads_without_moments_are_the_slope_of_an_energy(case) -> None:
     np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-7)
 
 
-@pytest.mark.parametrize("law", ["coordinate", "bushing"])
+@sweep("law", ["coordinate", "bushing"])
 def test_both_engines_miss_the_same_load_for_equilibrium(case, law: opensim_peer.Law) -> None:
     chain, pose, _ = case
     found = opensim_peer.residual(opensim_peer.build(chain, law=law), pose)
@@ -181,7 +185,7 @@ def test_both_engines_find_the_same_equilibrium(case) -> None:
     np.testing.assert_allclose(found["opensim bushing"], found["pinocchio"], rtol=0, atol=ROUND_OFF)
 
 
-@pytest.mark.parametrize("law", ["coordinate", "bushing"])
+@sweep("law", ["coordinate", "bushing"])
 def test_a_file_has_the_equilibrium_of_its_chain(tmp_path, case, law: opensim_peer.Law) -> None:
     """Half of the loads go through the file, the others are added to it."""
     chain, _, _ = case
@@ -196,7 +200,7 @@ def test_a_file_has_the_equilibrium_of_its_chain(tmp_path, case, law: opensim_pe
             assert found[f"{name}_{level}"] == pytest.approx(value, abs=1e-11)
 
 
-@pytest.mark.parametrize("integrator", ["cpodes", "rkm"])
+@sweep("integrator", ["cpodes", "rkm"])
 def test_settling_of_one_joint_follows_its_closed_form(integrator: str) -> None:
     """Overdamped: inertia a'' + damping a' + stiffness a = moment, from rest."""
     chain = one_joint(np.random.default_rng(3))

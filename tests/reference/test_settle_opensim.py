@@ -1,9 +1,12 @@
-"""Settling in time against OpenSim's implicit integrator, and its end against the equilibrium."""
+"""Settling in time against OpenSim's implicit integrator, and its end against the equilibrium.
+
+Catches a way or end of settling that another integrator does not take.
+"""
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.statics import Program, settle
 from spinepipe.status import Status
@@ -36,7 +39,7 @@ def chain_and_loads(name: str) -> Chain:
     }[name]
 
 
-CHAINS = pytest.mark.parametrize(
+CHAINS = sweep(
     "name",
     [
         "bending under the pot",
@@ -62,7 +65,7 @@ def peak(history: Array, kind: slice) -> float:
 
 
 @CHAINS
-@pytest.mark.parametrize("ramp_s", [0.0, 0.5], ids=["constant", "ramped"])
+@sweep("ramp_s", [0.0, 0.5])
 def test_the_way_is_that_of_opensim(name: str, ramp_s: float) -> None:
     chain = chain_and_loads(name)
     expected = peer.settle(chain, 1.5, times=TIMES, accuracy=PEER_ACCURACY, ramp_time=ramp_s)
@@ -75,7 +78,7 @@ def test_the_way_is_that_of_opensim(name: str, ramp_s: float) -> None:
 
 
 @CHAINS
-@pytest.mark.parametrize("ramp_s", [0.0, 0.5], ids=["constant", "ramped"])
+@sweep("ramp_s", [0.0, 0.5])
 def test_what_remains_is_the_way_to_the_equilibrium(name: str, ramp_s: float) -> None:
     chain = chain_and_loads(name)
     system = bridge.system(chain)

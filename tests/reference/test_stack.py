@@ -1,4 +1,7 @@
-"""Stacks of runs against the engine of record: poses, readings, derivatives, effect by effect."""
+"""Stacks of runs against the engine of record: poses, readings, derivatives, effect by effect.
+
+Catches a stack whose poses, readings or derivatives are not the engine's, for any effect.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

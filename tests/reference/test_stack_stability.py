@@ -1,10 +1,14 @@
-"""What a stack takes for stable, against PyBullet's mass matrix and the rates of all modes."""
+"""What a stack takes for stable, against PyBullet's mass matrix and the rates of all modes.
+
+Catches a tipping or fluttering spine that is proven stable.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics import System
@@ -46,7 +50,7 @@ def by_pybullet(chain: chains.Chain, q: Array) -> Matrices:
     return system.chain.mass_matrix(q.ravel()) * both, tangent * both
 
 
-@pytest.mark.parametrize("n_joints", [1, 3, 6, 17])
+@sweep("n_joints", [1, 3, 6, 17])
 def test_tangents_and_mass_matrices_are_pybullet_s(n_joints: int) -> None:
     rng = np.random.default_rng(n_joints)
     chain = loaded(rng, n_joints, 1.0, 1.0)
@@ -63,7 +67,7 @@ def test_tangents_and_mass_matrices_are_pybullet_s(n_joints: int) -> None:
     np.testing.assert_allclose(tangent, expected_tangent, rtol=0, atol=1e-11 * largest)
 
 
-@pytest.mark.parametrize("n_joints", [1, 3, 6, 17])
+@sweep("n_joints", [1, 3, 6, 17])
 def test_inertia_is_pybullet_s(n_joints: int) -> None:
     """Mass matrices, what inertia asks for at given rates, and the accelerations that answer."""
     rng = np.random.default_rng(20 + n_joints)
@@ -87,8 +91,8 @@ def test_inertia_is_pybullet_s(n_joints: int) -> None:
             np.testing.assert_allclose(mass @ found, forces[lane], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("n_joints", "size", "softest", "unstable"),
+@sweep(
+    "n_joints, size, softest, unstable",
     [
         (1, 4.0, 0.02, 0),
         (3, 1.5, 0.1, 0),
@@ -120,8 +124,8 @@ def test_what_is_proven_is_what_decays(
     assert by_forms.sum() >= 0.9 * stands.sum()
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 3.0])
-@pytest.mark.parametrize("n_joints", [1, 2, 5])
+@sweep("share", [0.0, 0.3, 3.0])
+@sweep("n_joints", [1, 2, 5])
 def test_no_mode_lies_below_the_rate_where_the_form_loses_its_sign(
     n_joints: int, share: float
 ) -> None:
@@ -179,8 +183,8 @@ def fluttering(mass: Array, tangent: Array, share: float) -> float | None:
     return factor if growth(mass / factor, tangent / factor) > 1e-6 else None
 
 
-@pytest.mark.parametrize("share", [0.9, 0.3, 1e-3])
-@pytest.mark.parametrize("n_joints", [1, 2, 4])
+@sweep("share", [0.9, 0.3, 1e-3])
+@sweep("n_joints", [1, 2, 4])
 def test_what_flutters_is_never_proven(n_joints: int, share: float) -> None:
     """Springs hold, and moments that keep their direction in ground feed a growing motion.
 

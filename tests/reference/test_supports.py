@@ -1,4 +1,7 @@
-"""Joint coordinates that a rig fixes: closed forms, one engine against the other, differences."""
+"""Joint coordinates that a rig fixes: closed forms, one engine against the other, differences.
+
+Catches a rig's reaction, or its derivative, that is not what holds the joint.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

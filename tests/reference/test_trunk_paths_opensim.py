@@ -1,6 +1,8 @@
 """Lengths and lever arms of a trunk's fascicles against OpenSim's, bodies and points the same.
 
 The made-up trunk bends in all seven joints, that of myo-sim too.
+
+Catches a lever arm that is not OpenSim's.
 """
 
 import numpy as np

@@ -4,12 +4,15 @@ Every chain has all six joint types, tilted frames and full inertia tensors. Bot
 double precision, so they differ by rounding only: some hundred operations of 1e-16 each, on
 numbers that differ in size between rows. Errors are therefore held against the largest number of
 the same kind (translations, rotations), not entry by entry.
+
+Catches a wrong mass matrix, bias or Jacobian of the loaded chain.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.model import RefusedModel
 from spinepipe.world import Chain as LoadedChain
@@ -87,11 +90,7 @@ def test_jacobian_of_points_far_from_the_centre_of_mass(case) -> None:
         np.testing.assert_allclose(angular.T, expected[3:], rtol=0, atol=ROUND_OFF)
 
 
-@pytest.mark.parametrize(
-    "principal",
-    [(0.0, 0.0, 0.0), (2e-4, 2e-4, 2e-4), (1e-4, 1e-4, 1.5e-4), (1e-8, 2e-4, 2e-4)],
-    ids=["point", "ball", "disc", "needle"],
-)
+@sweep("principal", [(0.0, 0.0, 0.0), (2e-4, 2e-4, 2e-4), (1e-4, 1e-4, 1.5e-4), (1e-8, 2e-4, 2e-4)])
 def test_special_inertia_tensors(principal: tuple[float, float, float]) -> None:
     """Equal principal moments leave the principal axes open; PyBullet reports some all the same."""
     rng = np.random.default_rng(5)
@@ -143,7 +142,7 @@ def test_same_geometry_with_other_masses_is_another_model() -> None:
         assert_same(found, expected)
 
 
-@pytest.mark.parametrize(
+@sweep(
     "ask",
     [
         lambda loaded: loaded.mass_matrix(np.zeros(12)),
@@ -151,7 +150,6 @@ def test_same_geometry_with_other_masses_is_another_model() -> None:
         lambda loaded: loaded.mass_velocity(np.zeros(12)),
         lambda loaded: loaded.jacobian(np.zeros(12), 1, np.zeros(3)),
     ],
-    ids=["mass_matrix", "bias", "mass_velocity", "jacobian"],
 )
 def test_a_chain_replaced_by_another_is_refused(ask) -> None:
     model = spine_model(chains.random_chain(np.random.default_rng(9), 2))

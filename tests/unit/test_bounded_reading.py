@@ -1,4 +1,7 @@
-"""Files that people write are read within bounds: each is refused with its place, none holds up."""
+"""Files that people write are read within bounds: each is refused with its place, none holds up.
+
+Catches a reader that hangs, swells or runs what a file holds, and a fault told without its place.
+"""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -8,6 +11,7 @@ import pytest
 from cohort_cases import NAME, Change, add, cell, line, swap, text, valid_files, without, write
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from sweeps import sweep
 
 from spinepipe import cohort, problems
 from spinepipe.cohort import csv_table
@@ -42,8 +46,8 @@ def rows_of_motion(number: int, row: Callable[[int], str]) -> Change:
     return text(MOTION, MOTION_HEADER + "".join(row(n) for n in range(number)))
 
 
-@pytest.mark.parametrize(
-    ("about", "change", "place", "says"),
+@sweep(
+    "about, change, place, says",
     [
         ("alias", add(YAML, "a: &a [1, 1]\nb: [*a, *a]"), (YAML, 10), "anchor '&a'"),
         ("lone alias", add(YAML, "b: *a"), (YAML, 10), "alias '*a'"),
@@ -76,7 +80,7 @@ def rows_of_motion(number: int, row: Callable[[int], str]) -> Change:
         ("260", add(SPECIMENS, "s" * 190 + ",,,,,"), (SPECIMENS, 4), "a name of 190"),
         ("many columns", text(SPECIMENS, "specimen" + ",a" * 1001), (SPECIMENS, 1), "at most 1000"),
     ],
-    ids=lambda value: value if isinstance(value, str) and " " not in value[9:] else None,
+    lambda value: value if isinstance(value, str) and " " not in value[9:] else None,
 )
 def test_what_is_beyond_bounds_is_told_at_its_place(about, change, place, says, tmp_path) -> None:
     found = told(tmp_path, change)
@@ -174,8 +178,8 @@ def test_each_sign_that_a_name_may_have_can_be_drawn() -> None:
 MODEL = "model: m\ncohort: c\neffects:\n- effect: linear_bushing\n"
 
 
-@pytest.mark.parametrize(
-    ("content", "row", "says"),
+@sweep(
+    "content, row, says",
     [
         (MODEL + "cohort: d\n", 5, "same key twice"),
         (MODEL + "  values:\n  - {joint: '*', joint: L1L2}\n", 6, "same key twice"),
@@ -185,7 +189,6 @@ MODEL = "model: m\ncohort: c\neffects:\n- effect: linear_bushing\n"
         (MODEL + f"  values: [{{extension_nm_per_rad: {'9' * 199}}}]\n", 5, "allowed: 0.0001 to"),
         (MODEL + "a: \x01\n", 5, "U+0001"),
     ],
-    ids=["key", "nested-key", "anchor", "deep", "digits", "large", "control"],
 )
 def test_model_files_are_read_within_the_same_bounds(content, row, says, tmp_path) -> None:
     path = tmp_path / "model.yaml"
@@ -240,8 +243,8 @@ def renamed(old: str, new: str) -> Change:
     return change
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
+@sweep(
+    "old, new",
     [
         (LOADS, "Loads.csv"),
         (LOADS, "loads.CSV"),

@@ -1,4 +1,7 @@
-"""The bounded tangent law: what its equations say of it, derivatives, solves near its ends."""
+"""The bounded tangent law: what its equations say of it, derivatives, solves near its ends.
+
+Catches a wrong sign, bound or derivative of the law, and solves lost near its ends.
+"""
 
 import numpy as np
 import pytest

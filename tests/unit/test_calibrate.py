@@ -1,4 +1,8 @@
-"""Calibration: truth comes back, and what cannot be known is said so."""
+"""Calibration: truth comes back, and what cannot be known is said so.
+
+Catches a wrong residual, Jacobian, weight or bound, and a fit that says it converged where it did
+not.
+"""
 
 from dataclasses import replace
 

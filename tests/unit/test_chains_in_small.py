@@ -1,4 +1,7 @@
-"""Chains on densities that are written down: coordinates, starts, lengths, what is believed."""
+"""Chains on densities that are written down: coordinates, starts, lengths, what is believed.
+
+Catches a sampler's wrong step, Jacobian of coordinates or test of convergence.
+"""
 
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -7,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scipy.stats import norm
+from sweeps import sweep
 
 from spinepipe.calibrate.posterior import Mode, Point, Target, _mode
 from spinepipe.calibrate.sampler import Convergence, _chart, _start, convergence, sample
@@ -60,7 +64,7 @@ def test_a_normal_density_is_followed_to_its_quantiles() -> None:
     assert (far[0], far[1]) == pytest.approx((0.7 - 6.0, 0.7 + 6.0), rel=0.1)
 
 
-@pytest.mark.parametrize(("sd", "told"), [(0.89, True), (0.91, False)])
+@sweep("sd, told", [(0.89, True), (0.91, False)])
 def test_an_unknown_that_the_prior_holds_is_only_shifted(sd: float, told: bool) -> None:
     target = made([sd, 0.1], [0.2, 0.0])
     chart = _chart(cast(Target, target), target.mode)
@@ -100,7 +104,7 @@ def test_where_nothing_stands_quantiles_end() -> None:
     assert z[0] == pytest.approx(0.5 * norm.ppf(norm.cdf(-1.0) * cut), abs=0.02)
 
 
-@pytest.mark.parametrize("halvings", [0, 1, 3, 7])
+@sweep("halvings", [0, 1, 3, 7])
 def test_a_start_is_drawn_in_by_halves_until_it_stands(halvings: int) -> None:
     wide = 2.0 * np.random.default_rng(20011).standard_normal(3)
     reach = np.abs(wide).max() * 0.5**halvings * 1.01
@@ -147,8 +151,8 @@ def test_draws_of_a_normal_density_their_number_and_what_they_cost() -> None:
     assert again.evaluations == target.evaluations - before
 
 
-@pytest.mark.parametrize(
-    ("r_hat", "bulk", "tail", "words"),
+@sweep(
+    "r_hat, bulk, tail, words",
     [
         (1.01, 400.0, 400.0, []),
         (1.0101, 400.0, 400.0, ["R-hat is 1.010, allowed 1.01"]),

@@ -1,6 +1,8 @@
-"""The command line: what it prints, what it writes, how it ends."""
+"""The command line: what it prints, what it writes, how it ends.
 
-import shutil
+Catches a command that prints another answer, writes elsewhere or ends well where it should not.
+"""
+
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +15,7 @@ import pytest
 from chain_cases import JOINTS, Chains
 from cohort_cases import swap, text, without, write
 from cohort_edge_cases import A
+from mistaken_cohorts import good
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
@@ -54,12 +57,10 @@ def test_check_tells_how_much_the_data_tell(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], free: str
 ) -> None:
     """Moments, and rotations alone were read: translations asked for are warned of."""
-    shutil.copytree(
-        ROOT / "config/cohorts/t12s1_phantom", tmp_path / "config/cohorts/t12s1_phantom"
-    )
-    motion = pd.read_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv")
+    file = good("t12s1_phantom", tmp_path / "config/cohorts") / "motion.csv"
+    motion = pd.read_csv(file)
     motion[["anterior_mm", "superior_mm", "right_mm"]] = np.nan
-    motion.to_csv(tmp_path / "config/cohorts/t12s1_phantom/motion.csv", index=False)
+    motion.to_csv(file, index=False)
     (tmp_path / "config/studies").mkdir()
     asked = f"calibration: {{free: {free}}}\n" if free else ""
     (tmp_path / "config/studies/pose.yaml").write_text(PURE_MOMENTS + asked)
@@ -428,8 +429,11 @@ def test_a_broken_library_is_one_message(
     assert "`spinepipe doctor` says what is missing" in err
 
 
-def test_as_a_program() -> None:
-    command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check"]
+@pytest.mark.parametrize(
+    "named", [["linear_spines"], pytest.param([], marks=pytest.mark.full)], ids=["one", "all"]
+)
+def test_what_is_shipped_is_sound_to_the_program(named: list[str]) -> None:
+    command = [sys.executable, "-m", "spinepipe.cli", "--root", str(ROOT), "check", *named]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 

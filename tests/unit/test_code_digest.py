@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from sweeps import sweep
 
 from spinepipe.jobs import code
 
@@ -52,7 +53,7 @@ def test_a_file_that_has_changed_since_is_read_again(kept: Path) -> None:
     assert code.code_digest(MODULE) == fresh
 
 
-@pytest.mark.parametrize("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
+@sweep("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
 def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
     fresh = code.code_digest(MODULE)
     kept.write_text(content, "utf-8")
@@ -75,8 +76,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path
     return tmp_path / "spinepipe"
 
 
-@pytest.mark.parametrize(
-    ("name", "counts"),
+@sweep(
+    "name, counts",
     [
         *((f"used/published{suffix}", True) for suffix in code._DATA_SUFFIXES),
         ("published.csv", True),
@@ -101,8 +102,8 @@ def test_data_beside_imported_modules_counts(package: Path, name: str, counts: b
     assert (digest() != one) is counts
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
+@sweep(
+    "one, other, same",
     [
         ('"""Doc."""\nx = 1  # why\n', "x = 1\n", True),
         ("def f():\n    '''Doc.'''\n    return 1\n", "def f():\n\n    return 1\n", True),
@@ -127,8 +128,8 @@ OTHER = Table("other", "About it.", (), (Column("b", "text", meaning="what b is"
 """
 
 
-@pytest.mark.parametrize(
-    ("was", "becomes", "counts"),
+@sweep(
+    "was, becomes, counts",
     [
         ("what a is", "what it is", False),
         ("was not read", "nobody read it", False),
@@ -159,8 +160,8 @@ def test_of_tables_the_imported_ones_count_without_wording(
     assert (digest(TABLES) != digest(TABLES.replace(was, becomes))) is counts
 
 
-@pytest.mark.parametrize(
-    ("own", "counts"),
+@sweep(
+    "own, counts",
     [
         ("from spinepipe.effects import create\n", False),
         ("from spinepipe.effects import create\ncreate('creep')\n", True),

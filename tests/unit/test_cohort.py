@@ -1,4 +1,7 @@
-"""Valid cohorts of every allowed form are read as they stand."""
+"""Valid cohorts of every allowed form are read as they stand.
+
+Catches a valid cohort that is refused, or read as another one.
+"""
 
 from itertools import pairwise
 from pathlib import Path

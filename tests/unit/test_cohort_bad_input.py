@@ -1,4 +1,7 @@
-"""Every malformed cohort is refused with file, row, column and a sentence that helps."""
+"""Every malformed cohort is refused with file, row, column and a sentence that helps.
+
+Catches a malformed cohort that is accepted, or a message that names another place.
+"""
 
 from pathlib import Path
 
@@ -17,6 +20,7 @@ from cohort_cases import (
     without,
     write,
 )
+from sweeps import sweep
 
 from spinepipe import cohort
 from spinepipe.problems import InputError, Problem
@@ -182,7 +186,7 @@ def problems_of(folder: Path) -> tuple[Problem, ...]:
     return caught.value.problems
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.about.replace(" ", "-"))
+@sweep("case", CASES, lambda case: case.about.replace(" ", "-"))
 def test_fault_is_located_and_explained(case: Case, tmp_path: Path) -> None:
     problems = problems_of(write(tmp_path / NAME, case.change))
     listing = "\n".join(map(str, problems))

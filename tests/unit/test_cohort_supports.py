@@ -1,4 +1,7 @@
-"""``supports.csv``: what a rig fixes, as the engine gets it, as it is read, and what is refused."""
+"""``supports.csv``: what a rig fixes, as the engine gets it, as it is read, and what is refused.
+
+Catches a rig's fixed coordinates that reach the engine wrongly or are left out unsaid.
+"""
 
 from itertools import product
 from pathlib import Path
@@ -9,6 +12,7 @@ import pytest
 from cohort_cases import Change, Files, both, swap, text, write
 from hypothesis import given
 from hypothesis import strategies as st
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe import problems
@@ -145,8 +149,8 @@ def test_digests_without_a_rig_are_as_before_and_with_one_are_others(tmp_path: P
     assert plain.digest_of(["b"]) != everyone.digest_of(["b"])
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "told"),
+@sweep(
+    "row, column, told",
     [
         ("*,*,L2L3,flexion,held,", "coordinate", "one of anterior"),
         ("*,*,L2L3,extension,hold,", "state", "did you mean 'held'"),
@@ -232,8 +236,8 @@ def test_a_preload_acts_at_every_step(tmp_path: Path) -> None:
             np.testing.assert_allclose(axial.point, [0.005, 0.072, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "told"),
+@sweep(
+    "row, column, told",
     [
         ("*,*,L4,0,-400,0,0,0,0,0,0,0", "vertebra", "fixed to ground"),
         ("*,*,L2,0,-400,0,0,0,0,,,", "px_mm", "a force without a point"),

@@ -1,4 +1,7 @@
-"""Tests that a rig starts at zero beside tests that it does not."""
+"""Tests that a rig starts at zero beside tests that it does not.
+
+Catches zero readings taken for measured, or the other way round.
+"""
 
 from pathlib import Path
 

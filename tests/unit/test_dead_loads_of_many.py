@@ -1,9 +1,12 @@
-"""Dead loads of many tests at once are those of each alone, and slopes are differences."""
+"""Dead loads of many tests at once are those of each alone, and slopes are differences.
+
+Catches loads of one test that act in another, and a wrong tangent of dead loads.
+"""
 
 from typing import Any
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Neutral
@@ -24,7 +27,7 @@ LOADS: list[tuple[str, dict[str, Any]]] = [
     ("segment_weight", {"where": "each"}),
     ("segment_weight", {"where": "top"}),
 ]
-EVERY = pytest.mark.parametrize(("name", "options"), LOADS, ids=str)
+EVERY = sweep("name, options", LOADS, str)
 
 
 def of(name: str, options: dict[str, Any]) -> DeadLoad:

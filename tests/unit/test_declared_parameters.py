@@ -1,6 +1,8 @@
 """What effects declare for each coordinate, in the units that people use: sizes and bounds.
 
 Pages of `docs/effects.md` hold what they declare for the coordinate that they take by default.
+
+Catches a size or bound that means another unit than the page says.
 """
 
 from typing import Any

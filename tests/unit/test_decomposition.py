@@ -2,6 +2,8 @@
 
 Tolerances: rounding of a backward stable decomposition is a few times the size of the matrix times
 1.1e-16 of its largest singular value; `LEAST` is some hundred times that of the largest one here.
+
+Catches a decomposition that fails or is wrong on matrices where LAPACK gives up.
 """
 
 from collections.abc import Callable, Iterator
@@ -73,7 +75,7 @@ def as_it_is() -> Iterator[list[str]]:
     yield []
 
 
-either_way = pytest.mark.parametrize("lapack", [as_it_is, divide_and_conquer_gives_up])
+either_way = sweep("lapack", [as_it_is, divide_and_conquer_gives_up])
 
 
 def made(rows: int, columns: int, rank: int, zeros: int, seed: int) -> Array:
@@ -91,11 +93,7 @@ SHAPES = [
 ]
 """Tall, wide and square; rows, columns, rank, zero columns."""
 
-of_each_shape = pytest.mark.parametrize(
-    "matrix",
-    [made(*shape, seed) for seed, shape in enumerate(SHAPES)],
-    ids=["-".join(map(str, shape)) for shape in SHAPES],
-)
+of_each_shape = sweep("matrix", [made(*shape, seed) for seed, shape in enumerate(SHAPES)])
 
 
 def assert_decomposed(matrix: Array) -> None:

@@ -1,4 +1,7 @@
-"""Descents along bounds, against scipy's linear and general bounded solvers."""
+"""Descents along bounds, against scipy's linear and general bounded solvers.
+
+Catches a descent that leaves its bounds or stops before it must.
+"""
 
 import numpy as np
 import pytest

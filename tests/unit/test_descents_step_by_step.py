@@ -1,4 +1,7 @@
-"""Descents whose every look is worked out by hand: damping, promises, ends."""
+"""Descents whose every look is worked out by hand: damping, promises, ends.
+
+Catches a damping, promise or end of a descent that is off by one rule.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Designs: a Latin hypercube of normals hits every stratum once, reproducibly."""
+"""Designs: a Latin hypercube of normals hits every stratum once, reproducibly.
+
+Catches strata left empty, and draws that change though the seed does not.
+"""
 
 import numpy as np
 import pytest

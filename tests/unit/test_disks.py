@@ -1,4 +1,7 @@
-"""Disks that take no more: what was there stays, nothing half is left, and a sentence says so."""
+"""Disks that take no more: what was there stays, nothing half is left, and a sentence says so.
+
+Catches half a file, or a lost old one, where the disk takes no more.
+"""
 
 import errno
 import resource
@@ -8,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.jobs.pool import _explain, _Failure
 from spinepipe.marks import write_marked
@@ -52,7 +56,7 @@ WRITERS: dict[str, Callable[[Path, int], None]] = {
 }
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@sweep("name", WRITERS)
 def test_a_file_that_does_not_fit_is_not_written_at_all(tmp_path: Path, name: str) -> None:
     path, writer = tmp_path / name, WRITERS[name]
     writer(path, 10)
@@ -65,8 +69,8 @@ def test_a_file_that_does_not_fit_is_not_written_at_all(tmp_path: Path, name: st
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize(
-    ("number", "words"),
+@sweep(
+    "number, words",
     [
         (errno.ENOSPC, "no space is left on the disk of results/small; free some space"),
         (errno.EDQUOT, "your disk quota is used up in results/small; free some space"),

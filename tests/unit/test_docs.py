@@ -1,4 +1,7 @@
-"""Generated parts of the documentation: complete, up to date, and derived from the code."""
+"""Generated parts of the documentation: complete, up to date, and derived from the code.
+
+Catches pages that are stale or lack an entry of the code.
+"""
 
 import re
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Wrong units and signs in files that are sound cell by cell: told, named, and nowhere else."""
+"""Wrong units and signs in files that are sound cell by cell: told, named, and nowhere else.
+
+Catches a wrong unit or sign that goes unsaid, is told twice, or is told of good data.
+"""
 
 import shutil
 from collections.abc import Callable

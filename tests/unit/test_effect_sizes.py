@@ -2,6 +2,8 @@
 
 A search's verdicts hang on each of these numbers, and model files on what they mean where they do
 not name one. Those of the default options stand in docs/effects.md; the others are entered again.
+
+Catches a number that an effect declares and that was changed by mistake.
 """
 
 from collections.abc import Iterator

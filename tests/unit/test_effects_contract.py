@@ -1,4 +1,7 @@
-"""The contract of effects carries one example of each kind, alone and all together."""
+"""The contract of effects carries one example of each kind, alone and all together.
+
+Catches an effect of any kind that the engine adds, scopes or differentiates wrongly.
+"""
 
 from dataclasses import replace
 

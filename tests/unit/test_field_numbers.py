@@ -1,10 +1,14 @@
-"""Numbers of the field against closed forms, whatever the law is called."""
+"""Numbers of the field against closed forms, whatever the law is called.
+
+Catches ranges, stiffness and breaks that hang on the name of a law.
+"""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.field_numbers import Law, field_numbers, load_over, numbers_of
@@ -79,7 +83,7 @@ def test_a_loop_of_friction_has_its_area() -> None:
     assert found.drift_per_decade is None
 
 
-@pytest.mark.parametrize("load", ["held", "ramped"])
+@sweep("load", ["held", "ramped"])
 def test_creep_drifts_as_its_closed_form(load: str) -> None:
     """q(t) / q(0) = 1 + f / (1 - f) (1 - exp(-(1 - f) t / T))."""
     f, time = 0.3, 200.0
@@ -98,7 +102,7 @@ def test_a_load_that_is_never_reached_is_none() -> None:
     assert found.zone is None
 
 
-@pytest.mark.parametrize("ratio", [1.12, 1.5, 3.0])
+@sweep("ratio", [1.12, 1.5, 3.0])
 def test_a_joint_breaks_where_it_is_half_as_much_stiffer_as_in_the_end(ratio: float) -> None:
     """Stiffness K exp(b q) is K (1 + b M / K) under M: half way at q = log((1 + ratio) / 2) / b."""
     rate = (ratio - 1.0) * K / 5.0
@@ -109,16 +113,14 @@ def test_a_joint_breaks_where_it_is_half_as_much_stiffer_as_in_the_end(ratio: fl
     assert found.zone == pytest.approx(2.0 * at, abs=2e-4, rel=1e-3)
 
 
-@pytest.mark.parametrize(("ratio", "told"), [(1.10, False), (1.115, True)])
+@sweep("ratio, told", [(1.10, False), (1.115, True)])
 def test_a_tenth_of_the_stiffness_makes_a_break(ratio: float, told: bool) -> None:
     """Of the larger: nine tenths of 1.111."""
     found = field_numbers(joint("nonlinear_stiffening", (ratio - 1.0) * K / 5.0), "extension")
     assert (found.breaks[1] is not None) == told
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "load", "furthest"), [("extension", 5.0, 1.5), ("anterior", 50.0, 0.1)]
-)
+@sweep("coordinate, load, furthest", [("extension", 5.0, 1.5), ("anterior", 50.0, 0.1)])
 def test_a_joint_is_asked_up_to_a_and_a_half_radians_or_ten_centimetres(
     coordinate: str, load: float, furthest: float
 ) -> None:

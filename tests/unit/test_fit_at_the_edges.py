@@ -1,4 +1,7 @@
-"""Fits where honesty is easily lost: at the brink of stability, and on zeroed readings."""
+"""Fits where honesty is easily lost: at the brink of stability, and on zeroed readings.
+
+Catches a fit called good at the brink of stability, and a zeroed reading that counts.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Fits of models with effects of every kind: exact Jacobians, and friction that is found back."""
+"""Fits of models with effects of every kind: exact Jacobians, and friction that is found back.
+
+Catches a wrong Jacobian of a model with effects, and memory carried from cycle to cycle.
+"""
 
 from dataclasses import replace
 

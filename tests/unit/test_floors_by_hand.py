@@ -1,9 +1,13 @@
-"""Floors and limits of indices where they can be worked out: closed forms, numbers, edges."""
+"""Floors and limits of indices where they can be worked out: closed forms, numbers, edges.
+
+Catches a floor or limit of indices that is off at its edge.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import DUMMY, Design, draw
@@ -74,8 +78,8 @@ def test_the_floor_of_effects_is_what_a_solver_leaves_open_over_a_step() -> None
     assert floors["mu"].high[0] == pytest.approx(2.24 * of_mean, rel=0.3)
 
 
-@pytest.mark.parametrize(
-    ("method", "samples", "replicates"),
+@sweep(
+    "method, samples, replicates",
     [
         ("latin_hypercube", 60, {"PAWN": 100, "KS_low": 100, "S1_RBD": 100, "delta": 20}),
         ("morris", 10, {"mu": 100, "mu_star": 100, "sigma": 100}),
@@ -135,9 +139,7 @@ def test_pairs_without_numbers_have_a_floor_without() -> None:
         assert floor.high.tolist() == [max(pair.high[0] for pair in pairs), None]
 
 
-@pytest.mark.parametrize(
-    ("method", "fewest"), [("sobol", 8), ("morris", 4), ("latin_hypercube", 50)]
-)
+@sweep("method, fewest", [("sobol", 8), ("morris", 4), ("latin_hypercube", 50)])
 def test_the_fewest_whole_blocks_with_an_index(method: str, fewest: int) -> None:
     design = draw(method, ALONE, 64, 20026)
     outputs = np.exp(design.unit[:, :1])
@@ -157,7 +159,7 @@ def test_as_many_may_be_lost_as_is_said() -> None:
         assert {index.status for index in found} == {(status,)}
 
 
-@pytest.mark.parametrize(("resolution", "status"), [(0.4, Known.DONE), (1.0, Known.CONSTANT)])
+@sweep("resolution, status", [(0.4, Known.DONE), (1.0, Known.CONSTANT)])
 def test_outputs_closer_than_the_resolution_are_alike(resolution: float, status: Known) -> None:
     """Levels of two: the outputs are 0 and 1, no further apart than 1."""
     design = draw("morris", ALONE, 8, 20028, levels=2)

@@ -1,6 +1,8 @@
 """Follower loads of a cohort and of virtual tests, where their motion is known in closed form.
 
 A cable through the centres of coaxial joints presses each of them by its tension and turns none.
+
+Catches a follower load that presses otherwise than its cable would.
 """
 
 from pathlib import Path

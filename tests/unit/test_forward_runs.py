@@ -1,4 +1,7 @@
-"""The published way of fitting: its runs, its derivatives, and the rows of fits that fail."""
+"""The published way of fitting: its runs, its derivatives, and the rows of fits that fail.
+
+Catches an emulation of the published fit that hides a failed fit or differs from its own runs.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Frames: rotations and coordinates round trip, joint poses from landmarks in closed cases."""
+"""Frames: rotations and coordinates round trip, joint poses from landmarks in closed cases.
+
+Catches a turned axis, a wrong order of rotations, a frame that is not right-handed.
+"""
 
 import numpy as np
 import pytest

@@ -1,9 +1,11 @@
-"""Effects on geometry: where a joint's laws act, worked by hand, and all their derivatives."""
+"""Effects on geometry: where a joint's laws act, worked by hand, and all their derivatives.
+
+Catches a displaced law that acts elsewhere, and any wrong derivative of it.
+"""
 
 from itertools import product
 
 import numpy as np
-import pytest
 from effect_slopes import (
     assert_placement_derivatives,
     assert_sensitivities,
@@ -14,6 +16,7 @@ from effect_slopes import (
 )
 from example_effects import scoped
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import Spread, create
 
@@ -31,14 +34,14 @@ def at_off(name: str, joints: int) -> np.ndarray:
     return np.zeros((joints, len(create(name).parameters)))
 
 
-@pytest.mark.parametrize("values", [somewhere, at_off])
-@pytest.mark.parametrize("name", NAMES)
+@sweep("values", [somewhere, at_off])
+@sweep("name", NAMES)
 def test_derivatives_of_placements_are_slopes(name: str, values) -> None:
     q = poses()
     assert_placement_derivatives(create(name), q, values(name, len(q)))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sweep("name", NAMES)
 def test_off_leaves_the_coordinates_alone(name: str) -> None:
     q, effect = poses(), create(name)
     assert {p.off for p in effect.parameters} == {0.0}
@@ -47,22 +50,22 @@ def test_off_leaves_the_coordinates_alone(name: str) -> None:
     np.testing.assert_allclose(placed.by_coordinate, np.tile(np.eye(6), (len(q), 1, 1)), atol=1e-15)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sweep("name", NAMES)
 def test_each_strength_shows_at_its_off_value(name: str) -> None:
     q = poses()
     by_parameter = create(name).by_parameter(q, at_off(name, len(q)))
     assert np.all(np.abs(by_parameter.q[:-1]).max(axis=(0, 1)) > 1e-3)
 
 
-@pytest.mark.parametrize("values", [somewhere, at_off])
-@pytest.mark.parametrize("name", NAMES)
+@sweep("values", [somewhere, at_off])
+@sweep("name", NAMES)
 def test_tangents_and_sensitivities_of_whole_spines(name: str, values) -> None:
     system = system_with(scoped(create(name), JOINTS, *map(tuple, values(name, 3))))
     assert_tangent(system)
     assert_sensitivities(system)
 
 
-@pytest.mark.parametrize("order", [NAMES, NAMES[::-1]], ids=["in turn", "backwards"])
+@sweep("order", [NAMES, NAMES[::-1]])
 def test_geometry_effects_on_top_of_each_other(order: tuple[str, ...]) -> None:
     effects = (scoped(create(name), (0, 2), *map(tuple, somewhere(name, 2))) for name in order)
     system = system_with(*effects)
@@ -149,7 +152,7 @@ def test_the_difference_of_the_orders_is_as_documented() -> None:
     assert 1.85 < np.rad2deg(np.abs(change).max()) < 1.9
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sweep("name", NAMES)
 def test_effects_change_the_motion_of_a_spine(name: str) -> None:
     plain = reported(system_with())
     found = reported(system_with(scoped(create(name), JOINTS)))

@@ -1,4 +1,7 @@
-"""Known indices lie in their intervals, and indices settle as a design grows."""
+"""Known indices lie in their intervals, and indices settle as a design grows.
+
+Catches intervals that miss known indices, and an end of a growing design that comes too soon.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Designs of a global analysis: structure, counts, seeds, groups, and values at their points."""
+"""Designs of a global analysis: structure, counts, seeds, groups, and values at their points.
+
+Catches designs of wrong structure, count or group, and draws that change with the seed unchanged.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, the dummy."""
+"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, the dummy.
+
+Catches an index that differs from SALib's, and failed runs that count.
+"""
 
 import numpy as np
 import pytest
@@ -6,6 +9,7 @@ from known_indices import FUNCTIONS, Array
 from SALib.analyze import delta, fast, morris, pawn, rbd_fast, sobol
 from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
+from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.sensitivity.global_indices.estimates import Index, Known, Settings
@@ -38,8 +42,8 @@ def with_failures(design: Design, rows: list[int]) -> tuple[Array, np.ndarray]:
     return outputs, ok
 
 
-@pytest.mark.parametrize("groups", [None, PAIR])
-@pytest.mark.parametrize("second_order", [True, False])
+@sweep("groups", [None, PAIR])
+@sweep("second_order", [True, False])
 def test_sobol_is_salibs(second_order: bool, groups: tuple[str | None, ...] | None) -> None:
     design = draw("sobol", G.factors, 64, 5, groups=groups, second_order=second_order)
     outputs = two_outputs(design)
@@ -79,7 +83,7 @@ def test_a_sobol_group_holds_what_its_factors_and_their_interaction_hold() -> No
     assert found["ST", "g", ""].estimate[0] == pytest.approx(expected, abs=0.01)
 
 
-@pytest.mark.parametrize("groups", [None, PAIR])
+@sweep("groups", [None, PAIR])
 def test_morris_is_salibs(groups: tuple[str | None, ...] | None) -> None:
     design = draw("morris", G.factors, 12, 5, groups=groups, levels=6)
     outputs = two_outputs(design)
@@ -161,7 +165,7 @@ def test_delta_is_near_its_integral_and_without_the_bias_of_an_idle_factor() -> 
     assert abs(idle.estimate[0]) < 0.03 < biased
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris", "latin_hypercube"])
+@sweep("method", ["sobol", "morris", "latin_hypercube"])
 def test_a_failed_run_takes_its_block_and_nothing_else(method: str) -> None:
     design = draw(method, G.factors, 64, 5)
     failed = [3, 4, 5 * design.block, 20 * design.block + design.block // 2]
@@ -194,7 +198,7 @@ def test_a_broken_fast_curve_costs_its_factor_alone() -> None:
             assert index.estimate.tolist() == whole[key].estimate.tolist()
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris", "latin_hypercube"])
+@sweep("method", ["sobol", "morris", "latin_hypercube"])
 def test_too_many_failures_leave_no_index(method: str) -> None:
     design = draw(method, G.factors, 64, 5)
     outputs, ok = with_failures(design, [row * design.block for row in range(13)])  # 20.3 %
@@ -204,7 +208,7 @@ def test_too_many_failures_leave_no_index(method: str) -> None:
         assert "at most 20% may be lost" in index.message[0]
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris", "latin_hypercube", "fast"])
+@sweep("method", ["sobol", "morris", "latin_hypercube", "fast"])
 def test_all_failed_is_no_error(method: str) -> None:
     design = draw(method, G.factors, 513 if method == "fast" else 64, 5)
     outputs = np.full((design.n, 2), np.nan)
@@ -219,7 +223,7 @@ def test_too_few_points_leave_no_index() -> None:
     assert "30 points; at least 50 are needed" in found[0].message[0]
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris", "latin_hypercube", "fast"])
+@sweep("method", ["sobol", "morris", "latin_hypercube", "fast"])
 def test_a_constant_output_has_no_indices_and_leaves_the_others_alone(method: str) -> None:
     design = draw(method, G.factors, 513 if method == "fast" else 64, 5)
     both = two_outputs(design)
@@ -235,7 +239,7 @@ def test_a_constant_output_has_no_indices_and_leaves_the_others_alone(method: st
         assert np.isfinite(index.estimate.data).all()
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris", "latin_hypercube", "fast"])
+@sweep("method", ["sobol", "morris", "latin_hypercube", "fast"])
 def test_an_output_of_one_run_alone_gives_numbers(method: str) -> None:
     """Resamples without that run are constant."""
     design = draw(method, G.factors, 513 if method == "fast" else 64, 5)

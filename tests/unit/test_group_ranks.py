@@ -1,4 +1,7 @@
-"""Rank tests of groups and pairs, and the F test of nested fits, against published examples."""
+"""Rank tests of groups and pairs, and the F test of nested fits, against published examples.
+
+Catches a rank test or F test that differs from the published numbers.
+"""
 
 import math
 from itertools import combinations, product

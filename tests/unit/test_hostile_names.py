@@ -1,4 +1,7 @@
-"""No name and no text of anybody becomes markup, in page or figures of any kind of study."""
+"""No name and no text of anybody becomes markup, in page or figures of any kind of study.
+
+Catches a name that becomes markup in a page or a figure.
+"""
 
 import json
 import re
@@ -12,6 +15,7 @@ from drawn import caption, drawings
 from hostile import HARMLESS, PAYLOAD, Structure, mapped, renamed
 from made_pages import SVG, document_of, page_of
 from made_results import MAKERS, Made, made
+from sweeps import sweep
 
 from spinepipe.documents.names import folder_fault, name_fault
 from spinepipe.marks import marked
@@ -84,7 +88,7 @@ def _texts_of(scene: Any) -> Iterator[str]:
             yield from [words] if isinstance(words, str) else words
 
 
-@pytest.mark.parametrize("kind", ["joint_pose_sensitivity", "discrepancy"])
+@sweep("kind", ["joint_pose_sensitivity", "discrepancy"])
 def test_no_text_of_a_page_becomes_markup(kind: str, tmp_path: Path) -> None:
     """Each text of document, settings and cohort ends with the payload, with and without a verdict.
 
@@ -152,7 +156,7 @@ def assert_is_a_drawing(svg: bytes) -> None:
     assert b"<script" not in svg
 
 
-@pytest.mark.parametrize("text", [PAYLOAD, SHORT, "<b>", "a&lt;b", "javascript:alert(1)//<"])
+@sweep("text", [PAYLOAD, SHORT, "<b>", "a&lt;b", "javascript:alert(1)//<"])
 def test_such_names_are_refused_already(text: str) -> None:
     assert name_fault(text)
     assert folder_fault(text)
@@ -173,7 +177,7 @@ def test_only_the_page_vouches_for_markup() -> None:
     assert not re.search(r"innerHTML|outerHTML|document\.write|insertAdjacentHTML|eval\(", scripts)
 
 
-@pytest.mark.parametrize("kind", kind_names())
+@sweep("kind", kind_names())
 def test_captions_hold_no_names_and_no_directives(kind: str) -> None:
     """They come with the kind, so in `snakemake --report` nobody's name meets reStructuredText."""
     for figure in kind_of(kind).figures:

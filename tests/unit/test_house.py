@@ -1,6 +1,9 @@
 """The house keeps its plan (docs/decisions/0015): who imports whom, what no tracked file holds.
 
 One loop for each rule, which lists every place that breaks it.
+
+Catches an import upwards or across kinds, and machine paths, hosts or large files that get
+tracked.
 """
 
 import ast

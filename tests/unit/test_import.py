@@ -2,6 +2,8 @@
 
 The files are made by a generator that knows nothing of the library (tests/generators/
 testing_machine.py); true values come from its closed forms.
+
+Catches a machine's file read in a wrong unit, sign, zero or cycle.
 """
 
 import json
@@ -13,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.calibrate import Problem, fit
@@ -122,7 +125,7 @@ def test_time_is_that_of_the_steps(tmp_path: Path) -> None:
         assert (np.diff(cycle.time) >= 0).all()
 
 
-@pytest.mark.parametrize("noise", [0.02, 0.1])
+@sweep("noise", [0.02, 0.1])
 def test_the_declared_sd_is_that_of_the_readings(tmp_path: Path, noise: float) -> None:
     """Readings of many made-up files scatter by what the import says, from residuals alone."""
     rig = replace(NOISY, cycles=1, noise_deg=noise, noise_nm=0.0, friction_nm=0.0)
@@ -160,7 +163,7 @@ def test_noise_makes_no_reversal_and_spikes_are_told(tmp_path: Path) -> None:
     assert len(test.cycles) == 3
 
 
-@pytest.mark.parametrize("way", [1.0, -1.0])
+@sweep("way", [1.0, -1.0])
 def test_loads_to_one_side(tmp_path: Path, way: float) -> None:
     rig = replace(NOISY, both_sides=False, peak_nm=way * 5.0)
     imported = folders.read(written(tmp_path, german(*record(linear, rig, 4), offset=1.0)))
@@ -169,7 +172,7 @@ def test_loads_to_one_side(tmp_path: Path, way: float) -> None:
     np.testing.assert_allclose(loads[2], [-way * x for x in [*there, *there[-2::-1]]], atol=1e-9)
 
 
-@pytest.mark.parametrize(("asked", "sizes"), [(100.0, [100, 300, 500]), (None, [97, 300, 500])])
+@sweep("asked, sizes", [(100.0, [100, 300, 500]), (None, [97, 300, 500])])
 def test_cycles_on_a_preload(tmp_path: Path, asked: float | None, sizes: list[float]) -> None:
     """Compression between 100 and 500 N: the load never comes near zero."""
     rig = replace(NOISY, both_sides=False, peak_nm=400.0, friction_nm=0.0, noise_nm=1.0)
@@ -275,8 +278,8 @@ MOTION = DOCUMENT["motion"][0]
 FILE = DOCUMENT["files"][0]
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
+@sweep(
+    "changes, says",
     [
         ({"motion": [{**MOTION, "joint": "L5L4"}]}, "'L5L4'; allowed: one of L4L5"),
         ({"loads": [{**LOAD, "unit": "N"}]}, "'flexion' in N; allowed: one of anterior"),

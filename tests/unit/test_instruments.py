@@ -1,4 +1,7 @@
-"""Instruments that follow other joints or drift: worked by hand, slopes, stack beside engine."""
+"""Instruments that follow other joints or drift: worked by hand, slopes, stack beside engine.
+
+Catches readings that follow the wrong joint, and derivatives lost between stack and engine.
+"""
 
 from dataclasses import replace
 
@@ -14,6 +17,7 @@ from effect_slopes import (
     unknowns,
 )
 from example_effects import loaded, scoped, spine
+from sweeps import sweep
 
 from spinepipe.effects import Kind, Spread, create
 from spinepipe.effects.contract import Beside
@@ -54,8 +58,8 @@ def with_times(times: tuple[float | None, ...]) -> LoadCase:
     return replace(case, steps=tuple(steps))
 
 
-@pytest.mark.parametrize(
-    ("times", "expected"),
+@sweep(
+    "times, expected",
     [
         ((0.0, 30.0, 60.0, 120.0), (0.0, 0.25, 0.5, 1.0)),
         ((10.0, 20.0, 50.0, 50.0), (0.0, 0.25, 1.0, 1.0)),
@@ -90,8 +94,8 @@ def test_drift_runs_from_nothing_to_all_of_it() -> None:
         np.testing.assert_allclose(seen[[0, 2, 4]], [0.0, 2e-3 * half, 2e-3], rtol=1e-3)
 
 
-@pytest.mark.parametrize("on", [True, False], ids=["on", "off"])
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("on", [True, False])
+@sweep("name", EFFECTS)
 def test_derivatives_are_slopes(name: str, on: bool) -> None:
     q, here = poses(), effect_of(name, on)
     if "along" not in name:  # a reach of a fifth of a millimetre bends too much over a step of one
@@ -111,14 +115,14 @@ def test_derivatives_are_slopes(name: str, on: bool) -> None:
         assert_sensitivities(system_with(effect_of(name, joints=joints)))
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@sweep("name", EFFECTS)
 def test_off_reads_the_motion_as_it_is(name: str) -> None:
     plain, off = (reported(system_with(*e)) for e in ((), (effect_of(name, on=False),)))
     np.testing.assert_array_equal(off, plain)
     assert np.abs(reported(system_with(effect_of(name))) - plain).max() > 1e-5
 
 
-@pytest.mark.parametrize("joints", [(0, 1, 2), (0, 2), (1,)])
+@sweep("joints", [(0, 1, 2), (0, 2), (1,)])
 def test_a_stack_reads_as_the_engine_of_record_does(joints: tuple[int, ...]) -> None:
     """Instruments one behind the other, some of them ordinary, in two tests of different length."""
     tilt = scoped(create("marker_bias", {"form": "tilt"}), joints, (0.03, -0.02, 0.04))

@@ -1,4 +1,7 @@
-"""Joint laws: loads worked by hand, and what the laws declare."""
+"""Joint laws: loads worked by hand, and what the laws declare.
+
+Catches a law whose load, sign or declared parameter is not the published one.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""Joint laws: derivatives against differences, what off means, and what is symmetric."""
+"""Joint laws: derivatives against differences, what off means, and what is symmetric.
+
+Catches a wrong tangent or derivative of any law at any coordinate, also beside its corners.
+"""
 
 from collections.abc import Callable
 from fractions import Fraction

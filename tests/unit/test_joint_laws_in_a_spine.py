@@ -1,4 +1,7 @@
-"""Joint laws in a whole spine: derivatives of its motion against motion solved afresh."""
+"""Joint laws in a whole spine: derivatives of its motion against motion solved afresh.
+
+Catches a law's derivative that is lost or misplaced among the joints of a spine.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Results that validation keeps hang on code that is there."""
+"""Results that validation keeps hang on code that is there.
+
+Catches validation that keeps results of code that is gone.
+"""
 
 import pytest
 

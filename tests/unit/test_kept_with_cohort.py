@@ -1,4 +1,7 @@
-"""What is kept of a cohort goes with it: a worker that serves many studies holds no old tables."""
+"""What is kept of a cohort goes with it: a worker that serves many studies holds no old tables.
+
+Catches tables of an old cohort that a worker goes on using.
+"""
 
 import gc
 import weakref

@@ -1,4 +1,7 @@
-"""Which kernels of OpenBLAS a processor can run, and that one that is asked for acts."""
+"""Which kernels of OpenBLAS a processor can run, and that one that is asked for acts.
+
+Catches numeric tests that ran under another kernel than was asked for, or under none.
+"""
 
 import subprocess
 from pathlib import Path

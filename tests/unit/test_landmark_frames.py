@@ -1,4 +1,7 @@
-"""Joint frames by landmarks against the cohort's own rule, differences, and models built anew."""
+"""Joint frames by landmarks against the cohort's own rule, differences, and models built anew.
+
+Catches joint frames that differ from the cohort's rule, or a wrong derivative by a landmark.
+"""
 
 from dataclasses import replace
 

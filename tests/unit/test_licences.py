@@ -1,10 +1,13 @@
-"""What the product runs on may be passed on with it; who needs a judgement has one that holds."""
+"""What the product runs on may be passed on with it; who needs a judgement has one that holds.
+
+Catches a new dependency that may not be passed on.
+"""
 
 import re
 from importlib.metadata import PathDistribution, distribution
 from pathlib import Path
 
-import pytest
+from sweeps import sweep
 
 from spinepipe.reference import licences as module
 from spinepipe.reference.licences import JUDGED, LOCK, Licence, licences, pinned
@@ -43,8 +46,8 @@ def _licence_files(name: str) -> list[Path]:
     return [Path(str(f.locate())) for f in found.files or () if f.name.startswith("LICENSE")]
 
 
-@pytest.mark.parametrize(
-    ("metadata", "licence", "allowed"),
+@sweep(
+    "metadata, licence, allowed",
     [
         ("License-Expression: MIT", "MIT", True),
         ("License-Expression: MIT AND PSF-2.0", "MIT AND PSF-2.0", True),
@@ -75,8 +78,8 @@ def test_licences_are_read_as_packages_tell_them(
     assert Licence("one", "1.0", told).allowed == allowed
 
 
-@pytest.mark.parametrize(
-    ("text", "licence"),
+@sweep(
+    "text, licence",
     [
         ("Permission is hereby granted, free of charge, to any person", "MIT"),
         ("GNU GENERAL PUBLIC LICENSE\nVersion 3", ""),

@@ -1,4 +1,7 @@
-"""What it takes to be inside a range of a paper, worked out anew from the rows themselves."""
+"""What it takes to be inside a range of a paper, worked out anew from the rows themselves.
+
+Catches a claim called true or false on the wrong side of its limit.
+"""
 
 import csv
 import importlib

@@ -1,4 +1,7 @@
-"""Load effects: each against loads said another way, virtual work, and all their derivatives."""
+"""Load effects: each against loads said another way, virtual work, and all their derivatives.
+
+Catches a load of wrong size, point or direction, and any wrong derivative of it.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,7 @@
-"""Searches in lockstep: each gets its own answers, round by round; trouble ends all of them."""
+"""Searches in lockstep: each gets its own answers, round by round; trouble ends all of them.
+
+Catches a search that gets the answers of another, and trouble that is swallowed.
+"""
 
 import threading
 from collections.abc import Callable, Sequence

@@ -1,4 +1,7 @@
-"""Where a region's end is looked for, look by look, on costs whose rise is written down."""
+"""Where a region's end is looked for, look by look, on costs whose rise is written down.
+
+Catches an end of a region looked for on the wrong side, or given up too soon.
+"""
 
 from collections.abc import Callable
 

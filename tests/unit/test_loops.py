@@ -1,9 +1,13 @@
-"""Loops of load and rotation against closed forms, and their intervals against sampled noise."""
+"""Loops of load and rotation against closed forms, and their intervals against sampled noise.
+
+Catches hysteresis, neutral zone or stiffness read off a loop wrongly, and intervals too short.
+"""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import integrate
+from sweeps import sweep
 
 from spinepipe.experiment.double_sigmoid import FEWEST_POINTS, Zone, fitted, neutral_zone
 from spinepipe.experiment.loop import Loop, Measure, Spread, reading_noise, stiffness_interval
@@ -65,8 +69,8 @@ def test_a_straight_loop_loses_nothing_and_has_no_neutral_zone() -> None:
         assert stiffness_interval(slope, 0.0) == pytest.approx((50.0, 50.0, 50.0))
 
 
-@pytest.mark.parametrize(
-    ("loads", "two_sided", "unloaded", "closed", "curves"),
+@sweep(
+    "loads, two_sided, unloaded, closed, curves",
     [
         ([0, 1, 2, 3], False, False, False, 0),
         ([0, 1, 2, 3, 2, 1, 0], False, True, True, 0),
@@ -104,7 +108,7 @@ def test_range_of_motion_from_the_first_reading_of_a_half_loop() -> None:
     assert half.area().value == pytest.approx(4.0 * (1.5 - 1.0) + 4.0 * 0.5 * 0.5)
 
 
-@pytest.mark.parametrize("points", [11, 21, 41])
+@sweep("points", [11, 21, 41])
 def test_the_neutral_zone_of_one_sigmoid_has_a_closed_form(points: int) -> None:
     """Smit et al. 2011 with one sigmoid: bends most at ln(2 + sqrt 3), rise over sqrt 3 wide."""
     load = np.linspace(-PEAK, PEAK, points)
@@ -150,7 +154,7 @@ def test_elastic_zones_begin_where_the_neutral_zone_ends() -> None:
     assert Loop(load, bent).elastic_compliance(1, 7.4) is None, "one load is no line"
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_propagated_intervals_are_those_of_sampled_noise(zeroed: bool) -> None:
     """1500 samples tell an SD to 2 %; that of the median slope is theory for many points."""
     rng = np.random.default_rng(1)
@@ -182,7 +186,7 @@ def test_two_recordings_each_with_its_own_zero_are_noisier() -> None:
     assert reading_noise([3, 3], SD, zeroed=True).at(known).root.shape == (5, 6)
 
 
-@pytest.mark.parametrize(("curve", "points"), [(sigmoid, 21), (uneven, 31)])
+@sweep("curve, points", [(sigmoid, 21), (uneven, 31)])
 def test_intervals_of_the_neutral_zone_hold_it(curve: object, points: int) -> None:
     """95 % asked for; at least 80 % held: to first order, and the number of sigmoids is chosen."""
     assert callable(curve)

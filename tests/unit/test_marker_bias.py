@@ -1,4 +1,7 @@
-"""Marker bias: what is reported against rotations multiplied out, in and out of tests' scopes."""
+"""Marker bias: what is reported against rotations multiplied out, in and out of tests' scopes.
+
+Catches a bias turned about the wrong axis, or reported outside of its tests.
+"""
 
 from dataclasses import replace
 
@@ -16,6 +19,7 @@ from effect_slopes import (
 )
 from example_effects import scoped
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import Spread, create
 
@@ -46,8 +50,8 @@ def test_a_tilted_registration_frame_sees_the_same_motion() -> None:
     np.testing.assert_allclose(seen[-1], 0.0, rtol=0, atol=1e-16)  # neutral reads zero
 
 
-@pytest.mark.parametrize("on", [True, False], ids=["on", "off"])
-@pytest.mark.parametrize("form", FORMS)
+@sweep("on", [True, False])
+@sweep("form", FORMS)
 def test_derivatives_are_slopes(form: str, on: bool) -> None:
     q, here = poses(), biased(form, on=on)
     effect, values = here.effect, np.tile(here.values[0], (len(q), 1))
@@ -59,8 +63,8 @@ def test_derivatives_are_slopes(form: str, on: bool) -> None:
     assert np.all(np.abs(found[:-1]).max(axis=(0, 1)) > 1e-3)
 
 
-@pytest.mark.parametrize("on", [True, False], ids=["on", "off"])
-@pytest.mark.parametrize("form", FORMS)
+@sweep("on", [True, False])
+@sweep("form", FORMS)
 def test_tangents_and_sensitivities_of_whole_spines(form: str, on: bool) -> None:
     system = system_with(biased(form, on=on))
     assert_tangent(system)
@@ -71,7 +75,7 @@ def test_both_forms_on_top_of_each_other() -> None:
     assert_sensitivities(system_with(biased("offset"), biased("tilt", (1, 2))))
 
 
-@pytest.mark.parametrize("form", FORMS)
+@sweep("form", FORMS)
 def test_off_reports_the_truth(form: str) -> None:
     assert {p.off for p in biased(form).effect.parameters} == {0.0}
     plain, found = (reported(system_with(*e)) for e in ((), (biased(form, on=False),)))
@@ -85,7 +89,7 @@ def test_only_readings_of_joints_in_scope_change() -> None:
     np.testing.assert_array_equal(found[:, :2], plain[:, :2])
 
 
-@pytest.mark.parametrize("form", FORMS)
+@sweep("form", FORMS)
 def test_each_test_has_its_own_values(form: str) -> None:
     mine = replace(biased(form), tests=("all ways",))
     other = replace(biased(form), tests=("another",), values=2.0 * mine.values)

@@ -1,4 +1,7 @@
-"""Every kind of result file carries its mark and gives it back; other files have none."""
+"""Every kind of result file carries its mark and gives it back; other files have none.
+
+Catches a file without its mark, and a damaged one that is believed.
+"""
 
 import io
 import json
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from sweeps import sweep
 
 from spinepipe.marks import KEY, marked, read_mark, with_mark, without_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, read_model, write_model
@@ -41,7 +45,7 @@ MODEL = ModelFile(model="m", cohort="c", effects=(EffectEntry(effect="linear_bus
 KINDS = (".parquet", ".json", ".yaml", ".svg", ".png", ".html", ".osim", ".mot")
 
 
-@pytest.mark.parametrize("suffix", KINDS)
+@sweep("suffix", KINDS)
 def test_a_mark_comes_back_from_every_kind_of_file(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"file{suffix}"
     for digest in (DIGEST, OTHER, ""):
@@ -49,7 +53,7 @@ def test_a_mark_comes_back_from_every_kind_of_file(suffix: str, tmp_path: Path) 
         assert read_mark(path) == digest
 
 
-@pytest.mark.parametrize("suffix", KINDS)
+@sweep("suffix", KINDS)
 def test_one_changed_byte_of_a_mark_is_seen(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"file{suffix}"
     save(suffix, path, DIGEST)
@@ -59,7 +63,7 @@ def test_one_changed_byte_of_a_mark_is_seen(suffix: str, tmp_path: Path) -> None
     assert read_mark(path) != DIGEST
 
 
-@pytest.mark.parametrize("suffix", KINDS)
+@sweep("suffix", KINDS)
 def test_half_a_file_or_none_of_its_kind_has_no_mark(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"file{suffix}"
     save(suffix, path, DIGEST)

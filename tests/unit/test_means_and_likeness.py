@@ -1,4 +1,7 @@
-"""Means, how alike curves are, pooled bins and exact limits: boundaries and small numbers."""
+"""Means, how alike curves are, pooled bins and exact limits: boundaries and small numbers.
+
+Catches means, bins and likeness that are off at boundaries or with few numbers.
+"""
 
 import numpy as np
 import pytest

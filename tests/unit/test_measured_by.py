@@ -1,4 +1,7 @@
-"""Benchmarks and validation stand outside of the suite: what they name by words must be there."""
+"""Benchmarks and validation stand outside of the suite: what they name by words must be there.
+
+Catches a benchmark or validation that is named and no longer there.
+"""
 
 import ast
 from importlib.util import find_spec

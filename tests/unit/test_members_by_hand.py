@@ -1,4 +1,7 @@
-"""Steps of one specimen of a cohort, and what spreads are told by, in numbers worked by hand."""
+"""Steps of one specimen of a cohort, and what spreads are told by, in numbers worked by hand.
+
+Catches a step of one specimen, or a told spread, that is off by one rule.
+"""
 
 from types import SimpleNamespace
 from typing import Any, cast

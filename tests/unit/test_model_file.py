@@ -1,4 +1,7 @@
-"""The model file: effects by name with scope and values, refused when anything in it is off."""
+"""The model file: effects by name with scope and values, refused when anything in it is off.
+
+Catches a model file that is accepted though it is wrong, or written otherwise than read.
+"""
 
 import re
 from pathlib import Path
@@ -6,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from example_effects import CubicStiffening, FollowerLoad, JointCentreOffset
+from sweeps import sweep
 
 from spinepipe.effects import register, registry
 from spinepipe.model.file import ModelFile, effects_for, read_model, write_model
@@ -85,8 +89,8 @@ def test_a_written_file_reads_back_the_same(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["again.yaml", "model.yaml"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
+@sweep(
+    "old, new, expected",
     [
         ("rise: 1234.5", "rise: 1.0e+7", r"effects\.1\.values\.rise.*allowed: 1 to 1e\+06"),
         ("rise: 1234.5", "rise: 0.5", r"found 0\.5; allowed: 1 to"),
@@ -122,10 +126,7 @@ def test_a_missing_file_is_an_input_error(tmp_path: Path) -> None:
         read_model(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [("joints: [L1L2, L3L4]", "joints: [L9L9]"), ("joint: L2L3", "joint: L9L9")],
-)
+@sweep("old, new", [("joints: [L1L2, L3L4]", "joints: [L9L9]"), ("joint: L2L3", "joint: L9L9")])
 def test_a_joint_that_does_not_exist_is_refused(tmp_path, old, new) -> None:
     model = read(tmp_path, TEXT.replace(old, new))
     with pytest.raises((InputError, ValueError), match="L9L9"):

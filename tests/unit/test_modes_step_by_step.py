@@ -1,4 +1,7 @@
-"""Modes of densities that are written down: each step, what ends a search, what is asked for."""
+"""Modes of densities that are written down: each step, what ends a search, what is asked for.
+
+Catches a search for a mode that ends too soon, too late or at none.
+"""
 
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace

@@ -1,20 +1,23 @@
-"""Motion that no load makes: the unit that explains it in all joints is named."""
+"""Motion that no load makes: the unit that explains it in all joints is named.
+
+Catches a wrong unit of all motion that is named wrongly or not at all.
+"""
 
 from math import pi
 
-import pytest
+from sweeps import sweep
 
 from spinepipe.cohort.motion_size import implausible, unit_of
 
 
-@pytest.mark.parametrize("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])
+@sweep("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])
 def test_motion_of_a_measured_size_is_left_alone(slope: float | None) -> None:
     """Motion against the load is another fault, and told elsewhere."""
     assert implausible(slope) == ""
 
 
-@pytest.mark.parametrize(
-    ("factor", "coordinate", "words"),
+@sweep(
+    "factor, coordinate, words",
     [
         (pi / 180.0, "extension", "radians"),
         (180.0 / pi, "left_rotation", "degrees once more"),

@@ -1,4 +1,7 @@
-"""Mutation testing: what is drawn, how it is run, what is counted."""
+"""Mutation testing: what is drawn, how it is run, what is counted.
+
+Catches mutants drawn twice, run wrongly or counted as seen.
+"""
 
 import ast
 import csv
@@ -9,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
+from sweeps import sweep
 
 from tests.mutants.lines import mentions, statement
 from tests.mutants.reach import Reach
@@ -33,7 +37,7 @@ def test_lengths_that_must_be_alike_are_not_spoilt() -> None:
     assert not [line for line in lines if "strict=True" in line and line.count("True") == 1]
 
 
-@pytest.mark.parametrize("mutant", drawn(AREA, 6, 1), ids=lambda one: f"{one.path}:{one.line}")
+@sweep("mutant", lambda: drawn(AREA, 6, 1), lambda one: f"{one.path}:{one.line}")
 def test_a_mutant_is_code_that_differs_in_one_place(mutant: Mutant) -> None:
     whole, code = (ROOT / mutant.path).read_text(), mutant.code()
     assert ast.dump(ast.parse(whole)) != ast.dump(ast.parse(code))
@@ -70,6 +74,7 @@ def test_a_name_is_mentioned_where_it_is_used() -> None:
         assert not text.strip().startswith(("def ", "from ", "import "))
 
 
+@pytest.mark.full
 def test_tests_are_near_the_lines_that_they_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -93,6 +98,7 @@ def test_tests_are_near_the_lines_that_they_run(
 
 RUNS = """\
 import pytest
+from sweeps import sweep
 
 def test_passes(): pass
 

@@ -1,4 +1,7 @@
-"""The trunk of the package myo-sim: counted, symmetric, of a sane size, or a clear refusal."""
+"""The trunk of the package myo-sim: counted, symmetric, of a sane size, or a clear refusal.
+
+Catches a trunk that lost muscles or symmetry when the package's files are read.
+"""
 
 from collections import Counter
 from importlib.metadata import PackageNotFoundError

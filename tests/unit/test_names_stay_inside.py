@@ -1,4 +1,7 @@
-"""No name and no link leads out of the folder it belongs to."""
+"""No name and no link leads out of the folder it belongs to.
+
+Catches a name or link by which a job reads or writes outside of its folder.
+"""
 
 import os
 from collections.abc import Iterator
@@ -13,6 +16,7 @@ from hostile import mapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_results import MAKERS, Made, made
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.inside import leads_out
@@ -41,7 +45,7 @@ WRONG = (
 """Names that mean a folder, a device, an option or a command somewhere."""
 
 
-@pytest.mark.parametrize("name", WRONG)
+@sweep("name", WRONG)
 def test_names_that_mean_something_to_a_system_are_refused(name: str) -> None:
     assert name_fault(name)
     assert folder_fault(name)
@@ -120,8 +124,8 @@ def folder(tmp_path: Path) -> Path:
     return write(tmp_path / "cohorts" / "small")
 
 
-@pytest.mark.parametrize("name", ["cohort.yaml", "specimens.csv", "loads.csv"])
-@pytest.mark.parametrize("dead", [False, True], ids=["a file", "nothing"])
+@sweep("name", ["cohort.yaml", "specimens.csv", "loads.csv"])
+@sweep("dead", [False, True])
 def test_links_out_of_a_cohort_are_refused(folder: Path, name: str, dead: bool) -> None:
     elsewhere = folder.parents[1] / "elsewhere"
     (folder / name).rename(elsewhere)
@@ -156,13 +160,13 @@ def test_links_within_a_cohort_and_to_a_whole_cohort_are_followed(folder: Path) 
     assert cohorts.read(folder).digest == plain.digest == cohorts.read(other).digest
 
 
-@pytest.mark.parametrize("name", ["../loads.csv", "/etc/loads.csv", "raw/../../loads.csv"])
+@sweep("name", ["../loads.csv", "/etc/loads.csv", "raw/../../loads.csv"])
 def test_a_name_can_lead_out_without_any_link(folder: Path, name: str) -> None:
     assert leads_out(folder / name, folder)
     assert not leads_out(folder / "raw" / "~" / "loads.csv", folder)
 
 
-@pytest.mark.parametrize("name", ["../flexion.trc", "/etc/flexion.trc", "out/flexion.trc"])
+@sweep("name", ["../flexion.trc", "/etc/flexion.trc", "out/flexion.trc"])
 def test_motions_outside_of_the_cohort_are_refused(tmp_path: Path, name: str) -> None:
     change = swap("trials.csv", "flexion_extension.trc", name)
     folder = tracked_cohort.write(tmp_path, change)

@@ -1,4 +1,7 @@
-"""Shares of specimens, draws within them and common treatments: mean squares, truth, coverage."""
+"""Shares of specimens, draws within them and common treatments: mean squares, truth, coverage.
+
+Catches a variance component of wrong size, and intervals that are not the jackknife's.
+"""
 
 import numpy as np
 import pandas as pd

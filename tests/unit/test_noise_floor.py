@@ -2,6 +2,8 @@
 
 Beside the dummy each design has another factor without effect, ``inert``, of which the floor knows
 nothing: its indices must lie in the floor about as often as the interval says.
+
+Catches a factor called negligible, or important, by noise alone.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Nothing that lies on disk as data is executed: no file of the library knows how (0036)."""
+"""Nothing that lies on disk as data is executed: no file of the library knows how (0036).
+
+Catches a library call that runs what a data file holds.
+"""
 
 import ast
 import pickle
@@ -10,6 +13,7 @@ import numpy as np
 import planted
 import pytest
 from cohort_cases import swap, text, write
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import read_yaml
@@ -83,8 +87,8 @@ def runs(tree: ast.AST) -> Iterator[str]:
         yield from (f"line {getattr(node, 'lineno', 0)}: {one}" for one in found)
 
 
-@pytest.mark.parametrize(
-    ("text", "count"),
+@sweep(
+    "text, count",
     [
         ("import pickle", 1),
         ("from joblib import load", 1),

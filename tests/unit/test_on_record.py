@@ -1,4 +1,7 @@
-"""Final poses against the engine of record: rounding passes, an error is told, a snap is a snap."""
+"""Final poses against the engine of record: rounding passes, an error is told, a snap is a snap.
+
+Catches an end that differs from the engine's and is not told.
+"""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,6 +1,8 @@
 """Pages of results in Chromium: nobody's name runs, nothing is fetched, no script fails.
 
 Skipped where no Chromium is installed.
+
+Catches a script that fails, a name that runs, an address that is fetched.
 """
 
 import json

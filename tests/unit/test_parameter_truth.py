@@ -1,4 +1,7 @@
-"""The map of parameters: laws of the generator and of spinepipe at mapped values are the same."""
+"""The map of parameters: laws of the generator and of spinepipe at mapped values are the same.
+
+Catches a map between parameters of generator and library that is off.
+"""
 
 from dataclasses import asdict
 from typing import Any

@@ -1,4 +1,7 @@
-"""Parts of equilibrium and settling by closed forms: factors, decay, sizes of steps, the method."""
+"""Parts of equilibrium and settling by closed forms: factors, decay, sizes of steps, the method.
+
+Catches a wrong factor, decay or step size inside equilibrium and settling.
+"""
 
 from types import SimpleNamespace
 from typing import Any

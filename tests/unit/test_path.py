@@ -1,4 +1,7 @@
-"""Steps of a case: warm starts, failures in between, path states, slots and shares of loads."""
+"""Steps of a case: warm starts, failures in between, path states, slots and shares of loads.
+
+Catches warm starts, states or shares of loads that leak from one step into the next.
+"""
 
 from dataclasses import replace
 

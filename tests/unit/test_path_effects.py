@@ -1,4 +1,7 @@
-"""Hysteresis and creep: closed forms of one joint, derivatives along a path, corners passed."""
+"""Hysteresis and creep: closed forms of one joint, derivatives along a path, corners passed.
+
+Catches hysteresis or creep that is no closed form's, and derivatives lost along the path.
+"""
 
 from dataclasses import replace
 from fractions import Fraction

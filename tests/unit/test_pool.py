@@ -1,4 +1,7 @@
-"""Workers: who dies in mid-job is told, who dies while it waits harms nobody."""
+"""Workers: who dies in mid-job is told, who dies while it waits harms nobody.
+
+Catches a dead worker that is not told, or that takes its pool along.
+"""
 
 import time
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Partial pooling: statistics against other people's, mechanics against a plain optimiser."""
+"""Partial pooling: statistics against other people's, mechanics against a plain optimiser.
+
+Catches a likelihood, posterior or slope of the hierarchy that is not the textbook's.
+"""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,7 @@
-"""Posteriors of springs under known loads against quadrature of their own closed forms."""
+"""Posteriors of springs under known loads against quadrature of their own closed forms.
+
+Catches a density, gradient or sampler whose draws are not those of the closed form.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,7 @@
-"""The power term: products by numpy, derivatives by differences, motion in closed form."""
+"""The power term: products by numpy, derivatives by differences, motion in closed form.
+
+Catches a product or derivative of the power term that is wrong.
+"""
 
 from typing import Any
 

@@ -1,4 +1,7 @@
-"""Spines held in place: against a planar chain written down on its own, virtual work, mirrors."""
+"""Spines held in place: against a planar chain written down on its own, virtual work, mirrors.
+
+Catches spines held in place that move, or whose holding loads are wrong.
+"""
 
 from dataclasses import replace
 from functools import cached_property
@@ -7,6 +10,7 @@ import numpy as np
 import pytest
 from example_effects import scoped, spine
 from scipy.optimize import minimize, root
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
@@ -145,7 +149,7 @@ def bent_by(share: float) -> Array:
     return Planar().top(share * np.where(np.arange(COUNT) % 3 == 1, LOWER, UPPER))
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.8, -0.3])
+@sweep("share", [0.1, 0.5, 0.8, -0.3])
 def test_a_planar_chain_stands_where_its_energy_is_least(share: float) -> None:
     wanted = bent_by(share)
     found = held(wanted)
@@ -170,7 +174,7 @@ def test_from_its_own_end_nothing_is_left_to_do() -> None:
     assert near.iterations < min(there.iterations, 5)
 
 
-@pytest.mark.parametrize("axis", range(3))
+@sweep("axis", range(3))
 def test_the_pushes_do_the_work_that_the_spine_stores(axis: int) -> None:
     """Castigliano: the stored energy grows by push times displacement."""
     wanted, step = bent_by(0.5), 1e-6 * np.eye(3)[axis]
@@ -240,7 +244,7 @@ def tilted() -> SpineModel:
     return plain.with_effects((plain.effects[0], law))
 
 
-@pytest.mark.parametrize(
+@sweep(
     "prescription",
     [
         Place(2, np.array([0.02, 0.12, -0.01]), np.array([0.6, 0.0, 0.8])),

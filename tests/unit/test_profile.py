@@ -1,4 +1,7 @@
-"""Regions of fitted unknowns against closed forms and plain scans of the cost."""
+"""Regions of fitted unknowns against closed forms and plain scans of the cost.
+
+Catches a region too narrow, and an end that was not looked for.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,6 +12,7 @@ import pytest
 from example_effects import NOWHERE, loaded, spine
 from scipy import stats
 from scipy.optimize import brentq, minimize_scalar
+from sweeps import sweep
 
 from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
 from spinepipe.calibrate.problem import Evaluation
@@ -69,8 +73,8 @@ def noisy(seed: int, stiffness: float, sd: float = 2e-3) -> Array:
     return MOMENTS_NM / stiffness + sd * rng.normal(size=len(MOMENTS_NM))
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("noise", [None, 2e-3])
+@sweep("seed", range(4))
+@sweep("noise", [None, 2e-3])
 def test_a_spring_under_moments_has_the_region_of_a_straight_line(
     seed: int, noise: float | None
 ) -> None:
@@ -185,8 +189,8 @@ def bent(seed: int) -> Problem:
     return Problem(model, cases, free, np.ones(6), -bounds, bounds)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("unknown", [0, 1])
+@sweep("seed", [0, 1])
+@sweep("unknown", [0, 1])
 def test_ends_lie_where_a_scan_of_the_cost_has_them(seed: int, unknown: int) -> None:
     problem = bent(seed)
     found = fit(problem, profiled=True)

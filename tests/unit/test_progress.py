@@ -1,4 +1,7 @@
-"""What long work says of itself."""
+"""What long work says of itself.
+
+Catches work that says nothing, or too much, of itself.
+"""
 
 import itertools
 

@@ -1,4 +1,7 @@
-"""How many unknowns the data tell: counted by hand on a bar of one joint."""
+"""How many unknowns the data tell: counted by hand on a bar of one joint.
+
+Catches unknowns called known that the data leave open.
+"""
 
 import numpy as np
 import pytest

@@ -1,8 +1,12 @@
-"""Regression tree against rpart's published example, and laws."""
+"""Regression tree against rpart's published example, and laws.
+
+Catches a tree that is not rpart's, and poses learnt by heart that are praised.
+"""
 
 import numpy as np
 import pytest
 from sklearn.model_selection import GroupKFold
+from sweeps import sweep
 
 from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _growth, regression_tree
 from spinepipe.statistics import Ended
@@ -55,7 +59,7 @@ def test_splits_and_sequence_of_subtrees_are_those_of_rpart() -> None:
     np.testing.assert_allclose(sequence[:0:-1], RPART_COMPLEXITIES, atol=5e-7)
 
 
-@pytest.mark.parametrize(("complexity", "leaves"), [(0.2, 2), (0.05, 3), (0.6, 1)])
+@sweep("complexity, leaves", [(0.2, 2), (0.05, 3), (0.6, 1)])
 def test_a_split_that_saves_too_little_is_not_made(complexity: float, leaves: int) -> None:
     """rpart's complexities of 0.595, 0.135 and 0.0128 are those of its splits."""
     found = regression_tree(WEIGHT[:, None], MILEAGE, ["weight"], 1, complexity=complexity)
@@ -144,7 +148,7 @@ def test_same_seed_same_tree() -> None:
     assert one.r2_cross_validated == same.r2_cross_validated != other.r2_cross_validated
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1e9])
+@sweep("scale", [1e-12, 1e9])
 def test_the_unit_of_the_output_does_not_matter(scale: float) -> None:
     x, y = data(300, 3, seed=9)
     one, other = (regression_tree(x, factor * y, "abc", 1) for factor in (1.0, scale))
@@ -161,10 +165,7 @@ def test_one_row_that_differs_makes_no_tree() -> None:
     assert (found.status, found.leaves) == (Ended.DONE, 1)
 
 
-@pytest.mark.parametrize(
-    ("n", "groups", "status"),
-    [(19, None, Ended.TOO_FEW), (40, np.zeros(40, int), Ended.TOO_FEW)],
-)
+@sweep("n, groups, status", [(19, None, Ended.TOO_FEW), (40, np.zeros(40, int), Ended.TOO_FEW)])
 def test_too_few_rows_or_groups(n: int, groups, status: Ended) -> None:
     x, y = data(n, 3, seed=10)
     found = regression_tree(x, y, "abc", 1, groups=groups)
@@ -172,7 +173,7 @@ def test_too_few_rows_or_groups(n: int, groups, status: Ended) -> None:
     assert (found.r2_cross_validated, found.r2_training) == (None, None)
 
 
-@pytest.mark.parametrize(("rows", "leaves"), [(19, 1), (20, 2)])
+@sweep("rows, leaves", [(19, 1), (20, 2)])
 def test_twenty_rows_are_split_into_leaves_of_seven_at_least(rows: int, leaves: int) -> None:
     """``minsplit`` and ``minbucket`` of ``rpart.control``. The first six rows are alike."""
     x, y = np.arange(float(rows))[:, None], (np.arange(rows) < 6).astype(float)
@@ -186,14 +187,14 @@ def test_twenty_rows_in_two_groups_are_enough_for_a_tree() -> None:
     assert regression_tree(x, y, "abc", 1, groups=np.arange(20) % 2).status is Ended.DONE
 
 
-@pytest.mark.parametrize(("folds", "same"), [(10, True), (9, False), (11, False)])
+@sweep("folds, same", [(10, True), (9, False), (11, False)])
 def test_ten_folds_where_none_are_named(folds: int, same: bool) -> None:
     x, y = data(60, 3, seed=20041)
     one, other = regression_tree(x, y, "abc", 1), regression_tree(x, y, "abc", 1, folds=folds)
     assert (one.r2_cross_validated == other.r2_cross_validated) is same
 
 
-@pytest.mark.parametrize("folds", [2, 3])
+@sweep("folds", [2, 3])
 def test_a_step_is_one_split_however_few_folds(folds: int) -> None:
     """It saves all of the variance: the cost of a leaf that would undo it is 1."""
     found = regression_tree(np.arange(60)[:, None], np.arange(60) < 25, "x", 1, folds)
@@ -208,8 +209,8 @@ def test_a_constant_output_has_no_tree() -> None:
     assert found.importance.tolist() == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
+@sweep(
+    "change, message",
     [
         ({"names": "ab"}, "shapes"),
         ({"names": "abcd"}, "shapes"),

@@ -1,4 +1,7 @@
-"""Resamples as weights are resamples as repeated rows; intervals by hand; delta's classes."""
+"""Resamples as weights are resamples as repeated rows; intervals by hand; delta's classes.
+
+Catches weights that are not those of repeated rows, and wrong classes of delta.
+"""
 
 from collections.abc import Callable
 from itertools import pairwise

@@ -1,4 +1,7 @@
-"""The lock of a run that was killed is taken off, that of one that lives is not."""
+"""The lock of a run that was killed is taken off, that of one that lives is not.
+
+Catches the lock of a living run that is taken off, or of a dead one that stays.
+"""
 
 import os
 import signal

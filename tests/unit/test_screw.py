@@ -1,4 +1,7 @@
-"""Finite helical axes: turns about known lines, another library, and sampled noise."""
+"""Finite helical axes: turns about known lines, another library, and sampled noise.
+
+Catches a helical axis of wrong place, direction or error.
+"""
 
 import numpy as np
 import pinocchio as pin

@@ -1,4 +1,7 @@
-"""Sensitivities to loads and joint poses are slopes of motion solved afresh."""
+"""Sensitivities to loads and joint poses are slopes of motion solved afresh.
+
+Catches a wrong derivative by load, joint pose or stiffness.
+"""
 
 from dataclasses import replace
 

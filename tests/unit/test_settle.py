@@ -1,4 +1,7 @@
-"""Settling: closed forms of one joint, agreement with statics, and honest ends."""
+"""Settling: closed forms of one joint, agreement with statics, and honest ends.
+
+Catches settling that is not its equation's, and a fall that is called settled.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,7 @@
-"""Fits to settling runs: how loads come on, derivatives of the end, and truth that returns."""
+"""Fits to settling runs: how loads come on, derivatives of the end, and truth that returns.
+
+Catches wrong derivatives of the end of a run, and a course that is not the given one.
+"""
 
 from dataclasses import replace
 
@@ -224,7 +227,11 @@ FACTORS = np.array([1.5, 0.6, 1.0, 1.35, 1.0, 1.0])
 """Of stiffness, between a model and what was measured."""
 
 
-@COURSES
+@pytest.mark.parametrize(
+    "course",
+    [QUASI_STATIC, pytest.param(RAMPED, marks=pytest.mark.full)],
+    ids=["constant", "ramped"],
+)
 def test_a_truth_made_by_opensim_comes_back(course: Course) -> None:
     """CPodes' end of the segment with other stiffness, within 1 %."""
     chain = pushed_segment()

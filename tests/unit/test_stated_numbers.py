@@ -2,6 +2,8 @@
 
 Counts are taken from settings, schemas and tables of the repository, times from the results of
 `make bench`. What only a run of studies can tell is compared where their results are there.
+
+Catches numbers of README or tutorial that are no longer true.
 """
 
 import json

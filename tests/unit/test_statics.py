@@ -1,4 +1,7 @@
-"""Equilibria against closed forms, what has no equilibrium, and models that are refused."""
+"""Equilibria against closed forms, what has no equilibrium, and models that are refused.
+
+Catches an equilibrium that is none, and a model accepted that has none.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,7 @@
-"""Statistics against published examples, hand-worked cases and closed forms."""
+"""Statistics against published examples, hand-worked cases and closed forms.
+
+Catches a statistic or p-value that is not the published one.
+"""
 
 import math
 from itertools import pairwise, permutations
@@ -7,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
+from sweeps import sweep
 
 from spinepipe.statistics import (
     Ended,
@@ -65,7 +69,7 @@ def test_spearman_gives_the_published_tuna_result() -> None:
     assert found.message == "exact p"
 
 
-@pytest.mark.parametrize("n", [4, 5, 6])
+@sweep("n", [4, 5, 6])
 def test_spearman_p_is_the_share_of_orderings_as_extreme(n: int) -> None:
     ranks = np.arange(n)
     orders = list(permutations(range(n)))
@@ -109,7 +113,7 @@ def test_spearman_with_ties_is_pearson_of_mid_ranks_and_says_so() -> None:
     assert found.message == "ties: 5 of the first and 4 of the second values"
 
 
-@pytest.mark.parametrize("test", CORRELATIONS)
+@sweep("test", CORRELATIONS)
 def test_a_constant_has_no_correlation(test) -> None:
     found = test([1, 2, 3, 4, 5], [7, 7, 7, 7, 7])
     assert (found.statistic, found.p, found.effect) == (None, None, None)
@@ -118,21 +122,21 @@ def test_a_constant_has_no_correlation(test) -> None:
     assert "first" not in found.message
 
 
-@pytest.mark.parametrize("test", CORRELATIONS)
+@sweep("test", CORRELATIONS)
 def test_three_pairs_are_too_few(test) -> None:
     found = test([1, 2, 3], [1, 3, 2])
     assert (found.p, found.status, found.n) == (None, Ended.TOO_FEW, 3)
     assert test([1, 2, 3, 4], [1, 3, 2, 4]).status is Ended.DONE
 
 
-@pytest.mark.parametrize("test", CORRELATIONS)
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@sweep("test", CORRELATIONS)
+@sweep("bad", [np.nan, np.inf])
 def test_what_is_not_finite_is_refused(test, bad: float) -> None:
     with pytest.raises(ValueError, match="finite"):
         test([1, 2, 3, bad], [1, 2, 3, 4])
 
 
-@pytest.mark.parametrize("test", [*CORRELATIONS, bland_altman])
+@sweep("test", [*CORRELATIONS, bland_altman])
 def test_values_without_partner_are_refused(test) -> None:
     with pytest.raises(ValueError, match="pairs"):
         test([1, 2, 3, 4, 5], [1, 2, 3, 4])
@@ -170,7 +174,7 @@ def test_friedman_ranks_within_blocks_only() -> None:
     assert friedman(grid.T).p != pytest.approx(friedman(grid).p, rel=0.1)
 
 
-@pytest.mark.parametrize("shape", [(1, 5), (5, 2)])
+@sweep("shape", [(1, 5), (5, 2)])
 def test_friedman_of_a_small_grid_is_too_few(shape) -> None:
     found = friedman(np.arange(float(np.prod(shape))).reshape(shape))
     assert (found.status, found.p, found.effect) == (Ended.TOO_FEW, None, None)
@@ -241,6 +245,7 @@ def test_chi_squared_without_degree_of_freedom_points_to_kolmogorov_smirnov() ->
     assert "Kolmogorov-Smirnov" in found.message
 
 
+@pytest.mark.full
 def test_chi_squared_rejects_true_normals_as_often_as_it_says() -> None:
     draws = np.random.default_rng(1).normal(3.0, 0.2, size=(600, 200))
     rejected = np.mean([chi_squared_normality(values).p < 0.05 for values in draws])
@@ -273,12 +278,12 @@ def test_lilliefors_agrees_with_simulation_by_another_library() -> None:
     values = np.random.default_rng(4).gamma(4.0, size=30)
     found = lilliefors_normality(values)
     simulated = stats.goodness_of_fit(
-        stats.norm, values, statistic="ks", n_mc_samples=4000, rng=np.random.default_rng(5)
+        stats.norm, values, statistic="ks", n_mc_samples=1000, rng=np.random.default_rng(5)
     )
     # scipy fits by maximum likelihood: SD with n instead of n - 1, hence the small difference
     assert found.statistic == pytest.approx(simulated.statistic, rel=0.03)
     assert 0.02 < simulated.pvalue < 0.9
-    assert found.p == pytest.approx(simulated.pvalue, abs=0.04)
+    assert found.p == pytest.approx(simulated.pvalue, abs=0.05)
 
 
 def test_lilliefors_and_kolmogorov_smirnov_differ_in_p_only() -> None:
@@ -295,7 +300,7 @@ def test_lilliefors_says_where_its_table_ends() -> None:
     assert found.message == "p at most 0.001"
 
 
-@pytest.mark.parametrize("test", NORMALITY)
+@sweep("test", NORMALITY)
 def test_normality_does_not_depend_on_the_unit(test) -> None:
     values = np.random.default_rng(2).gamma(9.0, size=150)
     one, other = test(values), test(1e-6 * values + 3e-6)
@@ -303,7 +308,7 @@ def test_normality_does_not_depend_on_the_unit(test) -> None:
     assert other.effect == pytest.approx(one.effect, rel=1e-6)
 
 
-@pytest.mark.parametrize("test", NORMALITY)
+@sweep("test", NORMALITY)
 def test_normality_of_what_cannot_be_tested(test) -> None:
     same, few = test([0.1] * 50), test([1.0, 2.0, 4.0])
     assert (same.status, same.p, same.effect) == (Ended.CONSTANT, None, None)
@@ -325,7 +330,7 @@ def test_corrections_of_hand_worked_families() -> None:
     )
 
 
-@pytest.mark.parametrize("method", ["bonferroni", "holm"])
+@sweep("method", ["bonferroni", "holm"])
 def test_a_test_without_p_is_not_of_the_family(method) -> None:
     ps = [None, 0.01, None, 0.02, 0.9]
     found = corrected(ps, method)
@@ -342,7 +347,7 @@ def test_a_p_of_zero_is_one_of_the_family() -> None:
     assert corrected([0.0, 0.3], "bonferroni") == pytest.approx([0.0, 0.6])
 
 
-@pytest.mark.parametrize("bad", [-0.1, 1.1, np.nan])
+@sweep("bad", [-0.1, 1.1, np.nan])
 def test_what_is_no_p_is_refused(bad: float) -> None:
     with pytest.raises(ValueError, match="p value"):
         corrected([0.5, bad], "holm")
@@ -376,6 +381,7 @@ def test_exchanging_the_two_mirrors_the_agreement() -> None:
     assert other.proportional.effect == pytest.approx(-one.proportional.effect)
 
 
+@pytest.mark.full
 def test_the_intervals_cover_what_they_say() -> None:
     """Few pairs, where the approximation for many would miss: 95 % of true values inside."""
     draws = np.random.default_rng(3).normal(0.5, 2.0, size=(1000, 6))
@@ -412,7 +418,7 @@ def test_motion_that_hardly_varies_correlates_with_its_error_by_itself() -> None
     assert moved.proportional.effect == pytest.approx(0.0, abs=0.07)  # three standard errors
 
 
-@pytest.mark.parametrize(("times", "comparable"), [(1.99, True), (2.01, False), (0.49, False)])
+@sweep("times, comparable", [(1.99, True), (2.01, False), (0.49, False)])
 def test_spreads_are_comparable_within_a_factor_of_two(times: float, comparable: bool) -> None:
     values = np.array([1.0, 2.0, 4.0, 7.0])
     assert bland_altman(values, times * values).comparable == comparable

@@ -1,8 +1,12 @@
-"""Tests of values exactly where they change their way: counts, sizes, rounding, signs."""
+"""Tests of values exactly where they change their way: counts, sizes, rounding, signs.
+
+Catches a test that takes the wrong way exactly at its threshold.
+"""
 
 import numpy as np
 import pytest
 from scipy.stats import norm
+from sweeps import sweep
 
 from spinepipe.statistics import (
     Ended,
@@ -18,8 +22,8 @@ from spinepipe.statistics import (
 from spinepipe.statistics.waveforms import Likeness, multiple_correlation
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@sweep("sign", [-1.0, 1.0])
+@sweep("size", [1e-6, 1.0, 1e6])
 def test_curves_below_zero_are_held_against_their_size_as_those_above(
     sign: float, size: float
 ) -> None:
@@ -63,8 +67,8 @@ def test_rank_correlation_is_exact_up_to_ten_pairs() -> None:
     assert spearman([1.0, 2, 3, 4], [2.0, 4, 1, 3]).p == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    ("sizes", "how"),
+@sweep(
+    "sizes, how",
     [
         ((8, 8), "exact p, by"),  # 12,870 ways
         ((8, 9), "chi-squared p"),  # 24,310
@@ -105,7 +109,7 @@ def test_signed_ranks_are_exact_up_to_fifty_differences() -> None:
     assert four.message == "exact p; with 4 differences p is never below 0.125"
 
 
-@pytest.mark.parametrize("unit", [-1e3, 1e-3, 1.0])
+@sweep("unit", [-1e3, 1e-3, 1.0])
 def test_differences_are_told_apart_by_a_millionth_of_a_millionth(unit: float) -> None:
     """Of the largest value, whatever its sign: a tenth of it is rounding, ten times is none."""
     y = unit * np.array([1.0, 2.0, 3.0, 10.0])

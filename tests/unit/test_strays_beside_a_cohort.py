@@ -1,4 +1,7 @@
-"""What editors put beside a cohort while a study runs is not read by its jobs."""
+"""What editors put beside a cohort while a study runs is not read by its jobs.
+
+Catches an editor's leftovers that a job reads as data.
+"""
 
 from pathlib import Path
 

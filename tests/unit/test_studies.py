@@ -1,10 +1,14 @@
-"""Studies: defaults, places, and every fault of a study file located and explained."""
+"""Studies: defaults, places, and every fault of a study file located and explained.
+
+Catches a study file's fault that is accepted or told at another place.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from cohort_cases import Change, cell, joints, line, swap, text, without, write
+from sweeps import sweep
 
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
@@ -111,7 +115,7 @@ COHORT_CASES = [
 # fmt: on
 
 
-@pytest.mark.parametrize("case", [*ALONE, *WITH_COHORT], ids=lambda c: c.about.replace(" ", "-"))
+@sweep("case", [*ALONE, *WITH_COHORT], lambda c: c.about.replace(" ", "-"))
 def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path) -> None:
     assert case.old is None or case.old in STUDY
     study = STUDY + case.new + "\n" if case.old is None else STUDY.replace(case.old, case.new, 1)
@@ -121,7 +125,7 @@ def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path)
     assert any(case.says in str(problem) for problem in here), listing
 
 
-@pytest.mark.parametrize(("about", "changes", "key", "says"), COHORT_CASES)
+@sweep("about, changes, key, says", COHORT_CASES)
 def test_cohort_that_does_not_serve_the_study(
     about: str, changes: list[Change], key: str, says: str, tmp_path: Path
 ) -> None:
@@ -211,8 +215,8 @@ def test_selection(tmp_path: Path) -> None:
     assert studies.read_selection(root).full == ()
 
 
-@pytest.mark.parametrize(
-    ("content", "key", "says"),
+@sweep(
+    "content, key, says",
     [
         ("studies: [prob]\n", "studies.0", "did you mean 'probe'"),
         ("studies: []\n", "studies", "at least 1 item"),

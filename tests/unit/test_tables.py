@@ -1,4 +1,7 @@
-"""Tables keep their schema, appear whole or not at all, and carry their provenance."""
+"""Tables keep their schema, appear whole or not at all, and carry their provenance.
+
+Catches a table without schema or provenance, and half a table on disk.
+"""
 
 import errno
 from pathlib import Path

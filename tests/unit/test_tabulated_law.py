@@ -1,10 +1,14 @@
-"""The tabulated law: straight pieces through its knots, corners as running means, derivatives."""
+"""The tabulated law: straight pieces through its knots, corners as running means, derivatives.
+
+Catches a law that misses its knots, or a wrong derivative between them.
+"""
 
 from typing import Any
 
 import numpy as np
 import pytest
 from example_effects import NOWHERE, scoped, slope, spine
+from sweeps import sweep
 
 from spinepipe.effects import JointLaw, Wrench, create
 from spinepipe.effects.contract import Array
@@ -90,7 +94,7 @@ PLACES = (
 )
 
 
-@pytest.mark.parametrize("options", PLACES, ids=str)
+@sweep("options", PLACES, str)
 def test_derivatives_are_those_of_the_load(options: dict[str, Any]) -> None:
     """Between knots, at corners, in their rounded parts and beyond the reach."""
     one = law(**options)
@@ -144,7 +148,7 @@ def bent(moment_nm: float) -> tuple[SpineModel, LoadCase]:
     return model, LoadCase("bent", 1, (step,))
 
 
-@pytest.mark.parametrize("moment_nm", [-15.0, -3.0, 0.4, 7.5, 30.0])
+@sweep("moment_nm", [-15.0, -3.0, 0.4, 7.5, 30.0])
 def test_a_joint_turns_as_far_as_the_table_says(moment_nm: float) -> None:
     """Spring and table together, read backwards by numpy."""
     model, case = bent(moment_nm)
@@ -176,8 +180,8 @@ def test_a_model_file_carries_it(tmp_path: Any) -> None:
     np.testing.assert_array_equal(found.values, [np.zeros(8), VALUES])
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
+@sweep(
+    "options, message",
     [
         ({"coordinate": "flexion"}, "coordinate 'flexion' is not one of"),
         ({"over": "flexion"}, "over 'flexion' is not one of"),

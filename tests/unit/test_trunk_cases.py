@@ -1,4 +1,7 @@
-"""The made-up trunk is a trunk: symmetric, whole, and its muscles can hold every level."""
+"""The made-up trunk is a trunk: symmetric, whole, and its muscles can hold every level.
+
+Catches made-up trunks that hold nothing, by which other tests would then see nothing.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""A trunk from the tables of a cohort folder: written out from one, and the generic male's."""
+"""A trunk from the tables of a cohort folder: written out from one, and the generic male's.
+
+Catches a trunk that is written out and read back as another.
+"""
 
 import re
 from dataclasses import replace

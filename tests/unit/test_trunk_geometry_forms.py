@@ -1,9 +1,12 @@
-"""The forms of a cohort's own muscles fit the generic male and name what is wrong."""
+"""The forms of a cohort's own muscles fit the generic male and name what is wrong.
+
+Catches a muscle form that accepts what does not fit.
+"""
 
 from pathlib import Path
 
-import pytest
 from installed import need_male
+from sweeps import sweep
 
 from spinepipe.cohort.csv_table import read_table
 from spinepipe.studies.trunk_loads.geometry_forms import (
@@ -15,7 +18,7 @@ from spinepipe.studies.trunk_loads.geometry_forms import (
 HEADER = "muscle,point,body,x_mm,y_mm,z_mm\n"
 
 
-@pytest.mark.parametrize("form", GEOMETRY_FORMS, ids=lambda form: form.stem)
+@sweep("form", GEOMETRY_FORMS, lambda form: form.stem)
 def test_the_generic_male_is_read_without_a_word(form) -> None:
     table, problems = read_table(need_male() / form.file, form, form.file)
     assert problems == []
@@ -23,8 +26,8 @@ def test_the_generic_male_is_read_without_a_word(form) -> None:
     assert len(table) == {"muscles": 1406, "muscle_parameters": 392, "body_frames": 58}[form.stem]
 
 
-@pytest.mark.parametrize(
-    ("row", "column"),
+@sweep(
+    "row, column",
     [
         ("psoas,0,L3,1,2,", "z_mm"),
         ("psoas,0.5,L3,1,2,3", "point"),

@@ -1,4 +1,7 @@
-"""The two-sided exponential: Wang 2021 eq. 3 on each side, one slope at zero, derivatives."""
+"""The two-sided exponential: Wang 2021 eq. 3 on each side, one slope at zero, derivatives.
+
+Catches sides exchanged, a jump of slope at zero, or a wrong derivative.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""The URDF of a model: parsed again it stands, weighs and moves like the model."""
+"""The URDF of a model: parsed again it stands, weighs and moves like the model.
+
+Catches a URDF that stands, weighs or moves otherwise than its model.
+"""
 
 import tempfile
 from dataclasses import replace

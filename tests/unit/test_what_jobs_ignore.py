@@ -1,6 +1,8 @@
 """No job looks at a setting that its declaration says it ignores: else results would be stale.
 
 Read from the code: what the functions that a job reaches by name ask of ``settings`` or ``study``.
+
+Catches a setting that a job reads though it says it ignores it.
 """
 
 import ast

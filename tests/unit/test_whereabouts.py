@@ -2,6 +2,8 @@
 
 Every project that tests build in one run of theirs is looked through as soon as it is there
 (`small_project`); here stands that the look sees what it is for.
+
+Catches names of machines, people or folders in results.
 """
 
 import base64
@@ -14,8 +16,8 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-import pytest
 from matplotlib.figure import Figure
+from sweeps import sweep
 from whereabouts import needles, told_of_the_machine
 
 from spinepipe.jobs.digest import versions
@@ -64,7 +66,7 @@ HIDING = {
 }
 
 
-@pytest.mark.parametrize("name", HIDING)
+@sweep("name", HIDING)
 def test_what_a_file_hides_is_seen(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "results" / "small"
     folder.mkdir(parents=True)
@@ -86,7 +88,7 @@ def test_only_temporary_files_and_notes_of_runs_are_called_by_the_machine() -> N
     assert asking == {"spinepipe/files.py"}
 
 
-@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+@sweep("kind", ["svg", "png", "pdf"])
 def test_pictures_say_what_drew_them_and_no_more(kind: str, tmp_path: Path) -> None:
     with style():
         content = picture(Figure(figsize=(1, 1)), kind)

@@ -1,4 +1,7 @@
-"""No result file is believed that is not, to the bit, what was written; leftovers are swept."""
+"""No result file is believed that is not, to the bit, what was written; leftovers are swept.
+
+Catches a result believed that was damaged, and leftovers that stay.
+"""
 
 import json
 import os

@@ -1,10 +1,15 @@
-"""Projects spoilt in one place each: a sample of what `make validate` tries (wrong_inputs)."""
+"""Projects spoilt in one place each: a sample of what `make validate` tries (wrong_inputs).
+
+Catches a spoilt project that passes, ends in a stack, or is told of at another place.
+"""
 
 import random
 from collections import defaultdict
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 
 import pytest
+from sweeps import sweep
 
 from spinepipe import problems
 from spinepipe.problems import InputError, Problem
@@ -15,44 +20,62 @@ from tests.generators.spoilt.documented import columns, keys
 from tests.generators.spoilt.keys import yaml_files
 from tests.generators.spoilt.projects import projects, write
 
-EVERY = list(cases())
-
-SEED, EACH = 19, 1
-"""The sample has so many of each kind of mutation in each project."""
+SEED = 19
 
 
-def sample() -> list[Case]:
-    """Cases of every family and project; a pipe could hold a test up for good."""
+@cache
+def every() -> list[Case]:
+    """All that can be made."""
+    return list(cases())
+
+
+def sample() -> Iterator[Case]:
+    """A case of every family in every project; a pipe could hold a test up for good."""
     groups: dict[tuple[str, str], list[Case]] = defaultdict(list)
-    for case in EVERY:
+    for case in every():
         if case.what != "a pipe":
             groups[case.family, case.project.name].append(case)
     rng = random.Random(SEED)
-    return [case for group in groups.values() for case in rng.sample(group, min(EACH, len(group)))]
+    yield from (rng.choice(group) for group in groups.values())
 
 
-@pytest.mark.parametrize("case", sample(), ids=lambda case: case.name)
-def test_what_is_wrong_is_told_and_what_is_not_passes(case: Case, tmp_path: Path) -> None:
-    seen = looked(case, case.write(tmp_path / "project"))
-    assert verdict(case, seen) is Verdict.RIGHT, seen.printed
+def few() -> Iterator[Case]:
+    """Every family in four of the projects, others from family to family."""
+    families: dict[str, list[Case]] = defaultdict(list)
+    for case in sample():
+        families[case.family].append(case)
+    for number, some in enumerate(families.values()):
+        yield from (some[at] for at in {(number + 4 * k) % len(some) for k in range(4)})
 
 
-@pytest.mark.parametrize("project", projects(), ids=lambda project: project.name)
-def test_what_is_spoilt_is_sound(project, tmp_path: Path) -> None:
-    seen = look_at(project, write(project.files, tmp_path))
+@pytest.mark.parametrize("some", [few, pytest.param(sample, marks=pytest.mark.full)])
+def test_what_is_wrong_is_told_and_what_is_not_passes(
+    some: Callable[[], Iterable[Case]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    @sweep("case", some, lambda case: case.name)
+    def told(case: Case) -> None:
+        seen = looked(case, case.write(tmp_path_factory.mktemp("spoilt") / "project"))
+        assert verdict(case, seen) is Verdict.RIGHT, seen.printed
+
+    told()
+
+
+@sweep("project", projects, lambda project: project.name)
+def test_what_is_spoilt_is_sound(project, tmp_path_factory: pytest.TempPathFactory) -> None:
+    seen = look_at(project, write(project.files, tmp_path_factory.mktemp("sound")))
     assert (seen.code, seen.messages) == (0, []), seen.printed
 
 
 def test_cases_are_many_and_the_same_each_time() -> None:
     again = [(case.name, case.expected) for case in cases()]
-    assert again == [(case.name, case.expected) for case in EVERY]
-    assert len(EVERY) > 1845 + 1000
-    assert {case.expected for case in EVERY} == set(Expected)
+    assert again == [(case.name, case.expected) for case in every()]
+    assert len(every()) > 1845 + 1000
+    assert {case.expected for case in every()} == set(Expected)
     assert len({name for name, _ in again}) == len(again)
 
 
 def test_every_documented_key_and_every_column_that_is_there_is_spoilt() -> None:
-    spoilt = {(case.file, case.place) for case in EVERY}
+    spoilt = {(case.file, case.place) for case in every()}
     for project in (one for one in projects() if not one.spoilt_elsewhere):
         for file, form in yaml_files(project):
             there = {place for name, place in spoilt if name == file}
@@ -66,7 +89,7 @@ def test_every_documented_key_and_every_column_that_is_there_is_spoilt() -> None
 
 def case_of(what: str, file: str) -> Case:
     """The first case of a mutation of a file."""
-    return next(case for case in EVERY if case.what == what and case.file.endswith(file))
+    return next(case for case in every() if case.what == what and case.file.endswith(file))
 
 
 @pytest.mark.parametrize("stand_in", [Verdict.ACCEPTED, Verdict.STACK, Verdict.ELSEWHERE])
@@ -79,7 +102,7 @@ def test_a_check_that_is_wrong_would_be_seen(stand_in: Verdict) -> None:
         Verdict.ELSEWHERE: Seen(1, "      a/loads.csv, line 2: found x; allowed: y"),
     }
     assert verdict(case, said[stand_in]) is stand_in
-    fine = next(case for case in EVERY if case.expected is Expected.FINE)
+    fine = next(case for case in every() if case.expected is Expected.FINE)
     assert verdict(fine, said[Verdict.ELSEWHERE]) is Verdict.REFUSED
 
 

@@ -1,4 +1,7 @@
-"""Readings zeroed at step 0 share its error: the fit that allows for it is generalised."""
+"""Readings zeroed at step 0 share its error: the fit that allows for it is generalised.
+
+Catches readings that share an error taken for independent, and errors told too small.
+"""
 
 from dataclasses import replace
 
