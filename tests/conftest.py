@@ -88,13 +88,13 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
 
 @pytest.fixture(scope="session")
 def eight(shared: Shared) -> Project:
-    """A project whose studies, one of each kind, have been computed at once; not to be changed."""
+    """A project whose studies, one of each kind, were computed at once; not to be changed."""
 
     def build(folder: Path) -> Project:
-        from small_studies import eight_kinds
+        from small_studies import asked, eight_kinds
 
         project = eight_kinds(folder)
-        project.run()
+        project.run(*asked(project))
         return project
 
     return shared.project("eight", build)
