@@ -22,6 +22,7 @@ from discrepancy_cases import (
     tables,
 )
 from matplotlib.figure import Figure
+from sweeps import sweep
 
 from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
@@ -83,7 +84,7 @@ def said(figure: Figure) -> str:
     return " ".join(" ".join(text.get_text() for text in texts).split())
 
 
-@pytest.mark.parametrize(("answer", "name"), list(product(VERDICTS, FIGURES)))
+@sweep("answer, name", list(product(VERDICTS, FIGURES)))
 def test_every_figure_is_drawn_whatever_the_verdict(answer: str, name: str, tmp_path: Path) -> None:
     assert len(said(drawn(name, tmp_path, answer))) > 40
 
@@ -152,7 +153,7 @@ HEADLINES = {
 }
 
 
-@pytest.mark.parametrize(("answer", "words"), HEADLINES.items())
+@sweep("answer, words", HEADLINES.items())
 def test_the_verdict_is_one_sentence(answer: str, words: str) -> None:
     assert headline(verdict_of(VERDICTS[answer]), frames(answer)["where"]) == words
 
@@ -256,7 +257,7 @@ def test_files_of_before_regions_say_nothing_of_them() -> None:
     assert {one.identifiable for one in effect.parameters} == {None}
 
 
-@pytest.mark.parametrize("answer", VERDICTS)
+@sweep("answer", VERDICTS)
 def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
     study, cohort = study_of(tmp_path)
     svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
@@ -347,7 +348,7 @@ def test_no_name_is_not_always_an_unknown_effect() -> None:
         assert "Why no name: much stays. Its shape: load over bending." in how_sure(stays)
 
 
-@pytest.mark.parametrize("answer", VERDICTS)
+@sweep("answer", VERDICTS)
 def test_what_is_written_is_read(answer: str) -> None:
     verdict = verdict_of(VERDICTS[answer])
     assert verdict_of(json.loads(json.dumps(plain_data(verdict)))) == verdict

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.model import LoadCase
@@ -358,8 +359,8 @@ PLANTED: dict[str, Callable[[Trap], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("what", PLANTED)
-@pytest.mark.parametrize("sealed", [True, False])
+@sweep("what", PLANTED)
+@sweep("sealed", [True, False])
 def test_what_somebody_planted_is_not_run_and_computed_again(
     tmp_path: Path, what: str, sealed: bool
 ) -> None:
