@@ -188,7 +188,7 @@ def unequal(made: Chains) -> Chains:
 
 
 def test_cycles_of_unequal_loads_tell_the_noise_too(tmp_path: Path) -> None:
-    """Their motion differs by up to 1 deg, of which the loads are to blame; no noise is declared."""
+    """Their motion differs by up to 1 deg, of which the loads are to blame; no noise declared."""
     stiffness = {name: k * np.outer(np.ones(3), STIFFNESS) for name, k in SPECIMENS.items()}
     made = unequal(Chains(stiffness, **SMALL, sd=False))
     verdict = searched(noisy(made, list(DEGREES)), tmp_path)

@@ -103,9 +103,9 @@ def test_figures_and_report_cope(folder: Path) -> None:
         assert "can be shown" in Path(svg).read_text()
     files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
     paths = [str(folder / f"{table.name}.parquet") for table in TABLES]
-    captions = [str(ROOT / path) for path in files.captions()]
+    captions = [str(ROOT / path) for path in map(files.caption, files.figures())]
     output = folder / "report.html"
-    report.run(root, STUDY, paths, drawn, captions, str(output), verdict=verdict)
+    report.run(root, STUDY, "report", paths, drawn, captions, str(output), verdict=verdict)
     page = output.read_text()
     assert "he base model cannot be fitted: a, test flexion" in page
     assert "Look at the data first: all specimens" in page
