@@ -2,12 +2,13 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from small_project import Project, Shared, copy_project
+from small_project import Project, Shared
+from snakemake_starts import SnakemakeStarts
 
 settings.register_profile("same everywhere", derandomize=True, deadline=None, database=None)
 settings.load_profile("same everywhere")
@@ -16,32 +17,18 @@ settings.load_profile("same everywhere")
 
 FULL_FOR_NOW = frozenset(
     [
-        "test_stale",
         "test_investigation_edges",
-        "test_cluster_like",
-        "test_damage",
-        "test_global_sensitivity_run",
         "test_scoliosis_figures",
-        "test_failure",
-        "test_rerun",
-        "test_tracking_run",
         "test_tracking_figures",
-        "test_results",
-        "test_search_run",
         "test_posterior_job",
         "test_cohort_analysis",
-        "test_grid_run",
-        "test_cohort_study",
         "test_identification_figures",
         "test_sensitivity_figures",
         "test_tracking_findings",
-        "test_toy_kind",
-        "test_discrepancy_run",
         "test_tracking_checks",
         "test_figures",
         "test_tracking_page",
         "test_cohort_figures",
-        "test_ishigami_run",
         "test_trunk_figures",
         "test_discrepancy_page",
         "test_nuisances",
@@ -55,11 +42,17 @@ SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
 """Long files whose tests share nothing: each test may go to another worker."""
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Starts of Snakemake are counted."""
+    config.pluginmanager.register(SnakemakeStarts())
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Slow tests and long files first, so that none of them runs alone at the end.
 
-    Tests that share projects, and those of long files, go to any worker, all others file by file.
+    Those of long files go to any worker, all others file by file; who looks at one shared project
+    goes to one worker, so that no other waits until it is built.
     """
 
     def short(item: pytest.Item) -> bool:
@@ -69,8 +62,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.stem in FULL_FOR_NOW:
             item.add_marker(pytest.mark.full)
-        if "shared" not in getattr(item, "fixturenames", ()) and item.path.stem not in SPREAD:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        looks_at = {"eight", "toy"}.intersection(getattr(item, "fixturenames", ()))
+        if item.path.stem not in SPREAD:
+            item.add_marker(pytest.mark.xdist_group(min(looks_at, default=item.path.stem)))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -92,32 +86,35 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
     projects.check()
 
 
-@pytest.fixture
-def new_project(tmp_path: Path) -> Callable[[int], Project]:
-    """Makes a project without results, its study `small` with so many poses."""
+@pytest.fixture(scope="session")
+def eight(shared: Shared) -> Project:
+    """A project whose studies, one of each kind, were computed at once; not to be changed."""
 
-    def make(poses: int) -> Project:
-        project = copy_project(tmp_path / "project")
-        project.write_study("small", poses)
+    def build(folder: Path) -> Project:
+        from small_studies import asked, eight_kinds
+
+        project = eight_kinds(folder)
+        project.run(*asked(project))
         return project
 
-    return make
+    return shared.project("eight", build)
 
 
 @pytest.fixture(scope="session")
-def finished(shared: Shared) -> Project:
-    """A project whose study `small` (6 poses) has been computed; not to be changed."""
+def toy(shared: Shared) -> Project:
+    """A project with a kind more than there are, its study computed; not to be changed."""
 
     def build(folder: Path) -> Project:
-        project = copy_project(folder)
-        project.write_study("small", poses=6)
+        from toy import toy_project
+
+        project = toy_project(folder)
         project.run()
         return project
 
-    return shared.project("finished", build)
+    return shared.project("toy", build)
 
 
 @pytest.fixture
-def project(finished: Project, tmp_path: Path) -> Project:
+def toy_copy(toy: Project, tmp_path: Path) -> Project:
     """The same, for one test to change."""
-    return finished.copy(tmp_path / "project")
+    return toy.copy(tmp_path / "project")

@@ -14,7 +14,7 @@ from scipy.stats import qmc
 
 from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend, descend_along
 from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, side_by_side
 from spinepipe.calibrate.profile import Profile, Reach, profile
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
@@ -158,10 +158,44 @@ def fit(
     if noise is not None:
         refuse_correlated(problem)
     evaluator = Evaluator(problem)
-    problem = evaluator.problem
-    points = _start_points(problem, starts, seed)
+    points = _start_points(evaluator.problem, starts, seed)
     descents = [partial(_descend, evaluator, start) for start in points]
-    optima = _on_record(evaluator, in_lockstep(descents, evaluator.together))
+    optima = in_lockstep(descents, evaluator.together)
+    return _ended(evaluator, optima, identifiable_below, noise, profiled)
+
+
+def fit_alike(problems: Sequence[Problem]) -> list[Fit]:
+    """Fits of problems with the same tests and unknowns, each from its own model's values.
+
+    Their models differ in numbers alone, so that all are solved in one stack.
+
+    Raises
+    ------
+    RefusedModel
+        As `Evaluator` does.
+    """
+    evaluators: list[Evaluator] = []
+    for problem in problems:
+        evaluators.append(Evaluator(problem, evaluators[0] if evaluators else None))
+    descents = [partial(_descend, one, np.zeros(len(one.problem.free))) for one in evaluators]
+
+    def together(asked: Sequence[tuple[int, Array]]) -> list[Evaluation]:
+        return side_by_side([(number, evaluators[number], x) for number, x in asked])
+
+    optima = in_lockstep(descents, together)
+    return [_ended(one, [optimum]) for one, optimum in zip(evaluators, optima, strict=True)]
+
+
+def _ended(
+    evaluator: Evaluator,
+    ends: Sequence[Optimum],
+    identifiable_below: float = 1.0,
+    noise: Array | None = None,
+    profiled: bool = False,
+) -> Fit:
+    """The fit that descents to these ends make; parameters as of `fit`."""
+    problem = evaluator.problem
+    optima = _on_record(evaluator, ends)
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
     evaluations, region, message = evaluator.evaluations, None, best.message
@@ -181,7 +215,7 @@ def fit(
         evaluations=evaluations,
         n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
-        cases=evaluator.problem.cases,
+        cases=problem.cases,
         poses=best.evaluation.poses if best.status.usable else (),
         profile=region,
         cost_of_priors=float(np.sum((problem.by_priors @ best.x) ** 2)),

@@ -123,8 +123,13 @@ class Evaluation:
 class Evaluator:
     """Evaluates a problem; the chain is loaded once, neighbouring solutions are reused."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, beside: "Evaluator | None" = None) -> None:
         """Load the chain.
+
+        Parameters
+        ----------
+        beside : one whose problem has the same cases, unknowns and course, and a model that differs
+            in numbers alone: they are solved in one stack, see `side_by_side`.
 
         Raises
         ------
@@ -149,11 +154,13 @@ class Evaluator:
         self.sharing = np.concatenate([shared, alone])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
         loads = [case.case for case in problem.cases]
-        self._solver: AtRest | Settling = (
-            Settling(problem.model, loads, problem.free, problem.course)
-            if problem.course
-            else AtRest(problem.model, loads, problem.free, problem.scale)
-        )
+        self._solver: AtRest | Settling
+        if beside is not None:
+            self._solver = beside._solver
+        elif problem.course:
+            self._solver = Settling(problem.model, loads, problem.free, problem.course)
+        else:
+            self._solver = AtRest(problem.model, loads, problem.free, problem.scale)
         self._known: dict[bytes, Evaluation] = {}
         self.evaluations = 0
 
@@ -162,18 +169,18 @@ class Evaluator:
         self._solver.forget()
         self._known.clear()
 
+    def start_at(self, x: Array) -> None:
+        """Begin the next searches at x (m,), wherever others have been; nothing is recalled."""
+        self._solver.start_at(self.problem.model, x)
+        self._known.clear()
+
     def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,); known points are recalled."""
         return self.together([(0, x)])[0]
 
     def together(self, points: Sequence[tuple[int, Array]]) -> list[Evaluation]:
         """The same at x (m,) of several searches, each with its number."""
-        new = [(number, x) for number, x in points if x.tobytes() not in self._known]
-        if new:
-            self.evaluations += len(new)
-            for (_, x), seen in zip(new, self._solver.solve(new), strict=True):
-                self._known[x.tobytes()] = self._evaluation(x, seen)
-        return [self._known[x.tobytes()] for _, x in points]
+        return side_by_side([(number, self, x) for number, x in points])
 
     def _evaluation(self, x: Array, seen: Seen | str) -> Evaluation:
         if isinstance(seen, str):
@@ -197,7 +204,9 @@ class Evaluator:
         """
         found, problem = self.at(x), self.problem
         model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
-        poses = held_against(self._solver.record(x), model, cases, found.poses, SAME_POSE)
+        poses = held_against(
+            self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE
+        )
         if poses is None:
             return None
         chain = self._systems[0].chain
@@ -229,6 +238,23 @@ class Evaluator:
         if self.problem.correlated and self.problem.cases[number].zeroed:
             errors = whitened(errors, used)
         return errors[used]
+
+
+def side_by_side(points: Sequence[tuple[int, Evaluator, Array]]) -> list[Evaluation]:
+    """Residuals and Jacobians of evaluators that share a stack; known points are recalled.
+
+    Parameters
+    ----------
+    points : x (m,) of each of some searches, with the search's number and its evaluator.
+    """
+    new = [(number, one, x) for number, one, x in points if x.tobytes() not in one._known]
+    if new:
+        models = [one.problem.model for _, one, _ in new]
+        found = new[0][1]._solver.solve([(number, x) for number, _, x in new], models)
+        for (_, one, x), seen in zip(new, found, strict=True):
+            one.evaluations += 1
+            one._known[x.tobytes()] = one._evaluation(x, seen)
+    return [one._known[x.tobytes()] for _, one, x in points]
 
 
 def sharing(

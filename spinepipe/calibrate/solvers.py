@@ -3,7 +3,7 @@
 All load steps are solved together; those that settle, with the runs that tell the derivatives.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,22 +44,38 @@ class AtRest:
         """``reach`` (m,): how far from a point first order is trusted."""
         self._model, self._free, self._reach = model, free, reach
         self._cases = tuple(cases)
-        self._stacks = _Stacks(model, self._cases)
+        self._stacks = _Stacks(self._cases)
         self._last: dict[int, tuple[Array, Array, Array]] = {}
+        self._first: tuple[Array, Array, Array] | None = None
+        self._first_of: SpineModel | None = None
 
     def forget(self) -> None:
         """Start the next points from the neutral pose."""
         self._last.clear()
+        self._first = None
 
-    def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
+    def start_at(self, model: SpineModel, x: Array) -> None:
+        """Begin the next searches from the poses to which the loads lead a model at x (m,)."""
+        first, same = self._first, self._first_of is model
+        self.forget()
+        if first is None or not same or not np.array_equal(first[0], x):
+            self.solve([(0, x)], [model])
+            first = self._last.pop(0, None)
+        self._first, self._first_of = first, model
+
+    def solve(
+        self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
+    ) -> list[Seen | str]:
         """What is seen with the unknowns at x (m,), or why there is nothing.
 
         Parameters
         ----------
         points : x of each of some searches, with the search's number.
+        models : of each point, where they are not all of this one; they differ from it in numbers.
         """
-        models = [moved(self._model, self._free, x) for _, x in points]
-        stack, unknowns = self._stacks.of(models), [self._free] * len(points)
+        models = models or [self._model] * len(points)
+        there = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
+        stack, unknowns = self._stacks.of(models, there), [self._free] * len(points)
         found = stack.solve(self._guesses(points, stack), why=False)
         q = np.where(np.isnan(found.q), 0.0, found.q)
         dq = poses_by(stack, q, unknowns)
@@ -80,37 +96,47 @@ class AtRest:
 
     def _guesses(self, points: Sequence[tuple[int, Array]], stack: Stack) -> Array | None:
         """(L, J, 6) poses to start from, to first order; NaN for searches that have none."""
-        if not self._last:
+        if self._first is None and not self._last:
             return None
         nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
         guesses = []
         for number, x in points:
-            if number not in self._last:
+            known = self._last.get(number, self._first)
+            if known is None:
                 guesses.append(nothing)
                 continue
-            there, q, dq = self._last[number]
+            there, q, dq = known
             guesses.append(q + dq @ np.clip(x - there, -self._reach, self._reach))
         return np.concatenate(guesses)
 
-    def record(self, x: Array) -> tuple[Array, ...] | str:
-        """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
-        return by_record(moved(self._model, self._free, x), self._cases)
+    def record(self, model: SpineModel, x: Array) -> tuple[Array, ...] | str:
+        """(T, n) poses of every case by the engine of record, or why not.
+
+        Both engines go the same way from the neutral pose (`tests.validation engines`): where the
+        stack gets through, the engine starts each step from where that has come.
+        """
+        self.start_at(model, x)
+        there = moved(model, self._free, x)
+        if self._first is None:
+            return by_record(there, self._cases)
+        ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
+        return by_record(there, self._cases, np.split(self._first[1], ends))
 
 
 class _Stacks:
-    """Stacks of so many models that differ from one in values only, in the same cases."""
+    """Stacks of models in the same cases, kept for when the same are moved again."""
 
-    def __init__(self, model: SpineModel, cases: Sequence[LoadCase]) -> None:
-        self._model, self._cases = model, cases
-        self._known: dict[int, Stack] = {}
+    def __init__(self, cases: Sequence[LoadCase]) -> None:
+        self._cases = cases
+        self._known: dict[tuple[int, ...], tuple[Sequence[SpineModel], Stack]] = {}
 
-    def of(self, models: Sequence[SpineModel]) -> Stack:
-        """The stack of these models, each in all cases."""
-        count = len(models)
-        if count not in self._known:
-            runs = [(number, case) for number in range(count) for case in self._cases]
-            self._known[count] = Stack.of([self._model] * count, runs)
-        return self._known[count].with_models(models)
+    def of(self, models: Sequence[SpineModel], there: Sequence[SpineModel]) -> Stack:
+        """The stack of these models where their unknowns are now, each in all cases."""
+        key = tuple(map(id, models))
+        if key not in self._known:
+            runs = [(number, case) for number in range(len(models)) for case in self._cases]
+            self._known[key] = models, Stack.of(models, runs)
+        return self._known[key][1].with_models(there)
 
 
 class Settling:
@@ -133,45 +159,64 @@ class Settling:
         places = {key: number for number, key in enumerate(known)}
         self._cases = list(known.values())
         self._lanes = [np.array([places[key] for key, _ in steps]) for steps in alone]
-        self._stacks = _Stacks(model, self._cases)
-        self._sizes: dict[bytes, Mapping[int, tuple[float, ...]]] = {}
+        self._stacks = _Stacks(self._cases)
+        self._sizes: dict[tuple[int, bytes], list[tuple[float, ...]]] = {}
 
     def forget(self) -> None:
         """Nothing: each run starts from the neutral pose."""
 
-    def solve(self, points: Sequence[tuple[int, Array]]) -> list[Seen | str]:
+    def start_at(self, model: SpineModel, x: Array) -> None:
+        """Nothing: each run starts from the neutral pose."""
+
+    def solve(
+        self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
+    ) -> list[Seen | str]:
         """What is seen with the unknowns at x (m,), or why there is nothing.
 
         Parameters
         ----------
         points : x of each of some searches, with the search's number.
+        models : of each point, where they are not all of this one; they differ from it in numbers.
         """
-        return [self._solved(x) for _, x in points]
+        models = models or [self._model] * len(points)
+        bases = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
+        steps = STEP * np.eye(len(self._free))
+        runs = [
+            one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))
+        ]
+        count, each = len(self._cases), 1 + len(steps)
+        stack = self._stacks.of([model for model in models for _ in range(each)], runs)
+        leads = np.arange(len(runs) * count).reshape(len(points), each, count)
+        leads[:] = leads[:, :1]  # those that tell the derivatives take the steps of the point's own
+        ends = settle(stack, self._course, leads.ravel())
+        every = ends.q.reshape(len(points), each, count, -1, 6)
+        result: list[Seen | str] = []
+        for base, model, (_, x), lanes, q in zip(bases, models, points, leads, every, strict=True):
+            trouble = min(
+                set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble),
+                default=None,
+            )
+            self._sizes[id(model), x.tobytes()] = [ends.sizes[lane] for lane in lanes[0].tolist()]
+            result.append(self._seen(base, model, q) if trouble is None else ends.trouble[trouble])
+        return result
 
-    def _solved(self, x: Array) -> Seen | str:
-        base, steps = moved(self._model, self._free, x), STEP * np.eye(len(x))
-        models = [base, *(moved(base, self._free, step) for step in steps)]
-        count = len(self._cases)
-        ends = settle(self._stacks.of(models), self._course, np.tile(np.arange(count), len(models)))
-        self._sizes[x.tobytes()] = ends.sizes
-        if ends.trouble:
-            return ends.trouble[min(ends.trouble)]
-        every = ends.q.reshape(len(models), count, -1, 6)
+    def _seen(self, base: SpineModel, model: SpineModel, every: Array) -> Seen:
+        """What is seen of a model, from its ends (1 + m, cases, J, 6) and the changed ones."""
         dq = np.moveaxis((every[1:] - every[0]) / STEP, 0, -1)
-        there = self._stacks.of([base])
+        there = self._stacks.of([model], [base])
         seen, by_x = readings(there, every[0]), readings_by(there, every[0], dq, [self._free])
-        poses = every[0].reshape(count, -1)
+        poses = every[0].reshape(len(self._cases), -1)
         return Seen(*(tuple(one[at] for at in self._lanes) for one in (poses, seen, by_x)))
 
-    def record(self, x: Array) -> tuple[Array, ...] | str:
+    def record(self, model: SpineModel, x: Array) -> tuple[Array, ...] | str:
         """The poses (T, n) of every case by the engine of record, over the steps of `solve`."""
-        model, sizes = moved(self._model, self._free, x), self._sizes[x.tobytes()]
-        chain = Chain(model)
+        there, sizes = moved(model, self._free, x), self._sizes[id(model), x.tobytes()]
+        chain = Chain(there)
         ends = []
-        for number, case in enumerate(self._cases):
-            system = System(chain, model, case)
+        for case, taken in zip(self._cases, sizes, strict=True):
+            system = System(chain, there, case)
             program = self._course.program(system.slots.loading(case.steps[0].wrenches))
-            end = retrace(system, program, sizes[number])
+            end = retrace(system, program, taken)
             if end is None:
                 return "over the same steps of time the run is lost"
             ends.append(end)
@@ -199,12 +244,20 @@ LEAST_MOTION = np.array([1e-4] * 3 + [1e-3] * 3)
 """m and rad: smaller motion is held against this."""
 
 
-def by_record(model: SpineModel, cases: Sequence[LoadCase]) -> tuple[Array, ...] | str:
-    """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
+def by_record(
+    model: SpineModel, cases: Sequence[LoadCase], near: Sequence[Array] | None = None
+) -> tuple[Array, ...] | str:
+    """(T, n) poses of every case by the engine of record, or why not.
+
+    Parameters
+    ----------
+    near : (T, J, 6) of every case, where each step may start; None: from the neutral pose.
+    """
     chain = Chain(model)
     found = []
-    for case in cases:
-        solved = follow(System(chain, model, case))
+    for number, case in enumerate(cases):
+        guesses = None if near is None else [q.ravel() for q in near[number]]
+        solved = follow(System(chain, model, case), guesses)
         for step in solved:
             if not step.usable:
                 return step.equilibrium.message

@@ -6,10 +6,11 @@ dimensionless or per newton, so joints of different stiffness can share it.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, JointResponse
+from spinepipe.effects.contract import Array, Indices, JointResponse
 from spinepipe.units import COORDINATES, ROTATIONS
 
 ALL_ROTATIONS = "rotations"
@@ -41,7 +42,7 @@ class CarriedShare(ABC):
     """Its name, `ALL_ROTATIONS` or `ALL`."""
 
     @property
-    def columns(self) -> list[int]:
+    def columns(self) -> Indices:
         """Places of what is scaled among the six coordinates."""
         return columns_of(self.coordinate)
 
@@ -73,9 +74,10 @@ def coordinates_of(coordinate: str) -> tuple[str, ...]:
     return {ALL_ROTATIONS: ROTATIONS, ALL: COORDINATES}.get(coordinate, (coordinate,))
 
 
-def columns_of(coordinate: str) -> list[int]:
+@cache
+def columns_of(coordinate: str) -> Indices:
     """Places of what a name stands for among the six."""
-    return [COORDINATES.index(name) for name in coordinates_of(coordinate)]
+    return np.array([COORDINATES.index(name) for name in coordinates_of(coordinate)])
 
 
 def require(effect: str, option: str, given: str, allowed: tuple[str, ...]) -> None:

@@ -178,6 +178,10 @@ class _Joints:
 
     def __init__(self, laws: Sequence[Law], coordinate: str) -> None:
         self.laws = [(effect, np.asarray(values)) for effect, values in laws]
+        # looked up once: whether a law is a `JointLaw` is asked of all its methods, and slow
+        self.without_memory = [
+            (effect, values) for effect, values in self.laws if isinstance(effect, JointLaw)
+        ]
         self.count = len(self.laws[0][1])
         self.at = COORDINATES.index(coordinate)
         self.furthest = _FURTHEST_M if coordinate in TRANSLATIONS else _FURTHEST_RAD
@@ -186,12 +190,11 @@ class _Joints:
         """Loads (R, n) at motions (R, n), and slopes; of the laws without a memory."""
         place = self._place(q.ravel())
         load, tangent = np.zeros_like(place), np.zeros((*place.shape, 6))
-        for effect, values in self.laws:
-            if isinstance(effect, JointLaw):
-                own = effect.respond(place, np.repeat(values, q.shape[1], axis=0), load)
-                if own.by_carried is not None:
-                    tangent = tangent + own.by_carried @ tangent
-                load, tangent = load + own.load, tangent + own.tangent
+        for effect, values in self.without_memory:
+            own = effect.respond(place, np.repeat(values, q.shape[1], axis=0), load)
+            if own.by_carried is not None:
+                tangent = tangent + own.by_carried @ tangent
+            load, tangent = load + own.load, tangent + own.tangent
         held, slope = load[:, self.at], tangent[:, self.at, self.at]
         return held.reshape(q.shape), slope.reshape(q.shape)
 

@@ -47,27 +47,28 @@ def chord(u: Array, n: Array, offset: Array) -> tuple[Array, Array, Array, Array
 
     That is the mean slope of G from -offset to u - offset.
     """
+    u, n, offset = np.broadcast_arrays(u, n, offset)
     near = np.abs(u) < NEAR
-    of_near = _mean_slope(u, n, offset)
-    of_far = _difference(np.where(near, 1.0, u), n, offset)
-    value, by_u, by_n, by_offset = (
-        np.where(near, one, other) for one, other in zip(of_near, of_far, strict=True)
-    )
-    return value, by_u, by_n, by_offset
+    found = _difference(np.where(near, 1.0, u), n, offset)
+    if near.any():
+        found[:, near] = _mean_slope(u[near], n[near], offset[near])
+    return found[0], found[1], found[2], found[3]
 
 
-def _difference(u: Array, n: Array, offset: Array) -> tuple[Array, Array, Array, Array]:
-    (g, _, g_by_n), (slope, _, _) = inside(u - offset, n), _slope(u - offset, n)
-    (rest, _, rest_by_n), (start, _, _) = inside(offset, n), _slope(offset, n)
-    mean = ((u - offset) * g + offset * rest) / u
-    by_n = ((u - offset) * g_by_n + offset * rest_by_n) / u
-    return mean, (slope - mean) / u, by_n, (start - slope) / u
+def _difference(u: Array, n: Array, offset: Array) -> Array:
+    """(4, ...) value and derivatives from G and its slope at both ends of the chord."""
+    ends = np.stack([u - offset, offset])
+    log, steep, whole = _powers(ends, n)
+    g, slope = np.exp(-whole / n), np.exp(-(1.0 / n + 1.0) * whole)
+    g_by_n = g * (whole / n - steep * log) / n
+    mean, by_n = (ends * g).sum(axis=0) / u, (ends * g_by_n).sum(axis=0) / u
+    return np.stack([mean, (slope[0] - mean) / u, by_n, (slope[1] - slope[0]) / u])
 
 
-def _mean_slope(u: Array, n: Array, offset: Array) -> tuple[Array, Array, Array, Array]:
+def _mean_slope(u: Array, n: Array, offset: Array) -> Array:
     """The same by Gauss's rule with five points, for short chords."""
-    found = np.zeros((4, *np.broadcast_shapes(u.shape, n.shape, offset.shape)))
+    found = np.zeros((4, *u.shape))
     for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
         slope, by_u, by_n = _slope(point * u - offset, n)
         found += weight * np.stack([slope, point * by_u, by_n, -by_u])
-    return found[0], found[1], found[2], found[3]
+    return found

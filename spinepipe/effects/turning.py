@@ -11,9 +11,14 @@ _SPINS = {
 }
 """(3, 3) cross-product matrix of each axis."""
 
-_ONE = np.eye(3, dtype=int)
-_TIMES = np.vstack([0 * _ONE[:1], _ONE, *(_ONE + row for row in _ONE)])
-"""(13, 3) how often each turn is differentiated: none, by one angle, by two."""
+_FIRST, _SECOND = [0, 1, 0, 2, 1, 0], [0, 0, 1, 0, 1, 2]
+"""How often the first and the second turn are differentiated in each product of these two."""
+
+_TWO, _THIRD = [0, 1, 2, 0, 3, 4, 1, 5, 2, 0], [0, 0, 0, 1, 0, 0, 1, 0, 1, 2]
+"""Those products and how often the third turn is differentiated: none, by one angle, by two."""
+
+_BY_TWO = [[4, 5, 6], [5, 7, 8], [6, 8, 9]]
+"""Which of these is the derivative by angles a and b."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +62,18 @@ def turning(angles: Array, order: str = "ZXY") -> Turning:
     The order Z-X'-Y'' is that of extension, right bending, left rotation.
     """
     spins = np.stack([_SPINS[axis] for axis in order])[:, None]
+    twice = spins @ spins
     sine, cosine = np.sin(angles.T)[..., None, None], np.cos(angles.T)[..., None, None]
     turns = np.stack(  # Rodrigues: a turn about a fixed axis, and its two derivatives
         [
-            np.eye(3) + sine * spins + (1.0 - cosine) * spins @ spins,
-            cosine * spins + sine * spins @ spins,
-            -sine * spins + cosine * spins @ spins,
+            np.eye(3) + sine * spins + (1.0 - cosine) * twice,
+            cosine * spins + sine * twice,
+            -sine * spins + cosine * twice,
         ]
     )
-    one, two, three = (turns[_TIMES[:, turn], turn] for turn in range(3))
-    product = (one @ two @ three).swapaxes(0, 1)
-    shape = (len(angles), 3, 3, 3, 3)
-    return Turning(product[:, 0], product[:, 1:4], product[:, 4:].reshape(shape))
+    two = turns[_FIRST, 0] @ turns[_SECOND, 1]
+    product = (two[_TWO] @ turns[_THIRD, 2]).swapaxes(0, 1)
+    return Turning(product[:, 0], product[:, 1:4], product[:, _BY_TWO])
 
 
 def angles_by_angles(seen: Turning, axes: Array, axes_by_angle: Array) -> tuple[Array, Array]:

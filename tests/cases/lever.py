@@ -1,9 +1,18 @@
 """A project with a cohort of one stiff joint without weight under a small force."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from small_project import Project, copy_project
+
+from spinepipe.jobs import collect
+from spinepipe.jobs.expected import Expected, place_of
+from spinepipe.studies.global_sensitivity import analyse, base, calibrate, design, respond
+from spinepipe.studies.global_sensitivity.kind import SensitivityFiles
+from spinepipe.studies.read import check
+from spinepipe.tables import read_frame
 
 FORCE_N = (1.0, 2.0)
 POINT_MM = (20.0, 30.0)
@@ -28,8 +37,15 @@ bootstraps: 200
 def lever(folder: Path, *studies: tuple[str, int, str]) -> Project:
     """A project with the cohort of one joint and these studies: name, samples, more lines."""
     project = copy_project(folder)
+    write_lever(project, *studies)
+    return project
+
+
+def write_lever(project: Project, *studies: tuple[str, int, str]) -> None:
+    """Write the cohort and the studies into a project."""
     cohort = project.path("config/cohorts/lever")
-    cohort.mkdir()
+    cohort.mkdir(parents=True, exist_ok=True)
+    project.path("config/studies").mkdir(exist_ok=True)
     (cohort / "cohort.yaml").write_text(
         "cohort: lever\ntitle: one joint\nsource: written for the tests\n"
         "vertebrae: [V2, V1]\ngravity: false\n"
@@ -53,8 +69,50 @@ def lever(folder: Path, *studies: tuple[str, int, str]) -> Project:
         project.path(f"config/studies/{name}.yaml").write_text(text)
     names = ", ".join(name for name, _, _ in studies)
     project.path("config/config.yaml").write_text(f"studies: [{names}]\n")
-    return project
 
 
 def table(project: Project, study: str, name: str) -> pd.DataFrame:
     return pd.read_parquet(project.path(f"results/{study}/{name}.parquet"))
+
+
+def tables_of(
+    root: Path, study: str, solve: Callable[..., None] = respond.run
+) -> dict[str, pd.DataFrame]:
+    """Tables of specimen a, its jobs run one after the other in this process."""
+    told = Expected(str(root), *check(root, study))
+    files = told.files
+    assert isinstance(files, SensitivityFiles)
+
+    def path(name: str) -> str:
+        return str(root / name)
+
+    drawn = path(f"{files.folder}/design.parquet")
+    design.run(str(root), study, drawn)
+    of_base = {
+        name: path(files.job_files(name, "a", "000")[0])
+        for name in ("base_stiffness", "base_motion")
+    }
+    base.run(str(root), study, "a", **of_base)
+    start = [path(name) for name in files.base_of("a")]
+    blocks: dict[str, Any] = {"responses": [], "calibrated": []}
+    for table, job in (("responses", solve), ("calibrated", calibrate.run)):
+        if table not in files.tables:
+            continue
+        for specimen, block in files.blocks(table):
+            if specimen == "a":
+                parts = [path(name) for name in files.job_files(table, specimen, block)]
+                for part in parts:
+                    job(str(root), study, drawn, start, "a", place_of(part)["batch"], part)
+                blocks[table].append(path(files.block_file(table, specimen, block)))
+                marks = [told.of_part(table, part) for part in parts]
+                collect.run("global_sensitivity", table, parts, marks, blocks[table][-1])
+    names = ("indices", "convergence", "failed_runs")
+    found = {name: path(f"{files.folder}/{name}.parquet") for name in names}
+    analyse.run(str(root), study, drawn, **blocks, specimen="a", **found)
+    joined = {
+        name: pd.concat([read_frame(file) for file in made], ignore_index=True)
+        for name, made in blocks.items()
+        if made
+    }
+    whole = {"design": drawn, **of_base, **found}
+    return joined | {name: read_frame(file) for name, file in whole.items()}

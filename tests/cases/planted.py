@@ -1,5 +1,6 @@
 """What somebody might put beside data so that it runs when it is read."""
 
+import base64
 import os
 import pickle
 from pathlib import Path
@@ -40,14 +41,16 @@ def a_python_type(path: Path, sprung: Path) -> None:
     pq.write_table(pa.table({"specimen": ["a"]}, schema=pa.schema([column])), path)
 
 
+_STUDY = "joint_pose_sensitivity"
+_RECORD = base64.urlsafe_b64encode(f"results/{_STUDY}/simulations.parquet".encode()).decode()
 NAMES = {
     "results": ("x.pkl", "_task.pklz", "cache.joblib", "small.npy", "sitecustomize.py"),
-    "results/small": ("x.pkl", f"{'0' * 64}{SUFFIX}", "_result.pklz", "stiffness.pickle"),
+    f"results/{_STUDY}": ("x.pkl", f"{'0' * 64}{SUFFIX}", "_result.pklz", "stiffness.pickle"),
     "config": ("x.pkl", "config.pkl", "config.py", "config.json"),
-    "config/studies": ("small.pkl", "small.py", "conftest.py"),
+    "config/studies": (f"{_STUDY}.pkl", f"{_STUDY}.py", "conftest.py"),
     "config/cohorts/palanca_l1l4": ("landmarks.pkl", "landmarks.npy", "cohort.py", "specimens.npz"),
     ".snakemake/iocache": ("latest.pkl",),
-    ".snakemake/metadata": ("cmVzdWx0cy9zbWFsbC9zaW11bGF0aW9ucy5wYXJxdWV0",),
+    ".snakemake/metadata": (_RECORD,),
     ".snakemake/auxiliary": ("x.pkl",),
     ".snakemake": ("metadata.db", "x.pkl"),
 }

@@ -1,7 +1,8 @@
 """Copies of the project that run small studies, so that no test touches its results.
 
 A project that several tests look at is built once per run of the tests (`Shared`); a test that
-changes something takes a copy of it. Its results say nothing of the machine (`whereabouts`).
+changes something takes a copy of it. Its results say nothing of the machine (`whereabouts`). Each
+start of Snakemake is counted: it takes seconds before the first job (`snakemake_starts`).
 """
 
 import fcntl
@@ -28,10 +29,12 @@ study: {name}
 kind: joint_pose_sensitivity
 cohort: palanca_l1l4
 seed: 1
+loading: equilibrium
 poses: {poses}
 best_models: 2
-block: 4
+block: 2
 calibration:
+  bound_factor: 100
   weights:
     {{anterior: 10, superior: 100, right: 1, extension: 1, right_bending: 0, left_rotation: 0}}
 start_bootstrap: {{sets: 2, loadings: [equilibrium, quasi_static, dynamic]}}
@@ -43,6 +46,9 @@ load_point: {{superior_mm: [-20, 0, 20], superior_sd_mm: 10}}
 posterior: {{draws: 10, warm_up: 20, chains: 2, stiffness_factor: 10}}
 """
 _NOT_PASSED_ON = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
+STARTS: list[str] = []
+"""Arguments of each start of Snakemake in this process of the tests."""
+
 _HANGS_S = 3600
 """A run that takes longer hangs: it does on no machine, however busy."""
 
@@ -104,6 +110,7 @@ class Project:
 
         A run that ends well leaves nothing of ours in the system's temporary folder.
         """
+        STARTS.append(" ".join(arguments))
         with TemporaryDirectory(prefix="run-", ignore_cleanup_errors=True) as temporary:
             done = subprocess.run(
                 [sys.executable, "-m", "snakemake", *arguments],
@@ -133,12 +140,16 @@ class Project:
 
     def planned(self, *targets: str) -> set[str]:
         """Result files that a run for these targets, or for `all`, would write."""
-        done = self.snakemake("-n", *(targets or ("all",)), "--quiet", "host")
+        return self.look(*(targets or ("all",)))[0]
+
+    def look(self, *arguments: str) -> tuple[set[str], str]:
+        """The same of a run with these arguments, and what Snakemake said."""
+        done = self.snakemake("-n", *arguments, "--quiet", "host")
         assert done.returncode == 0, done.stdout
         lines = re.findall(r"^    output: (.*)$", done.stdout, re.MULTILINE)
         files = {name for line in lines for name in line.split(", ")}
         assert bool(files) != ("Nothing to be done" in done.stdout)
-        return {name.removeprefix("results/") for name in files}
+        return {name.removeprefix("results/") for name in files}, done.stdout
 
     def killed_after(self, count: int, rule: str, *targets: str) -> list[tuple[int, float]]:
         """Kill Snakemake outright when so many jobs of a rule are done.
@@ -179,12 +190,16 @@ def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
     return {name for name, time in after.items() if before.get(name) != time}
 
 
-def copy_project(folder: Path) -> Project:
-    """The project without results and with nothing selected but a study `small`."""
-    # Not above: it brings most of the library along, which few tests need.
-    from machine_code import of_joints
+def copy_project(folder: Path, solves: bool = True) -> Project:
+    """The project without results and with nothing selected but a study `small`.
 
-    of_joints()
+    solves : whether its studies will solve anything, and are to find compiled loops.
+    """
+    if solves:
+        # Not above: it brings most of the library along, which few tests need.
+        from machine_code import of_joints
+
+        of_joints()
     folder.mkdir(parents=True)
     for part in _PARTS:
         source = _ROOT / part

@@ -5,16 +5,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+NAME = "straight"
 SPECIMENS = {"a": 50.0, "b": 40.0, "c": 70.0}
 JOINTS = ("L4L5", "L3L4")
 ODD = "bending (left) 2 N·m, 50 %"
 """A name that labs may give a test, and that becomes the name of a folder."""
 
 TESTS = {"flexion": ("mz_nm", -1.0, "extension_deg"), ODD: ("mx_nm", -1.0, "right_bending_deg")}
-STUDY = """\
+STUDY = f"""\
 study: small
 kind: cohort_stiffness
-cohort: chains
+cohort: {NAME}
 significance: 0.05
 representations: [per_joint, partially_pooled]
 """
@@ -24,7 +25,7 @@ def write_cohort(folder: Path) -> None:
     """Straight chains in pure moments: each joint turns by moment over stiffness."""
     folder.mkdir(parents=True)
     (folder / "cohort.yaml").write_text(
-        "cohort: chains\ntitle: straight chains\nsource: written for the tests\n"
+        f"cohort: {folder.name}\ntitle: straight chains\nsource: written for the tests\n"
         "vertebrae: [L5, L4, L3]\ngravity: false\n"
         "measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1}\n"
     )

@@ -1,32 +1,23 @@
 """A study run as on a cluster: submitted jobs are processes of their own that share a folder.
 
 The profile for Slurm is used as it is, with an executor that submits to a shell script instead.
+What would be caught: rules that only work in the process that has planned them, jobs of a group
+that start Snakemake one by one, a profile that speaks of rules that are no more.
 """
 
 import re
 import shutil
 from pathlib import Path
 
-import grid_cases
 import pytest
 import yaml
-from lever import lever
-from small_project import Project, copy_project
+from small_project import STARTS, Project
 
-from spinepipe.studies.registry import kind_names
+from spinepipe.studies.registry import kind_names, kind_of
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-PROFILE = ROOT / "profiles/slurm/config.yaml"
-MOVES = 16
-STUDY = (
-    "poses: 2\nstiffness_sets: 8\n"
-    "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
-)
-MOVES_PER_SUBMITTED_JOB = 8
-SAMPLES = 24
-"""Runs of each specimen of the sensitivity study: one submitted job."""
 SUBMIT = """\
 #!/bin/sh
 # Stands in for a queue: the job script runs in a session of its own, as nobody's child.
@@ -35,12 +26,7 @@ echo $!
 """
 # Which process reads the Snakefile: one for each time Snakemake is started.
 NOTE = "\nPath('queue', f'{os.getpid()}.start').touch()\n"
-
-
-def new_project(folder: Path) -> Project:
-    project = copy_project(folder)
-    grid_cases.project(folder, STUDY, specimens=("a",))
-    return with_queue(project)
+BLOCK = "range_of_motion/blocks/range_of_motion/specimen=b/block=000.parquet"
 
 
 def with_queue(project: Project) -> Project:
@@ -53,60 +39,57 @@ def with_queue(project: Project) -> Project:
     return project
 
 
-def run_on_cluster(project: Project, target: str) -> str:
+def run_on_cluster(project: Project, target: str, moves: int) -> str:
     """What a project is asked for, its jobs submitted; returns what Snakemake said."""
     done = project.snakemake(
         *(target, "--profile", "profiles/slurm", "--executor", "cluster-generic"),
         *("--cluster-generic-submit-cmd", "./submit.sh", "--jobs", "2", "--cores", "2"),
-        *("--group-components", f"moves={MOVES_PER_SUBMITTED_JOB}", f"responses={SAMPLES}"),
+        *("--group-components", f"moves={moves}"),
         *("--seconds-between-status-checks", "1", "--latency-wait", "10"),
     )
     logs = "\n".join(path.read_text() for path in project.path("queue").glob("*.log"))
     assert done.returncode == 0, done.stdout + logs
+    STARTS.extend(["submitted"] * (starts(project) - 1))
     return done.stdout
 
 
-def test_samples_computed_as_on_a_cluster_give_the_same_files(tmp_path: Path) -> None:
-    study = ("factors", SAMPLES // 6, "")
-    local = lever(tmp_path / "local", study)
-    # Nothing is submitted after this table that is not when moves are asked for below.
-    asked = "results/factors/responses.parquet"
-    local.run(asked)
-    cluster = with_queue(lever(tmp_path / "cluster", study))
-    said = run_on_cluster(cluster, asked)
-    assert cluster.contents() == local.contents()
-    groups = len(re.findall("Submitted group job", said))
-    assert (
-        len(list(cluster.path("results/factors/jobs/responses").rglob("*.parquet"))) == 2 * SAMPLES
-    )
-    assert groups == 2  # the samples of each specimen
+def starts(project: Project) -> int:
+    return len(list(project.path("queue").glob("*.start")))
 
 
-def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(tmp_path: Path) -> None:
-    local, cluster = new_project(tmp_path / "local"), new_project(tmp_path / "cluster")
-    local.run()
-    said = run_on_cluster(cluster, "all")
-    assert cluster.contents() == local.contents()
-
-    groups = len(re.findall("Submitted group job", said))
-    submitted = len(re.findall("Submitted (?:group )?job", said))
-    assert (
-        groups == MOVES // MOVES_PER_SUBMITTED_JOB + 1
-    )  # and one of summaries, figures and report
-    assert submitted < MOVES
-    assert len(list(cluster.path("queue").glob("*.start"))) == submitted + 1
-
-    assert cluster.planned() == set()
+def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(
+    eight: Project, tmp_path: Path
+) -> None:
+    """Four moves are one submitted job, the block that joins them another."""
+    cluster = with_queue(eight.copy(tmp_path / "project"))
+    shutil.rmtree(cluster.path("results/range_of_motion/jobs/specimen=b"))
+    cluster.path(f"results/{BLOCK}").unlink()
+    said = run_on_cluster(cluster, f"results/{BLOCK}", moves=4)
+    assert cluster.contents() == eight.contents()
+    assert len(re.findall("Submitted group job", said)) == 1
+    assert len(re.findall("Submitted (?:group )?job", said)) == 2
+    assert starts(cluster) == 2 + 1
 
 
-def test_the_profile_speaks_of_rules_that_exist(tmp_path: Path) -> None:
-    settings = yaml.safe_load(PROFILE.read_text())
-    project = new_project(tmp_path / "project")
-    shutil.copytree(ROOT / "config/studies", project.path("config/studies"), dirs_exist_ok=True)
-    rules = set(project.snakemake("--list-rules").stdout.split())
+@pytest.mark.full
+def test_a_whole_study_comes_out_the_same(eight: Project, tmp_path: Path) -> None:
+    cluster = with_queue(eight.copy(tmp_path / "project"))
+    shutil.rmtree(cluster.path("results/range_of_motion"))
+    said = run_on_cluster(cluster, "results/range_of_motion/report.html", moves=4)
+    assert all(eight.contents()[name] == found for name, found in cluster.contents().items())
+    # Moves of each specimen; and one of summaries, figures and report.
+    assert len(re.findall("Submitted group job", said)) == 2 + 1
+    assert starts(cluster) == len(re.findall("Submitted (?:group )?job", said)) + 1
+
+
+def test_the_profile_speaks_of_rules_that_exist() -> None:
+    settings = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
+    written = "\n".join(path.read_text() for path in ROOT.glob("workflow/rules/*.smk"))
+    rules = set(re.findall(r"^ *(?:rule|checkpoint) (\w+):", written, re.MULTILINE))
     assert {"move", "respond"} <= rules
+    pages = {f"{kind}_{made}" for kind in kind_names() for made in ("figure", "report")}
+    rules |= pages | {f"{kind}_{made}" for kind in kind_names() for made in ("block", "table")}
+    rules |= {f"{kind}_{job.name}" for kind in kind_names() for job in kind_of(kind).analyses}
     assert set(settings["groups"]) | set(settings["set-resources"]) <= rules
     assert set(settings["group-components"]) <= set(settings["groups"].values())
-    pages = {rule for rule in rules if rule.endswith(("_figure", "_report"))}
-    assert len(pages) == 2 * len(kind_names())
     assert {settings["groups"].get(rule) for rule in pages} == {"pages"}

@@ -1,24 +1,26 @@
-"""Runs that go wrong: bad input, dying workers, folders that cannot be written."""
+"""Runs that go wrong: dying workers, a run that is killed, bad input, folders of somebody else's.
 
+What would be caught: a Python stack in the place of a sentence, a job that failed and takes others
+along, a killed run that loses or mixes results, a run that starts though it cannot end.
+"""
+
+import os
 import shutil
-from collections.abc import Callable
 
+import psutil
 import pytest
 from small_project import Project
+from toy import SPECIMENS
 
 pytestmark = pytest.mark.slow
 
-CALIBRATIONS = "small/calibrations/specimen=s01"
 ACCIDENTS = {
-    "0001": ("import os; os.kill(os.getpid(), 9)", "killed from outside (SIGKILL)"),
-    "0002": ("import os; os._exit(7)", "ended itself in mid-job with exit code 7"),
-    "0003": ("raise ValueError('no such spine')", "ValueError: no such spine"),
-    "0004": (
-        "raise OSError(28, 'full', 'results/x')",
-        "no space is left on the disk of results",
-    ),
+    "a": ("import os; os.kill(os.getpid(), 9)", "killed from outside (SIGKILL)"),
+    "b": ("import os; os._exit(7)", "ended itself in mid-job with exit code 7"),
+    "c": ("raise ValueError('no such spine')", "ValueError: no such spine"),
+    "d": ("raise OSError(28, 'full', 'results/x')", "no space is left on the disk of results"),
 }
-"""What happens at a pose, and what must be said of it."""
+"""What happens at a specimen, and what must be said of it."""
 
 # Added to the Snakefile: the accidents stand beside it and are run in place of the job.
 RUN_ACCIDENTS = """
@@ -27,74 +29,174 @@ whole_execute = execute
 
 
 def execute(rule, function, wildcards, log, arguments):
-    pose = wildcards.get("pose")
-    if rule == "calibrate" and pose in {poses}:
-        function = f"accidents:at_{{pose}}"
+    specimen = wildcards.get("specimen")
+    if rule == "count_joints" and specimen in {specimens}:
+        function = f"accidents:at_{{specimen}}"
     whole_execute(rule, function, wildcards, log, arguments)
 """
 
 
-def test_failing_jobs_are_named_and_the_others_are_kept(project: Project) -> None:
-    content, snakefile = project.contents(), project.path("Snakefile")
+def job_file(specimen: str) -> str:
+    return f"counted/joints/specimen={specimen}.parquet"
+
+
+def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
+    toy_copy: Project,
+) -> None:
+    """First four of six jobs fail, then a run with other settings is killed, then all is well."""
+    content, snakefile = toy_copy.contents(), toy_copy.path("Snakefile")
     whole = snakefile.read_text()
-    shutil.rmtree(project.path(f"results/{CALIBRATIONS}"))
-    happens = [f"def at_{pose}(**_):\n    {what}\n" for pose, (what, _) in ACCIDENTS.items()]
-    project.path("accidents.py").write_text("\n".join(happens))
-    snakefile.write_text(whole + RUN_ACCIDENTS.format(poses=set(ACCIDENTS)))
-    done = project.snakemake("-j2", "--keep-going", "all")
+    shutil.rmtree(toy_copy.path("results"))
+    happens = [f"def at_{one}(**_):\n    {what}\n" for one, (what, _) in ACCIDENTS.items()]
+    toy_copy.path("accidents.py").write_text("\n".join(happens))
+    snakefile.write_text(whole + RUN_ACCIDENTS.format(specimens=set(ACCIDENTS)))
+    done = toy_copy.snakemake("-j2", "--keep-going", "all")
     assert done.returncode != 0
     assert "Traceback" not in done.stdout
     assert f"{len(ACCIDENTS)} jobs failed:" in done.stdout.partition("Exiting because")[2]
-    for pose, (_, words) in ACCIDENTS.items():
-        log = f"results/small/logs/calibrate/specimen=s01/pose={pose}.log"
-        assert f"job calibrate study=small specimen=s01 pose={pose}: " in done.stdout
+    for specimen, (_, words) in ACCIDENTS.items():
+        log = f"results/counted/logs/count_joints/specimen={specimen}.log"
+        assert f"job count_joints study=counted specimen={specimen}: " in done.stdout
         assert words in done.stdout
         assert log in done.stdout
-        assert words in project.path(log).read_text()
+        assert words in toy_copy.path(log).read_text()
+    kept = {job_file(one) for one in SPECIMENS if one not in ACCIDENTS}
+    assert set(toy_copy.files()) == kept
 
     snakefile.write_text(whole)
-    again = project.rerun()
-    lost = {f"{CALIBRATIONS}/pose={pose}.parquet" for pose in ACCIDENTS}
-    assert {name for name in again if name.startswith(CALIBRATIONS)} == lost
-    assert project.contents() == content
+    toy_copy.edit("config/studies/counted.yaml", "times: 2", "times: 3")
+    workers = toy_copy.killed_after(4, "count_joints")
+    assert workers
+    assert all(ended(pid, start) for pid, start in workers)
+    toy_copy.edit("config/studies/counted.yaml", "times: 3", "times: 2")
+    before, left = toy_copy.files(), toy_copy.contents()
+    of_other_settings = [name for name in left if left[name] != content[name]]
+    assert len(of_other_settings) >= 4
+
+    said = toy_copy.run()
+    assert said.count("was killed: its lock is taken off") == 1
+    assert toy_copy.contents() == content
+    after = toy_copy.files()
+    cut_off = {path.name for path in toy_copy.path(".snakemake/incomplete").rglob("*")}
+    assert not cut_off
+    sound = set(before) - set(of_other_settings)
+    assert sum(after[name] != before[name] for name in sound) <= 2  # at work when it was killed
 
 
-def test_an_unsound_cohort_is_told_before_anything_runs(
-    new_project: Callable[[int], Project],
-) -> None:
-    project = new_project(6)
-    loads = project.path("config/cohorts/palanca_l1l4/loads.csv")
-    loads.write_text(loads.read_text() + "s01,flexion,2,L9,0,heavy,0,0,0,0,,,\n")
-    done = project.snakemake("-j2", "all")
+def ended(pid: int, start: float) -> bool:
+    """Whether that process is gone, or goes while one waits for it."""
+    try:
+        process = psutil.Process(pid)
+        if process.create_time() == start:
+            process.wait(timeout=600)
+    except psutil.NoSuchProcess:
+        return True
+    return not process.is_running() or process.create_time() != start
+
+
+def test_an_unsound_cohort_or_study_is_told_before_anything_runs(toy_copy: Project) -> None:
+    shutil.rmtree(toy_copy.path("results"))
+    toy_copy.edit("config/cohorts/stack/joints.csv", "b,L2L3,0,36,", "b,L2L3,0,high,")
+    text = toy_copy.path("config/studies/counted.yaml").read_text()
+    other = text.replace("study: counted", "study: other").replace("times: 2", "times: 0")
+    toy_copy.path("config/studies/other.yaml").write_text(other)
+    toy_copy.edit("config/config.yaml", "[counted]", "[counted, other]")
+    done = toy_copy.snakemake("-j2", "all")
     assert done.returncode != 0
-    assert "loads.csv" in done.stdout
+    for told in ("joints.csv", "high", "other.yaml", "times", "greater than or equal to 1"):
+        assert told in done.stdout, told
     assert "Traceback" not in done.stdout
-    assert not project.path("results").exists()
+    assert not toy_copy.path("results").exists()
 
 
-def test_a_study_outside_the_selection_is_checked_when_asked_for(project: Project) -> None:
-    project.write_study("other", poses=0)
-    assert project.planned() == set()
-    done = project.snakemake("-j2", "results/other/poses.parquet")
-    assert done.returncode != 0
-    assert "other.yaml" in done.stdout
-    assert "Traceback" not in done.stdout
-
-
-def test_results_that_cannot_be_written_are_told_at_once(
-    new_project: Callable[[int], Project],
-) -> None:
-    project = new_project(6)
-    project.path("results").symlink_to("/proc/self")  # not even root may make a folder there
-    done = project.snakemake("-j2", "all")
+def test_results_that_cannot_be_written_are_told_at_once(toy_copy: Project) -> None:
+    shutil.rmtree(toy_copy.path("results"))
+    toy_copy.path("results").symlink_to("/proc/self")  # not even root may make a folder there
+    done = toy_copy.snakemake("-j2", "all")
     assert done.returncode != 0
     assert "results cannot be written to" in done.stdout
     assert "Traceback" not in done.stdout
 
 
-def test_the_warm_pool_is_insisted_on(new_project: Callable[[int], Project]) -> None:
-    project = new_project(6)
-    done = project.snakemake("-j2", "--workflow-profile", "none", "all")
+def test_a_record_that_cannot_be_kept_is_told_before_anything_runs(toy_copy: Project) -> None:
+    """Its folder is one in which nobody may write, not even root."""
+    toy_copy.path(".snakemake").rename(toy_copy.folder / "record")
+    toy_copy.path(".snakemake").symlink_to("/proc/self")
+    ended = toy_copy.snakemake("-j2", "all")
+    assert ended.returncode != 0
+    assert "where Snakemake keeps its record" in ended.stdout
+    assert "Traceback" not in ended.stdout
+
+
+def test_a_second_run_at_the_same_time_is_told(toy_copy: Project) -> None:
+    """By what the first one keeps while it runs: the files that it is about to make."""
+    locks = toy_copy.path(".snakemake/locks")
+    locks.mkdir(exist_ok=True)
+    (locks / "0.output.lock").write_text("results/counted/joints.parquet\n")
+    toy_copy.path(f"results/{job_file('b')}").write_bytes(b"")
+    before = toy_copy.files()
+    ended = toy_copy.snakemake("-j2", "all")
+    assert ended.returncode != 0
+    assert "cannot be locked" in ended.stdout
+    assert "--unlock" in ended.stdout
+    assert "Traceback" not in ended.stdout
+    assert toy_copy.files() == before
+
+
+def test_the_warm_pool_is_insisted_on(toy_copy: Project) -> None:
+    shutil.rmtree(toy_copy.path("results"))
+    done = toy_copy.snakemake("-j2", "--workflow-profile", "none", "all")
     assert done.returncode != 0
     assert "force-use-threads" in done.stdout
-    assert not project.path("results").exists()
+    assert not toy_copy.path("results").exists()
+
+
+@pytest.mark.full
+def test_a_study_outside_the_selection_is_checked_when_asked_for(toy_copy: Project) -> None:
+    text = toy_copy.path("config/studies/counted.yaml").read_text()
+    other = text.replace("study: counted", "study: other").replace("times: 2", "times: 0")
+    toy_copy.path("config/studies/other.yaml").write_text(other)
+    assert toy_copy.planned() == set()
+    done = toy_copy.snakemake("-j2", "results/other/joints.parquet")
+    assert done.returncode != 0
+    assert "other.yaml" in done.stdout
+    assert "Traceback" not in done.stdout
+
+
+REMOVED = """
+
+whole_execute = execute
+
+
+def execute(rule, function, wildcards, log, arguments):
+    if rule == "count_joints":
+        shutil.rmtree("results/counted", ignore_errors=True)
+    whole_execute(rule, function, wildcards, log, arguments)
+"""
+"""Added to the Snakefile: whenever a job begins, somebody removes all results."""
+
+
+@pytest.mark.full
+def test_results_removed_in_mid_run_are_told_in_a_sentence(toy_copy: Project) -> None:
+    content, snakefile = toy_copy.contents(), toy_copy.path("Snakefile")
+    whole = snakefile.read_text()
+    snakefile.write_text(f"import shutil\n{whole}{REMOVED}")
+    os.truncate(toy_copy.path(f"results/{job_file('b')}"), 0)
+    ended = toy_copy.snakemake("-j2", "all")
+    assert ended.returncode != 0
+    assert "Traceback" not in ended.stdout
+    assert "removed while the run went on. Run the same command again" in ended.stdout
+    snakefile.write_text(whole)
+    toy_copy.run()
+    assert toy_copy.contents() == content
+
+
+@pytest.mark.full
+def test_of_many_damaged_files_five_are_named(toy_copy: Project) -> None:
+    content = toy_copy.contents()
+    for one in SPECIMENS:
+        toy_copy.path(f"results/{job_file(one)}").write_bytes(b"")
+    said = toy_copy.run()
+    assert said.count("is damaged, cut off, empty") == 5
+    assert f"so do {len(SPECIMENS) - 5} more files" in said
+    assert toy_copy.contents() == content

@@ -1,21 +1,104 @@
-"""What is computed again after something was deleted or changed, and what is kept."""
+"""What is computed again after something was deleted or changed, and what is kept.
 
+What would be caught: a job that is not made again though what it reads has changed (its mark does
+not reach the rule), or is though nothing has; a lost file that nobody misses; a look at what is to
+be done that changes or reads what it must not.
+"""
+
+import os
 from pathlib import Path
 
+import planted
 import pytest
 from small_project import Project, written
+from small_studies import SMALL, asked
+from toy import add_kind
 
 from spinepipe.studies.read import check
-from spinepipe.studies.registry import kind_of
-from spinepipe.studies.study_files import StudyFiles
+from spinepipe.studies.registry import files_of, kind_of
 
 pytestmark = pytest.mark.slow
 
-KIND = "joint_pose_sensitivity"
-SIMULATION = "small/jobs/specimen=s01/pose=0005/stiffness=best02.parquet"
-BOOTSTRAP = "small/bootstrap/specimen=s01/bootstrap=start/loading=dynamic/set=001.parquet"
-CALIBRATION = "small/calibrations/specimen=s01/pose=0002.parquet"
-JOB_FOLDERS = ("jobs", "bootstrap", "calibrations", "methods", "precision")
+POSES = "joint_pose_sensitivity"
+SIMULATIONS = f"{POSES}/jobs/"
+BATCH = "global_sensitivity/jobs/responses/specimen=b/batch=00002.parquet"
+MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
+"""Lost files."""
+
+UNTOUCHED = ("scoliosis", "trunk_loads")
+
+
+def made_of(project: Project, *tables: str) -> set[str]:
+    """Tables of joint poses that hang on any of these tables, but they."""
+    files, reached = files_of(*check(project.folder, POSES)), set(tables)
+    tables_of_all = set(files.tables_of(full=False))
+    jobs = [job for job in kind_of(POSES).analyses if set(job.writes) <= tables_of_all]
+    for _ in jobs:
+        reached |= {name for job in jobs if reached & set(job.reads) for name in job.writes}
+    return {f"{POSES}/{name}.parquet" for name in reached - set(tables)}
+
+
+def of_jobs(files: set[str]) -> set[str]:
+    """Those that a job for one pose, batch or the like writes."""
+    return {name for name in files if "=" in name and "/blocks/" not in name}
+
+
+def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
+    eight: Project, tmp_path: Path
+) -> None:
+    """A change in each of five studies, none in two; a study, a kind, an effect more; pickles.
+
+    The search alone tries each effect that there is.
+    """
+    project = eight.copy(tmp_path / "project")
+    frames, simulate = project.path("spinepipe/frames.py"), project.job(POSES, "simulate")
+    frames.write_text(f'"""Other words."""\n{frames.read_text()}\n# a comment\n')
+    simulate.write_text(simulate.read_text() + "\n_UNUSED = 1\n")
+    project.edit("config/studies/cohort_stiffness.yaml", "significance: 0.05", "significance: 0.01")
+    project.edit("config/cohorts/stack/joints.csv", "b,L2L3,0,36,", "b,L2L3,0,37,")
+    effects = project.path("spinepipe/effects")
+    another = (effects / "hysteresis.py").read_text().replace('"hysteresis"', '"lately_added"')
+    (effects / "lately_added.py").write_text(another)
+    for lost in (BATCH, MOTION):
+        project.path(f"results/{lost}").unlink()
+    project.write_study("other", poses=2)
+    add_kind(project)
+    sprung = tmp_path / "sprung"
+    planted.plant(project.folder, sprung)
+    left = project.path(f"results/{POSES}/.best.json.{2**30}")  # of a process that is no more
+    left.write_bytes(b"{")
+
+    before = project.files()
+    both = ("results/other/report.html", "results/counted/report.html")
+    planned, said = project.look("--trust-io-cache", *asked(eight), *both)
+    assert "--trust-io-cache is ignored" in said
+    assert not sprung.exists()
+    assert project.files() == before
+
+    of = {kind: {name for name in planned if name.startswith(f"{kind}/")} for kind in SMALL}
+    for kind in UNTOUCHED:
+        assert of[kind] == set(), kind
+    assert "other/report.html" in planned
+    assert "discrepancy/discrepancy/verdict.json" in of["discrepancy"]
+    assert {Path(name).parts[0] for name in planned} == {"other", "counted", *SMALL} - set(
+        UNTOUCHED
+    )
+    all_simulations = {name for name in before if name.startswith(SIMULATIONS)}
+    assert len(all_simulations) == 4 * 3
+    assert of_jobs(of[POSES]) == all_simulations
+    assert {name for name in of[POSES] if "=" not in name} == {
+        f"{POSES}/simulations.parquet",
+        *made_of(project, "simulations"),
+    }
+    assert "cohort_stiffness/findings.parquet" in of["cohort_stiffness"]
+    assert not {name for name in of["cohort_stiffness"] if "=" in name}
+    of_b = {name for name in before if name.startswith("range_of_motion/jobs/specimen=b/")}
+    assert len(of_b) == 4
+    assert of_jobs(of["range_of_motion"]) == of_b | {"range_of_motion/frames/specimen=b.parquet"}
+    batches = {name for name in of_jobs(of["global_sensitivity"]) if "/jobs/" in name}
+    assert batches == {BATCH}
+    assert of["tracking"] == {MOTION}
+
 
 # Appended to the ranking of the copied package: another second set, all others the same.
 OTHER_RANKING = """
@@ -38,92 +121,36 @@ def run(**arguments):
 """
 
 
-def layout(project: Project) -> StudyFiles:
-    """Names of the files of the study."""
-    return kind_of(KIND).files.of(*check(project.folder, "small"))
-
-
-def made_of(project: Project, *tables: str) -> set[str]:
-    """Tables, figures and report that hang on any of these tables, their own files left out."""
-    files, reached = layout(project), set(tables)
-    jobs = [job for job in kind_of(KIND).analyses if set(job.writes) <= set(files.tables)]
-    for _ in jobs:
-        reached |= {name for job in jobs if reached & set(job.reads) for name in job.writes}
-    figures = [name for name in files.figures if reached & set(files.figure(name).tables)]
-    return {
-        *(f"small/{name}.parquet" for name in reached - set(tables)),
-        *(f"small/figures/{name}.{kind}" for name in figures for kind in ("svg", "png")),
-        "small/report.html",
-    }
-
-
-def delete(project: Project, *names: str) -> None:
-    for name in names:
-        project.path(f"results/{name}").unlink()
-
-
-def of_jobs(files: set[str]) -> set[str]:
-    """Those that a job for one pose, set or the like writes."""
-    return {name for name in files if "=" in name and name.split("/")[1] in JOB_FOLDERS}
-
-
-def simulations(files: set[str]) -> set[str]:
-    return {name for name in files if name.startswith("small/jobs/")}
-
-
-def test_a_run_makes_every_table_and_figure(finished: Project) -> None:
-    files = set(finished.files())
-    assert {name.removeprefix("results/") for name in layout(finished).results()} <= files
-    assert {"small/best.json", "small/model.yaml", "small/report.html"} <= files
-    assert len(simulations(files)) == 6 * 3
-    assert len([name for name in files if name.startswith("small/bootstrap/")]) == 3 * 2 + 2
-    assert not list(finished.path("results").rglob("*.log"))
-
-
-def test_nothing_is_computed_twice_also_after_other_comments(project: Project) -> None:
-    for path in (project.path("spinepipe/frames.py"), project.job(KIND, "simulate")):
-        path.write_text(f'"""Other words."""\n{path.read_text()}\n# a comment\n')
-    assert project.rerun() == set()
-
-
-def test_what_is_deleted_is_computed_alone_with_what_is_made_of_it(project: Project) -> None:
-    content = project.contents()
-    delete(project, SIMULATION)
-    block = "small/blocks/simulations/specimen=s01/block=001.parquet"
-    own = {SIMULATION, block, "small/simulations.parquet"}
-    assert project.planned() == own | made_of(project, "simulations")
-
-    before = project.files()
-    project.run(f"results/{SIMULATION}")  # every target can be asked for by name
-    assert written(before, project.files()) == {SIMULATION}
-
-    delete(project, SIMULATION, CALIBRATION, BOOTSTRAP)
-    again = project.rerun()
-    assert {"small/calibrations.parquet", "small/best.json", "small/bootstrap.parquet"} <= again
-    assert of_jobs(again) == {SIMULATION, CALIBRATION, BOOTSTRAP}  # the ranking stays as it was
-    assert project.contents() == content
-
-
-def test_a_new_ranking_reruns_the_simulations_that_use_it(project: Project) -> None:
-    path = project.job(KIND, "rank")
+@pytest.mark.full
+def test_a_new_ranking_reruns_the_simulations_that_use_it(eight: Project, tmp_path: Path) -> None:
+    project = eight.copy(tmp_path / "project")
+    path = project.job(POSES, "rank")
     path.write_text(path.read_text() + OTHER_RANKING)
-    again = of_jobs(project.rerun())
-    assert again == {name for name in simulations(set(project.files())) if "best02" in name}
+    again = {name for name in project.rerun() if name.startswith(SIMULATIONS)}
+    everything = {name for name in project.files() if name.startswith(SIMULATIONS)}
+    assert again == {name for name in everything if "best02" in name}
     assert project.planned() == set()
 
 
-def test_another_study_leaves_the_files_of_the_first(project: Project) -> None:
-    project.write_study("other", poses=2)
-    project.edit("config/config.yaml", "[small]", "[small, other]")
-    planned = project.planned()
-    assert "other/report.html" in planned
-    assert {Path(name).parts[0] for name in planned} == {"other"}
+@pytest.mark.full
+def test_a_ranking_with_the_same_sets_simulates_nothing_again(
+    eight: Project, tmp_path: Path
+) -> None:
+    """Its own mark differs, but a simulation hangs on nothing but its own set."""
+    project = eight.copy(tmp_path / "project")
+    success = "best_models: 2\nsuccess: {outlier_times_start: 50}"
+    project.edit(f"config/studies/{POSES}.yaml", "best_models: 2", success)
+    again = project.rerun(f"results/{POSES}/simulations.parquet")
+    assert f"{POSES}/best.json" in again
+    assert not [name for name in again if "/jobs/" in name]
 
 
-def test_changed_code_reruns_the_jobs_that_use_it(project: Project) -> None:
-    path = project.job(KIND, "simulate")
-    path.write_text(path.read_text() + "\n_UNUSED = 1\n")
-    again = project.planned()
-    assert len(simulations(again)) == 6 * 3
-    assert of_jobs(again) == simulations(again)
-    assert "small/calibrations.parquet" not in again
+@pytest.mark.full
+def test_a_job_file_is_made_when_asked_for_by_name(eight: Project, tmp_path: Path) -> None:
+    """And nothing that is made of it."""
+    project = eight.copy(tmp_path / "project")
+    lost = f"{SIMULATIONS}specimen=s01/pose=0003/stiffness=best02.parquet"
+    os.unlink(project.path(f"results/{lost}"))
+    before = project.files()
+    project.run(f"results/{lost}")
+    assert written(before, project.files()) == {lost}

@@ -1,21 +1,24 @@
-"""No table is made of two settings: what hangs on others is seen by its mark and computed again."""
+"""No table is made of two settings: what hangs on others is seen by its mark and computed again.
+
+One kill between two settings is in `test_failure`, one look after changes in `test_rerun`; here
+are kills at other jobs, and files whose marks are another's, gone or unrecorded.
+"""
 
 import base64
 import os
 import shutil
 from pathlib import Path
 
-import psutil
 import pyarrow.parquet as pq
 import pytest
-from small_project import Project, Shared
-from small_tables import TABLES, project_with_tables, simulation
+from small_project import Project
 
 from spinepipe.marks import read_mark
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.full]
 
 KIND = "joint_pose_sensitivity"
+TABLES = tuple(f"results/{KIND}/{name}.parquet" for name in ("simulations", "agreement"))
 
 SEED = ("seed: 1", "seed: 2")
 LOADING = ("loading: equilibrium", "loading: settle")
@@ -24,17 +27,25 @@ RANKING = ("best_models: 2", "best_models: 1")
 SAME = ("seed: 1", "seed: 1")
 
 
+def simulation(pose: int, stiffness: str) -> str:
+    return f"{KIND}/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
+
+
 @pytest.fixture
-def done(shared: Shared, tmp_path: Path) -> Project:
-    """A project with the tables of a small study; each test has its own."""
-    return project_with_tables(shared, tmp_path)
+def done(eight: Project, tmp_path: Path) -> Project:
+    """Each test has its own; files of the other kinds are left out."""
+    project = eight.copy(tmp_path / "project")
+    for folder in project.path("results").iterdir():
+        if folder.name != KIND:
+            shutil.rmtree(folder)
+    return project
 
 
 def killed_with(project: Project, change: tuple[str, str], rule: str, count: int) -> None:
     """Run with other settings until so many jobs of a rule are done, then with the old again."""
-    project.edit("config/studies/small.yaml", *change)
+    project.edit(f"config/studies/{KIND}.yaml", *change)
     project.killed_after(count, rule, *TABLES)
-    project.edit("config/studies/small.yaml", *change[::-1])
+    project.edit(f"config/studies/{KIND}.yaml", *change[::-1])
 
 
 @pytest.mark.parametrize(
@@ -67,34 +78,6 @@ def test_after_kill_and_change_back_tables_are_as_undisturbed(
     assert done.planned(*TABLES) == set()
 
 
-def test_a_killed_run_goes_on_where_it_was(done: Project) -> None:
-    content = done.contents()
-    shutil.rmtree(done.path("results"))
-    shutil.rmtree(done.path(".snakemake"))
-    workers = done.killed_after(8, "simulate", *TABLES)
-    assert workers
-    assert all(ended(pid, start) for pid, start in workers)
-    cut_off = {path.name for path in done.path(".snakemake/incomplete").rglob("*")}
-    before = done.files()
-    assert "cannot be locked" not in done.snakemake("-n", *TABLES).stdout
-    left = done.run(*TABLES)
-    assert left.count("was killed: its lock is taken off") == 1
-    again = {name for name, at in done.files().items() if before.get(name, at) != at}
-    assert len(again) <= len(cut_off)
-    assert done.contents() == content
-
-
-def ended(pid: int, start: float) -> bool:
-    """Whether that process is gone, or goes while one waits for it."""
-    try:
-        process = psutil.Process(pid)
-        if process.create_time() == start:
-            process.wait(timeout=600)
-    except psutil.NoSuchProcess:
-        return True
-    return not process.is_running() or process.create_time() != start
-
-
 def without_record(project: Project) -> Project:
     shutil.rmtree(project.path(".snakemake"))
     return project
@@ -103,9 +86,9 @@ def without_record(project: Project) -> Project:
 def test_copied_results_are_known_by_their_marks(done: Project) -> None:
     without_record(done)
     assert done.planned(*TABLES) == set()
-    done.edit("config/studies/small.yaml", *SEED)
-    landmarks = {f"small/landmarks{part}.parquet" for part in ("", "/specimen=s01")}
-    assert landmarks <= done.planned(*TABLES, "results/small/landmarks.parquet")
+    done.edit(f"config/studies/{KIND}.yaml", *SEED)
+    landmarks = {f"{KIND}/landmarks{part}.parquet" for part in ("", "/specimen=s01")}
+    assert landmarks <= done.planned(*TABLES, f"results/{KIND}/landmarks.parquet")
 
 
 def spoil(path: Path, metadata: bool) -> None:
@@ -142,19 +125,7 @@ def test_what_has_another_mark_or_none_or_was_cut_off_is_computed_again(
         again.add(cut_off(done))
     else:
         without_record(done)
-    blocks = "small/blocks/simulations/specimen=s01"
+    blocks = f"{KIND}/blocks/simulations/specimen=s01"
     tables = {name.removeprefix("results/") for name in TABLES}
     joined = {f"{blocks}/block=000.parquet", f"{blocks}/block=001.parquet", *tables}
     assert done.planned(*TABLES) == again | joined
-
-
-def test_a_ranking_with_the_same_sets_simulates_nothing_again(done: Project) -> None:
-    """Its own mark differs, but a simulation hangs on nothing but its own set."""
-    done.edit(
-        "config/studies/small.yaml",
-        "best_models: 2",
-        "best_models: 2\nsuccess: {outlier_times_start: 50}",
-    )
-    again = done.rerun(*TABLES)
-    assert "small/best.json" in again
-    assert not [name for name in again if "/jobs/" in name]

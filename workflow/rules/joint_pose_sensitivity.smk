@@ -9,7 +9,6 @@ wildcard_constraints:
     pose="[0-9]{4,5}",
     bootstrap="start|damping",
     loading="equilibrium|quasi_static|dynamic",
-    set="[0-9]{3,4}",
     method=one_of(METHODS),
     sd_mm="[0-9.e+-]+",
 
@@ -102,9 +101,9 @@ rule simulate:
 
 rule bootstrap:
     output:
-        output=f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/set={{set}}.parquet",
+        output=f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/batch={{batch}}.parquet",
     log:
-        f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{set}}.log",
+        f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{batch}}.log",
     params:
         digest=digest("bootstrap"),
     run:

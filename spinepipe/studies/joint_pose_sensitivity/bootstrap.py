@@ -1,12 +1,16 @@
-"""Job: one fit in a cohort's own joint poses, from a sampled start or with sampled damping."""
+"""Job: fits in a cohort's own joint poses, from sampled starts or with sampled damping.
 
+Fits of one way of loading are solved side by side: alone each would wait for numpy most of the time.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Evaluator, Fit, Problem, fit
+from spinepipe.calibrate import Evaluator, Fit, Problem, fit_alike, side_by_side
 from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array
@@ -20,11 +24,15 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     study_and_cohort,
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import (
+    SETS_PER_BATCH,
+    JointPoseSensitivity,
+)
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
+NO_REST = "with this stiffness the spine was still moving away when it was read: no rest"
 _START = [f"start_{name}" for name in STIFFNESS_COLUMNS]
 _ERRORS = [
     f"{name}_error_{unit}"
@@ -33,30 +41,45 @@ _ERRORS = [
 
 
 def run(
-    root: str, study: str, specimen: str, bootstrap: str, loading: str, set: str, output: str
+    root: str, study: str, specimen: str, bootstrap: str, loading: str, batch: str, output: str
 ) -> None:
-    """Write the rows, one per joint, of one fit."""
+    """Write the rows, one per joint, of the fits of one batch of sets."""
     settings, cohort = study_and_cohort(root, study)
-    start, damping = sampled(settings, specimen, bootstrap)[int(set)]
-    common = {
-        "specimen": specimen,
-        "bootstrap": bootstrap,
-        "loading": loading,
-        "set": int(set),
-        **dict(zip(_START, start.tolist(), strict=True)),
-        "damping_translation_n_s_per_m": float(damping[0]),
-        "damping_rotation_nm_s_per_rad": float(damping[5]),
-    }
+    first = int(batch) * SETS_PER_BATCH
+    sets = sampled(settings, specimen, bootstrap)[first : first + SETS_PER_BATCH]
+    found = _fits(root, settings, cohort, specimen, loading, sets)
+    rows = []
+    for number, ((start, damping), own) in enumerate(zip(sets, found, strict=True), start=first):
+        common = {
+            "specimen": specimen,
+            "bootstrap": bootstrap,
+            "loading": loading,
+            "set": number,
+            **dict(zip(_START, start.tolist(), strict=True)),
+            "damping_translation_n_s_per_m": float(damping[0]),
+            "damping_rotation_nm_s_per_rad": float(damping[5]),
+        }
+        rows += [{**common, **row} for row in own]
+    write(from_rows(BOOTSTRAP, rows), output, provenance("bootstrap", settings, cohort, [specimen]))
+
+
+def _fits(
+    root: str,
+    settings: JointPoseSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    loading: str,
+    sets: Sequence[tuple[Array, Array]],
+) -> list[list[dict[str, Any]]]:
+    """The rows, one per joint, of the fit of each set; refused where one is: they are alike."""
     try:
-        problem = _problem(root, settings, cohort, specimen, start, damping)
-        problem = replace(problem, course=course(settings, loading))
-        found = fit(problem)
+        problems = [_problem(root, settings, cohort, specimen, *one) for one in sets]
+        problems = [replace(problem, course=course(settings, loading)) for problem in problems]
+        found = fit_alike(problems)
     except RefusedModel as error:
-        rows = _refused(cohort, str(error))
-    else:
-        rows = _fitted(cohort, problem, found)
-    table = from_rows(BOOTSTRAP, [{**common, **row} for row in rows])
-    write(table, output, provenance("bootstrap", settings, cohort, [specimen]))
+        return [_refused(cohort, str(error))] * len(sets)
+    at_rest = _rests(problems, found)
+    return [_fitted(cohort, *one) for one in zip(problems, found, at_rest, strict=True)]
 
 
 def sampled(
@@ -109,10 +132,10 @@ def _problem(
     return replace(problem, model=model)
 
 
-def _fitted(cohort: Cohort, problem: Problem, found: Fit) -> list[dict[str, Any]]:
+def _fitted(cohort: Cohort, problem: Problem, found: Fit, rests: bool) -> list[dict[str, Any]]:
     """One row per joint: its stiffness and its own mean errors."""
     solved = found.status.usable
-    message = "; ".join(filter(None, (found.message, _no_rest(problem, found))))
+    message = "; ".join(filter(None, (found.message, "" if rests else NO_REST)))
     values = moved(problem.model, problem.free, found.x).effects[0].values
     rows = []
     for joint, errors in enumerate(np.moveaxis(absolute_errors(found.cases, found.poses), 1, 0)):
@@ -137,13 +160,18 @@ def _fitted(cohort: Cohort, problem: Problem, found: Fit) -> list[dict[str, Any]
     return rows
 
 
-def _no_rest(problem: Problem, found: Fit) -> str:
-    """What must be said of a fit to a moving spine that has no equilibrium under its load."""
-    if problem.course is None or not found.status.usable:
-        return ""
-    if Evaluator(replace(problem, course=None)).at(found.x).residual is not None:
-        return ""
-    return "with this stiffness the spine was still moving away when it was read: no rest"
+def _rests(problems: Sequence[Problem], found: Sequence[Fit]) -> list[bool]:
+    """Of each fit, whether there is an equilibrium where a moving spine was read, if one was."""
+    rests = [True] * len(found)
+    moving = [n for n, p in enumerate(problems) if p.course is not None and found[n].status.usable]
+    evaluators: list[Evaluator] = []
+    for number in moving:
+        still = replace(problems[number], course=None)
+        evaluators.append(Evaluator(still, evaluators[0] if evaluators else None))
+    points = [(n, one, found[n].x) for n, one in zip(moving, evaluators, strict=True)]
+    for number, there in zip(moving, side_by_side(points), strict=True):
+        rests[number] = there.residual is not None
+    return rests
 
 
 def _refused(cohort: Cohort, message: str) -> list[dict[str, Any]]:

@@ -11,7 +11,10 @@ from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.ranking import is_whole, ranked_set
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.settings import (
+    SETS_PER_BATCH,
+    JointPoseSensitivity,
+)
 from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
 from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
@@ -63,6 +66,13 @@ BY_SPECIMEN = (
 )
 """Tables joined from one file per specimen."""
 
+FULL = (
+    *("method_fits", "success_by_method"),
+    *("precision_errors", "landmark_precision", "required_precision", "spread_over_landmark_sd"),
+    *(*POSTERIOR, "against_gould_2024a"),
+)
+"""Emulated optimisers, fits under other settings, samplers, and the comparison that needs them."""
+
 OF_JOBS = (*_JOBS, *BY_SPECIMEN)
 """Tables joined from job files."""
 
@@ -94,6 +104,7 @@ class Layout(StudyFiles):
     """
 
     joined = OF_JOBS
+    full = FULL
     drawings = (
         Figure(
             "stiffness",
@@ -173,13 +184,13 @@ class Layout(StudyFiles):
 
     @cached_property
     def bootstraps(self) -> list[str]:
-        """Folders and names of all bootstrap fits of a specimen."""
+        """Folders and names of all batches of bootstrap fits of a specimen."""
         parts = {"start": self.study.start_bootstrap, "damping": self.study.damping_bootstrap}
         return [
-            f"bootstrap={name}/loading={loading}/set={number:03d}"
+            f"bootstrap={name}/loading={loading}/batch={number:05d}"
             for name, part in parts.items()
             for loading in part.loadings
-            for number in range(part.sets)
+            for number in range(-(-part.sets // SETS_PER_BATCH))
         ]
 
     @property

@@ -74,6 +74,10 @@ class Success(BaseModel):
     )
 
 
+SETS_PER_BATCH = 50
+"""Bootstrap fits that one job makes side by side."""
+
+
 class Bootstrap(BaseModel):
     """Fits in the cohort's own joint poses, from sampled starts or with sampled damping."""
 

@@ -1,6 +1,6 @@
-"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
+"""Job: motion of one specimen with one set of joint frames, all tests and stiffness sets."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,8 +14,8 @@ from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.model import RefusedModel
-from spinepipe.statics import System, follow
+from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.statics.many import Stack
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.range_of_motion.load_steps import asked_tests, virtual_tensions
@@ -23,10 +23,9 @@ from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
-from spinepipe.world import Chain
 
-TABLE = RANGE_OF_MOTION.without("specimen", "pose")
-"""A job file: specimen and pose are in its folders' names."""
+TABLE = RANGE_OF_MOTION.without("specimen")
+"""A job file: the specimen is in its folder's name."""
 
 Ends = list[tuple[Array, Status, str]]
 """End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
@@ -42,67 +41,78 @@ def run(
     stiffness_sets: str,
     specimen: str,
     pose: str,
-    stiffness: str,
     output: str,
 ) -> None:
-    """Write the rows of one specimen, pose and stiffness set."""
+    """Write the rows of one specimen and pose, of all stiffness sets."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     tests = asked_tests(root, study, specimen, cohort.digest)
     placed = drawn_frames(frames).of(specimen, int(pose))
-    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
     damping = np.array(settings.damping.in_order())
-    try:
-        tension_n = virtual_tensions(settings)
-        chain = Chain(on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n))
-        ends = [_motion(chain, test) for test in tests]
-    except RefusedModel as error:
-        nowhere = np.full(values.shape, np.nan)
-        ends = [
-            [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
-            for test in tests
-        ]
-    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
-    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
+    tension_n = virtual_tensions(settings)
+    sets = drawn_stiffness(stiffness_sets)
+    models: dict[int, SpineModel] = {}
+    refusals: dict[int, str] = {}
+    for number, values in enumerate(sets):
+        try:
+            models[number] = on_bushings(
+                cohort, specimen, placed, values, damping, tension_n=tension_n
+            )
+        except RefusedModel as error:
+            refusals[number] = str(error)
+    solved = iter(_ends(tuple(models.values()), tests))
+    names = ("stiffness", *_NAMES, *_MOTION)
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for number in range(len(sets)):
+        nowhere = (np.full(sets[number].shape, np.nan), Status.REFUSED, refusals.get(number, ""))
+        for test in tests:
+            steps = test.case.steps[test.stored]
+            ends = [nowhere] * len(steps) if number in refusals else next(solved)
+            _enter(columns, cohort.joint_names, (number, test), ends)
+    columns["pose"] = [int(pose)] * len(columns["stiffness"])
     made_by = provenance("simulate", settings, cohort, [specimen])
     write(to_arrow(TABLE, columns), output, made_by)
 
 
-def _motion(chain: Chain, test: AskedTest) -> Ends:
-    """Ends of the steps of a test that are stored.
+def _ends(models: Sequence[SpineModel], tests: Sequence[AskedTest]) -> Iterator[Ends]:
+    """Ends of the steps that are stored, model by model and test by test; all solved together.
 
     Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
     """
-    solved = follow(System(chain, chain.model, test.case))
-    start = solved[0].equilibrium.q if test.from_first else np.zeros(chain.n)
-    ends = []
-    for step in solved[test.stored]:
-        moved = step.equilibrium.q - start if step.usable else np.full(chain.n, np.nan)
-        ended = step.equilibrium
-        ends.append((from_si(moved.reshape(-1, 6)), ended.status, ended.message))
-    return ends
+    if not models:
+        return
+    runs = [(number, test) for number in range(len(models)) for test in tests]
+    stack = Stack.of(models, [(number, test.case) for number, test in runs])
+    found = stack.solve()
+    for (_, test), first, end in zip(runs, stack.first[:-1], stack.first[1:], strict=True):
+        start = found.q[first] if test.from_first else 0.0
+        yield [
+            (
+                from_si(found.q[lane] - start),
+                Status(found.status[lane]),
+                found.messages.get(lane, ""),
+            )
+            for lane in range(first, end)[test.stored]
+        ]
 
 
-def _columns(
-    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
-) -> dict[str, list[Any]]:
-    """Columns of a job file; rows step by step, joint by joint."""
-    names = ("test", "step", "largest_load", "joint", "status", "message")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
-    motions = []
-    for test, ends in tests:
-        for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
-            same = (test.case.test, step.step, step.step == test.largest)
-            for name, value in zip(names[:3], same, strict=True):
-                columns[name] += [value] * len(joints)
-            columns["joint"] += joints
-            columns["status"] += [status.value] * len(joints)
-            columns["message"] += [message] * len(joints)
-            motions.append(motion)
-    predicted = np.concatenate(motions).T
-    return {
-        **columns,
-        **dict(zip([f"predicted_{c}" for c in COORDINATE_COLUMNS], predicted, strict=True)),
-    }
+_NAMES = ("test", "step", "largest_load", "joint", "status", "message")
+_MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
+
+
+def _enter(
+    columns: dict[str, list[Any]],
+    joints: tuple[str, ...],
+    asked: tuple[int, AskedTest],
+    ends: Ends,
+) -> None:
+    """Add the rows of a stiffness set under a test, step by step and joint by joint."""
+    number, test = asked
+    for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
+        load = (test.case.test, step.step, step.step == test.largest)
+        for at, joint in enumerate(joints):
+            row = (number, *load, joint, status.value, message, *motion[at])
+            for values, value in zip(columns.values(), row, strict=True):
+                values.append(value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """A search for missing effects as Snakemake runs it: its files, and what is made again.
 
 The search itself is replaced by one that hands over made-up results: these are tests of the rules.
+What would be caught: a verdict that waits for pictures, another base model that goes unseen.
 """
 
 import shutil
@@ -11,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from small_project import Project, Shared, copy_project
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.full]
 
 STUDY = "probe"
 FOLDER = f"results/{STUDY}/discrepancy"

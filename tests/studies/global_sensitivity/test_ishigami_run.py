@@ -1,18 +1,28 @@
-"""Ishigami's function in the place of the engine: the workflow's indices beside the closed form.
+"""Ishigami's function in the place of the engine: the jobs' indices beside the closed form.
 
-Everything but the solve is the product's: the design, batches, tables, indices, convergence,
-figures and report. Ishigami & Homma 1990, a = 7, b = 0.1.
+Everything but the solve is the product's: the design, batches, tables, indices and convergence.
+Ishigami & Homma 1990, a = 7, b = 0.1. What would be caught: values, samples or factors that
+change places between the jobs; the estimators by themselves are looked at in
+`tests/unit/test_global_indices`.
 """
 
-from pathlib import Path
-
+import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from known_indices import ishigami, morris_truth
-from lever import lever, table
-from small_project import Project, Shared
+from lever import tables_of, write_lever
+from small_project import Project
 
-pytestmark = pytest.mark.slow
+from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.tables import RESPONSES
+from spinepipe.tables import to_arrow, write
+
+pytestmark = [pytest.mark.slow, pytest.mark.full]
+
+Computed = dict[str, dict[str, pd.DataFrame]]
 
 SAMPLES = {"sobol": 1024, "fast": 2048, "morris": 500}
 NAMES = {"load_point_x": "x1", "load_point_y": "x2", "load_point_z": "x3"}
@@ -30,20 +40,12 @@ design: {{method: {method}, samples: {samples}}}
 outputs: {{motion: [extension], joint_load: []}}
 """
 
-STAND_IN = '''
-"""Ishigami's function of the first three factors, in place of a solve."""
 
-import numpy as np
-import pyarrow.parquet as pq
-
-from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.inputs import study_of
-from spinepipe.studies.global_sensitivity.tables import RESPONSES
-from spinepipe.tables import to_arrow, write
-
-
-def run(root, study, design, base, specimen, batch, output):
-    settings, cohort = study_of(root, study)
+def in_place_of_a_solve(
+    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+) -> None:
+    """Ishigami's function of the first three factors."""
+    settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     size = settings.batch_size(1)
     values = pq.read_table(design).column("value").to_numpy().reshape(settings.n_runs, -1)
     part = values[int(batch) * size : (int(batch) + 1) * size]
@@ -61,25 +63,17 @@ def run(root, study, design, base, specimen, batch, output):
     )
     known = provenance("respond", settings, cohort, [specimen], [str(size)])
     write(to_arrow(table, columns), output, known)
-'''
 
 
-def build(folder: Path) -> Project:
-    """A study by each method, the engine of its copy of the project replaced."""
-    project = lever(folder)
-    project.job("global_sensitivity", "respond").write_text(STAND_IN)
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory: pytest.TempPathFactory) -> Computed:
+    """Tables of a study by each method."""
+    root = tmp_path_factory.mktemp("ishigami")
+    write_lever(Project(root))
     for method, samples in SAMPLES.items():
         text = STUDY.format(method=method, samples=samples)
-        project.path(f"config/studies/{method}.yaml").write_text(text)
-    project.path("config/config.yaml").write_text(f"studies: [{', '.join(SAMPLES)}]\n")
-    project.run()
-    return project
-
-
-@pytest.fixture
-def computed(shared: Shared) -> Project:
-    """The same, built once and not to be changed."""
-    return shared.project("ishigami", build)
+        (root / f"config/studies/{method}.yaml").write_text(text)
+    return {name: tables_of(root, name, in_place_of_a_solve) for name in SAMPLES}
 
 
 def beside_truth(rows: pd.DataFrame, truth: dict[tuple[str, str, str], float]) -> pd.DataFrame:
@@ -91,28 +85,28 @@ def beside_truth(rows: pd.DataFrame, truth: dict[tuple[str, str, str], float]) -
     return rows.assign(truth=named).dropna(subset=["truth"])
 
 
-def test_sobol_indices_are_ishigami_s(computed: Project) -> None:
-    rows = beside_truth(table(computed, "sobol", "indices"), ishigami().truth)
+def test_sobol_indices_are_ishigami_s(computed: Computed) -> None:
+    rows = beside_truth(computed["sobol"]["indices"], ishigami().truth)
     assert len(rows) == 9  # S1 and ST of three factors, three pairs
     assert (rows["estimate"] - rows["truth"]).abs().max() < 0.05
     inside = (rows["ci_low"] <= rows["truth"]) & (rows["truth"] <= rows["ci_high"])
     assert inside.sum() >= 8  # of nine intervals of 95 %
 
 
-def test_fast_indices_are_ishigami_s(computed: Project) -> None:
-    rows = beside_truth(table(computed, "fast", "indices"), ishigami().truth)
+def test_fast_indices_are_ishigami_s(computed: Computed) -> None:
+    rows = beside_truth(computed["fast"]["indices"], ishigami().truth)
     assert len(rows) == 6
     assert (rows["estimate"] - rows["truth"]).abs().max() < 0.05
 
 
-def test_elementary_effects_are_ishigami_s(computed: Project) -> None:
-    rows = beside_truth(table(computed, "morris", "indices"), morris_truth(ishigami()))
+def test_elementary_effects_are_ishigami_s(computed: Computed) -> None:
+    rows = beside_truth(computed["morris"]["indices"], morris_truth(ishigami()))
     assert len(rows) == 9
     assert (rows["estimate"] - rows["truth"]).abs().max() < 0.08 * rows["truth"].max()
 
 
-def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Project) -> None:
-    rows = table(computed, "sobol", "indices")
+def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Computed) -> None:
+    rows = computed["sobol"]["indices"]
     total = rows[rows["index"] == "ST"].set_index("factor")
     assert total.loc["dummy", "estimate"] == pytest.approx(0.0, abs=1e-12)
     assert not total.loc["dummy", "above_floor"]
@@ -124,8 +118,8 @@ def test_the_factor_that_changes_nothing_is_at_the_floor(computed: Project) -> N
     assert total.loc[list(NAMES), "above_floor"].all()
 
 
-def test_estimates_settle_with_the_size_of_the_design(computed: Project) -> None:
-    grown = table(computed, "sobol", "convergence")
+def test_estimates_settle_with_the_size_of_the_design(computed: Computed) -> None:
+    grown = computed["sobol"]["convergence"]
     x2 = grown[(grown["factor"] == "load_point_y") & (grown["index"] == "S1")]
     width = (x2["ci_high"] - x2["ci_low"]).to_numpy()
     order = x2["runs"].to_numpy().argsort()

@@ -1,12 +1,16 @@
-"""A study of tracked motions from beginning to end, and what is computed again."""
+"""A study of tracked motions: the files of OpenSim that a run makes, and what is computed again.
+
+What would be caught: a trial or an approach whose motion is not exported, motions of one person
+on which another's results hang, what is drawn that recomputes what is not.
+"""
 
 from pathlib import Path
 
 import pytest
-from small_project import Project, Shared, copy_project
-from tracked_cohort import NAME, known_truth, project, two_persons
-
-from spinepipe.studies.tracking.kind import KIND
+from small_project import Project
+from tracked_cohort import NAME, known_truth, two_persons
+from tracked_cohort import project as write_project
+from tracked_study import Run
 
 pytestmark = pytest.mark.slow
 
@@ -16,76 +20,46 @@ intervals: 10
 profiles: {intervals: 10, ratios: [1]}
 trade_off: [1]
 """
-RESULTS = "small/"
-JOB = f"{RESULTS}jobs/specimen=b/trial=stance/approach=optk_generic/fits.parquet"
-MOTION = f"{RESULTS}opensim/a/flexion_extension/optk_generic.mot"
 
 
-def build(folder: Path) -> Project:
-    made = copy_project(folder)
-    project(folder, STUDY, two_persons, known_truth)
-    made.run()
-    return made
-
-
-@pytest.fixture
-def computed(shared: Shared) -> Project:
-    """A project whose study has been computed; built once and not to be changed."""
-    return shared.project("tracking", build)
-
-
-@pytest.fixture
-def tracked(computed: Project, tmp_path: Path) -> Project:
-    """The same, for one test to change."""
-    return computed.copy(tmp_path / "project")
-
-
-def jobs(files: set[str]) -> set[str]:
-    return {name for name in files if name.startswith(f"{RESULTS}jobs/")}
-
-
-def test_a_run_makes_tables_motions_and_a_report(computed: Project) -> None:
-    files = set(computed.files())
-    assert {f"{RESULTS}{table.name}.parquet" for table in KIND.tables} <= files
+def test_a_run_exports_every_motion(eight: Project) -> None:
+    files = set(eight.files())
     motions = {name for name in files if name.endswith(".mot")}
-    assert len(motions) == 2 * 3 * 3
-    assert MOTION in motions
-    assert {f"{RESULTS}opensim/{name}.osim" for name in "ab"} <= files
-    assert f"{RESULTS}report.html" in files
-    assert computed.planned() == set()
+    assert len(motions) == 3 * 2  # trials, approaches
+    assert "tracking/opensim/a/flexion_extension/optk_generic.mot" in motions
+    assert "tracking/opensim/a.osim" in files
 
 
-def test_a_lost_job_file_is_computed_again_alone(tracked: Project) -> None:
-    """With the other files of the same job."""
-    tracked.path(f"results/{JOB}").unlink()
-    folder = JOB.removesuffix("fits.parquet")
-    of_job = {f"{folder}{name}.parquet" for name in ("tracked", "fits", "drawn")}
-    assert jobs(tracked.planned()) == of_job
+def marks(root: Path) -> dict[str, str]:
+    """What is expected of all job files."""
+    run = Run(root)
+    tables = run.files.made_of_jobs
+    return {
+        f"{table} {file}": run.expected.of_part(table, str(file))
+        for table in tables
+        for _, file in run.jobs_of(table)
+    }
 
 
-def test_a_lost_motion_is_written_again_alone(tracked: Project) -> None:
-    before = tracked.contents()
-    tracked.path(f"results/{MOTION}").unlink()
-    assert tracked.rerun() == {MOTION}
-    assert tracked.contents() == before
-
-
-def test_changed_motion_computes_that_person_again(tracked: Project) -> None:
+def test_changed_motion_computes_that_person_again(tmp_path: Path) -> None:
     """One marker of b moved by a micrometre in one frame of flexion."""
-    path = tracked.path(f"config/cohorts/{NAME}/b_flexion_extension.trc")
+    write_project(tmp_path, STUDY, two_persons, known_truth)
+    before = marks(tmp_path)
+    path = tmp_path / f"config/cohorts/{NAME}/b_flexion_extension.trc"
     lines = path.read_text().splitlines()
     cells = lines[-1].split("\t")
     cells[2] = f"{float(cells[2]) + 0.001:.4f}"
     path.write_text("\n".join([*lines[:-1], "\t".join(cells)]) + "\n")
-    planned = tracked.planned()
-    of_b = {name for name in jobs(set(tracked.files())) if "specimen=b/" in name}
-    assert jobs(planned) == of_b
-    exported = {name for name in planned if "/opensim/" in name}
-    assert exported == {name for name in tracked.files() if "/opensim/b" in name}
+    after = marks(tmp_path)
+    again = {name for name in before if before[name] != after[name]}
+    assert again == {name for name in before if "specimen=b/" in name}
 
 
-def test_another_choice_of_what_is_drawn_tracks_anew_and_nothing_else(tracked: Project) -> None:
-    study = "config/studies/small.yaml"
-    tracked.edit(study, "intervals: 10\n", "intervals: 10\ndrawn_approaches: [optk_generic]\n")
-    names = {name.rsplit("/", 1)[1] for name in jobs(tracked.planned())}
-    assert names == {"tracked.parquet", "fits.parquet", "drawn.parquet"}
+def test_another_choice_of_what_is_drawn_tracks_anew_and_nothing_else(tmp_path: Path) -> None:
+    write_project(tmp_path, STUDY, known_truth)
+    before = marks(tmp_path)
+    study = tmp_path / "config/studies/small.yaml"
+    study.write_text(study.read_text() + "drawn_approaches: [optk_generic]\n")
+    after = marks(tmp_path)
+    again = {name.split()[0] for name in before if before[name] != after[name]}
+    assert again == {"tracked", "fits", "drawn"}

@@ -23,7 +23,7 @@ import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 from small_project import Project
-from small_studies import SMALL
+from small_studies import of_kind
 
 from spinepipe.files import is_temporary
 from spinepipe.marks import CONTENT
@@ -155,7 +155,7 @@ class Disturbed:
 
 def row(kind: str, folder: Path, kills: int = KILLS, seed: int = 0) -> Row:
     """Kill the small study of that kind so often; what came of it."""
-    reference = SMALL[kind](folder / "reference")
+    reference = of_kind(kind, folder / "reference")
     whole = timed(reference)
     assert whole.code == 0, whole.said
     wanted = digests(reference)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -70,11 +70,11 @@ class Gap:
 
     def _noncentrality(self, share: float) -> float:
         """Noncentrality at which chi2 or less has that probability; 0 where none has."""
-        if self.dof <= 0.0 or ncx2.cdf(self.chi2, self.dof, 1e-12) <= share:
+        if self.dof <= 0.0 or chndtr(self.chi2, self.dof, 1e-12) <= share:
             return 0.0
         most = 2.0 * self.chi2 + 100.0
         found: float = brentq(
-            lambda size: ncx2.cdf(self.chi2, self.dof, size) - share, 1e-12, most, xtol=1e-12
+            lambda size: chndtr(self.chi2, self.dof, size) - share, 1e-12, most, xtol=1e-12
         )
         return found
 

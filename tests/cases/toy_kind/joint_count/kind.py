@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from spinepipe.studies.joint_count.settings import JointCount
-from spinepipe.studies.joint_count.tables import JOINTS, TOTALS
+from spinepipe.studies.joint_count.tables import JOINTS, SHARES, TOTALS
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
@@ -15,6 +15,7 @@ class JointCountFiles(StudyFiles):
     """The result files of one study."""
 
     joined = ("joints",)
+    full = ("shares",)
     drawings = (Figure("joint_bars", "Joints", "figures.bars:bars_figure", ("joints",)),)
 
     study: JointCount
@@ -27,7 +28,7 @@ class JointCountFiles(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """All tables."""
-        return ("joints", "totals")
+        return ("joints", "totals", "shares")
 
     @property
     def by_specimen(self) -> tuple[str, ...]:
@@ -43,9 +44,10 @@ KIND = Kind(
     settings=JointCount,
     files=JointCountFiles,
     checks=(),
-    tables=(JOINTS, TOTALS),
+    tables=(JOINTS, TOTALS, SHARES),
     jobs=(
         Job("count", ignores=ignoring("shown")),
         Job("totals", "totals", ("joints",), ("totals",), ignoring("shown")),
+        Job("shares", "shares", ("joints",), ("shares",), ignoring("shown")),
     ),
 )

@@ -13,3 +13,10 @@ JOINTS = Table(
 TOTALS = Table(
     "totals", "One row.", ("joints",), (Column("joints", "integer", "joints of all", low=1),)
 )
+
+SHARES = Table(
+    "shares",
+    "One row per specimen.",
+    ("specimen",),
+    (SPECIMEN, Column("share", "number", "of all joints", "1", low=0, high=1)),
+)

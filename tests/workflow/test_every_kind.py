@@ -1,0 +1,114 @@
+"""One run of a small study of each kind makes all that the kind declares, and nothing else.
+
+What would be caught: a rule or a job that makes other tables, columns, types or figures than are
+declared, tables that do not say what they were made of, numbers that are none, a page that lacks
+figures or fetches something, logs of jobs that went well, `full` that makes again what `all` has
+made. That results say nothing of the machine
+is asked when the project is built (`small_project.Shared`).
+"""
+
+import re
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from made_pages import SVG
+from small_project import Project
+from small_studies import SMALL
+
+from spinepipe.jobs.report import results_of
+from spinepipe.report.page.document import Picture
+from spinepipe.studies.read import check
+from spinepipe.studies.registry import PACKAGE, files_of, kind_of
+from spinepipe.studies.study_files import StudyFiles
+
+pytestmark = pytest.mark.slow
+
+MAKERS = {b"seed", b"code_digest", b"config_digest", b"data_digest", b"result_digest"}
+FETCHES = re.compile(r"""<(script|link|img|iframe)[^>]+(src|href)=["'](https?:)?//""")
+
+
+def layout(project: Project, kind: str) -> StudyFiles:
+    return files_of(*check(project.folder, kind))
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_tables_are_as_declared_and_name_their_makers(eight: Project, kind: str) -> None:
+    look_at_tables(eight, kind, full=False)
+
+
+def look_at_tables(project: Project, kind: str, full: bool) -> None:
+    tables = layout(project, kind).tables_of(full)
+    assert tables
+    for name in tables:
+        found = pq.read_table(project.path(f"{layout(project, kind).folder}/{name}.parquet"))
+        assert found.schema.remove_metadata() == kind_of(kind).table(name).schema, name
+        assert set(found.schema.metadata) >= MAKERS, name
+        for column, values in zip(found.column_names, found.columns, strict=True):
+            if str(values.type) == "double":
+                assert np.isfinite(values.drop_null().to_numpy()).all(), (name, column)
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_a_page_is_written_from_the_tables_of_all(eight: Project, kind: str) -> None:
+    """All that it reads is there without those of `full`; its figures are left empty."""
+    files, (study, cohort) = layout(eight, kind), check(eight.folder, kind)
+    module = import_module(f"{PACKAGE}.{kind}.page")
+    titles = {one.name: one.title for one in kind_of(kind).figures}
+    tables = [str(eight.path(name)) for name in files.table_files(files.tables, full=False)]
+    others = files.other_files(files.told_in_report)
+    others = {name: str(eight.path(path)) for name, path in others.items()}
+    results = results_of(module.READ, titles, tables, [], [], others)
+    drawn = files.figures(full=False)
+    pictures = {name: Picture.of(name, titles[name], SVG, "Words.") for name in drawn}
+    document = module.document(study, cohort, replace(results, pictures=pictures))
+    look_at_page(document.html(study, cohort), files, full=False)
+    assert document.findings
+
+
+def look_at_page(page: str, files: StudyFiles, full: bool) -> None:
+    for name in files.figures(full):
+        assert f'id="figure-{name}"' in page, name
+    assert "default-src 'none'" in page
+    assert not FETCHES.search(page)
+
+
+def look_at_results(project: Project, kind: str, full: bool) -> None:
+    files = layout(project, kind)
+    assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
+    assert not list(project.path(f"results/{kind}").rglob("*.log"))
+    page = project.path(f"{files.folder}/report.html").read_text()
+    look_at_page(page, files, full=False)
+    if files.adds:
+        assert "`make full` makes them" in page
+
+
+def test_a_study_that_is_all_computed_is_whole(eight: Project) -> None:
+    look_at_results(eight, "range_of_motion", full=False)
+
+
+def test_full_remakes_nothing_of_all(eight: Project, tmp_path: Path) -> None:
+    project = eight.copy(tmp_path / "project")
+    before, planned = set(project.files()), project.planned("full")
+    assert not planned & before
+    for kind in SMALL:
+        whole = {name.removeprefix("results/") for name in layout(project, kind).results(full=True)}
+        assert whole - before <= planned
+
+
+@pytest.mark.full
+def test_full_makes_all_tables_and_all_after_it_has_nothing_to_do(
+    eight: Project, tmp_path: Path
+) -> None:
+    project = eight.copy(tmp_path / "project")
+    project.run("all")
+    before = project.files()
+    again = project.rerun("full")
+    assert not again & set(before)
+    assert project.planned("all") == set()
+    for kind in SMALL:
+        look_at_tables(project, kind, full=True)
+        look_at_results(project, kind, full=True)
