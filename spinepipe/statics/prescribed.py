@@ -11,25 +11,31 @@ tangents of both. A law may be infinite beyond its ends: a step that leaves them
 
 Where no pose has all that is wanted, the pose is taken that misses it least: the holder is given a
 compliance, W^2 e, which is let go to nothing (W: 1 mm, 1 deg).
+
+Newton asks for one step at a time. Whoever holds many chains may answer many such questions at once
+(`newton_steps`, `calibrate.lockstep`); what is answered does not hang on what stands beside it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.decomposition import eigh, svd
-from spinepipe.effects.contract import Array
+from spinepipe.effects import JointLaw, Kind
+from spinepipe.effects.contract import Array, Indices
+from spinepipe.model import SpineModel
 from spinepipe.statics.equilibrium import (
     FIRST_INCREMENT,
     LARGEST_ROTATION,
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
-from spinepipe.statics.motion import ChainMotion, cross_matrix
-from spinepipe.statics.system import System
+from spinepipe.statics.holding import NO_STATES, ActiveLaw, Holding, hold
+from spinepipe.statics.many.survey import Plain, compiled, placed
+from spinepipe.statics.placement import Placed
 from spinepipe.status import Ended
 
 Flags = NDArray[np.bool_]
@@ -54,25 +60,10 @@ REACHED = 0.1
 UNREACHABLE = "no pose has all that is prescribed"
 UNSTABLE = "the spine buckles out of what is prescribed"
 
-
-class Prescription(Protocol):
-    """A number that the pose decides, and its derivatives."""
-
-    @property
-    def unit(self) -> float:
-        """Size of a miss by which others are told: m or rad."""
-
-    def value(self, motion: ChainMotion) -> float:
-        """The number, m or rad."""
-
-    def slope(self, motion: ChainMotion) -> Array:
-        """(n,) its derivative by the coordinates."""
-
-    def bend(self, motion: ChainMotion) -> Array:
-        """(n, n) its second derivative."""
+_NOTHING = np.empty(0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Place:
     """How far a vertebra's point lies along a direction, m.
 
@@ -86,19 +77,15 @@ class Place:
     direction: Array
 
     unit = 1e-3
+    is_tilt = False
 
-    def value(self, motion: ChainMotion) -> float:
-        return float(self.direction @ motion.displacement(self.body).apply(self.point))
-
-    def slope(self, motion: ChainMotion) -> Array:
-        found: Array = motion.velocities(self.body, self.point) @ self.direction
-        return found
-
-    def bend(self, motion: ChainMotion) -> Array:
-        return motion.wrench(self.body, self.point, self.direction, np.zeros(3)).tangent
+    @property
+    def vectors(self) -> Array:
+        """(3, 3) of which the last row means nothing."""
+        return np.array([self.point, self.direction, self.direction])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tilt:
     """Angle in a plane between a vertebra's line and a direction, rad.
 
@@ -114,44 +101,192 @@ class Tilt:
     aside: Array
 
     unit = float(np.deg2rad(1.0))
+    is_tilt = True
 
-    def value(self, motion: ChainMotion) -> float:
-        line = self._now(motion)
-        return float(np.arctan2(line @ self.aside, line @ self.up))
+    @property
+    def vectors(self) -> Array:
+        """(3, 3) line, up and aside."""
+        return np.array([self.line, self.up, self.aside])
 
-    def slope(self, motion: ChainMotion) -> Array:
-        line = self._now(motion)
-        found: Array = motion.angular(self.body) @ (cross_matrix(line) @ self._gradient(line))
-        return found
 
-    def bend(self, motion: ChainMotion) -> Array:
-        line, angular = self._now(motion), motion.angular(self.body)
-        of_line, gradient = cross_matrix(line), self._gradient(line)
-        moment = of_line @ gradient
-        turned = motion.wrench(self.body, np.zeros(3), np.zeros(3), moment).tangent
-        change = angular @ of_line  # of the line, by each coordinate
-        by_change = change @ cross_matrix(gradient) + self._bent(line, change) @ of_line.T
-        found: Array = turned + angular @ by_change.T
-        return found
+Prescription = Place | Tilt
+"""A number that the pose decides; ``unit``, m or rad, is a miss by which others are told."""
 
-    def _now(self, motion: ChainMotion) -> Array:
-        found: Array = motion.displacement(self.body).rotation @ self.line
-        return found
 
-    def _gradient(self, line: Array) -> Array:
-        """(3,) derivative of the angle by the line."""
-        up, aside = line @ self.up, line @ self.aside
-        found: Array = (up * self.aside - aside * self.up) / (up**2 + aside**2)
-        return found
+@compiled
+def _add_cross(a: Array, b: Array, factor: float, out: Array) -> None:
+    """Add a x b times a factor to out, (3,) each."""
+    out[0] += factor * (a[1] * b[2] - a[2] * b[1])
+    out[1] += factor * (a[2] * b[0] - a[0] * b[2])
+    out[2] += factor * (a[0] * b[1] - a[1] * b[0])
 
-    def _bent(self, line: Array, changes: Array) -> Array:
-        """(n, 3) change of the gradient with changes (n, 3) of the line."""
-        up, aside = line @ self.up, line @ self.aside
-        by_up, by_aside = (changes @ self.up)[:, None], (changes @ self.aside)[:, None]
-        square = up**2 + aside**2
-        shrink = 2.0 * (up * by_up + aside * by_aside) / square * self._gradient(line)
-        found: Array = (by_up * self.aside - by_aside * self.up) / square - shrink
-        return found
+
+@compiled
+def _pull(
+    is_tilt: bool, vectors: Array, turned: Array, shifted: Array, wrench: Array, by_twist: Array
+) -> float:
+    """Value of a prescription; its wrench (6,) on the vertebra and the slope (3, 6) of that.
+
+    The work of the wrench, moment about the origin of ground and force, is what the value grows by.
+    By the vertebra's twist (angular, linear) only the moment changes.
+    """
+    now, arm = np.empty(3), np.zeros(3)
+    for r in range(3):
+        now[r] = 0.0 if is_tilt else shifted[r]
+        for c in range(3):
+            now[r] += turned[r, c] * vectors[0, c]
+    wrench[:] = 0.0
+    by_twist[:] = 0.0
+    first, second = 0.0, 0.0
+    for r in range(3):
+        first += now[r] * vectors[1, r]
+        second += now[r] * vectors[2, r]
+    if not is_tilt:
+        force = vectors[1]
+        _add_cross(now, force, 1.0, wrench[:3])
+        for r in range(3):
+            wrench[3 + r] = force[r]
+            by_twist[r, r] -= first  # (w x now) x force = now (force . w) - w (force . now)
+            for c in range(3):
+                by_twist[r, c] += now[r] * force[c]
+            arm[:] = 0.0
+            arm[r] = 1.0
+            _add_cross(arm, force, 1.0, by_twist[:, 3 + r])
+        return first
+    square = first * first + second * second
+    gradient, moved, bent = np.empty(3), np.empty(3), np.empty(3)
+    for r in range(3):  # of the angle by the line
+        gradient[r] = (first * vectors[2, r] - second * vectors[1, r]) / square
+    _add_cross(now, gradient, 1.0, wrench[:3])
+    mixed, twice = second * second - first * first, 2.0 * first * second
+    for k in range(3):  # turning about axis k moves the line, and the gradient with it
+        arm[:] = 0.0
+        arm[k] = 1.0
+        moved[:] = 0.0
+        _add_cross(arm, now, 1.0, moved)
+        along, aside = 0.0, 0.0
+        for r in range(3):
+            along += moved[r] * vectors[1, r]
+            aside += moved[r] * vectors[2, r]
+        for r in range(3):
+            to_up, to_aside = twice * along + mixed * aside, mixed * along - twice * aside
+            bent[r] = (to_up * vectors[1, r] + to_aside * vectors[2, r]) / (square * square)
+        _add_cross(moved, gradient, 1.0, by_twist[:, k])
+        _add_cross(now, bent, 1.0, by_twist[:, k])
+    return np.arctan2(second, first)
+
+
+@compiled
+def _assemble(motion: Plain, asked: Plain, pushes: Array, held: Plain, found: Plain) -> None:
+    """Fill what is missing (N, f + k) and its derivative (N, f + k, f + k).
+
+    Of the last k rows only what is prescribed, as it is: neither what is wanted nor compliances.
+
+    An axis changes by ad(t) s, t the twist of each coordinate below it, s its own (Featherstone
+    2008, doi 10.1007/978-1-4899-7560-7); a second derivative is symmetric, its lower half is taken.
+    """
+    every_axes, every_turned, every_shifted = motion
+    is_tilt, bodies, every_vectors, free = asked
+    missings, matrices = found
+    loads, tangents = held
+    count, wrench, by_twist = len(free), np.empty(6), np.empty((3, 6))
+    own, turning, row = np.empty((count, 6)), np.empty((count, 6)), np.empty(6)
+    for n in range(len(matrices)):
+        axes, matrix, missing = every_axes[n], matrices[n], missings[n]
+        matrix[:] = 0.0
+        for i in range(count):
+            missing[i] = loads[n, free[i]]
+        own[:] = 0.0
+        turning[:] = 0.0
+        for p in range(len(bodies)):
+            b, push = bodies[p], pushes[n, p]
+            missing[count + p] = _pull(
+                is_tilt[p],
+                every_vectors[n, p],
+                every_turned[n, b],
+                every_shifted[n, b],
+                wrench,
+                by_twist,
+            )
+            for i in range(count):
+                if free[i] // 6 > b:
+                    continue
+                s = axes[free[i] // 6, free[i] % 6]
+                row[:] = 0.0
+                _add_cross(s[:3], wrench[:3], 1.0, row[:3])
+                _add_cross(s[3:], wrench[3:], 1.0, row[:3])
+                _add_cross(s[:3], wrench[3:], 1.0, row[3:])
+                work = 0.0
+                for c in range(6):
+                    work += s[c] * wrench[c]
+                    turning[i, c] += push * row[c]
+                    for r in range(3):
+                        own[i, c] += push * s[r] * by_twist[r, c]
+                matrix[count + p, i], matrix[i, count + p] = work, -work
+                missing[i] -= push * work
+        for i in range(count):
+            joint, at = free[i] // 6, free[i] % 6
+            for j in range(i + 1):
+                lower = free[j] // 6
+                other = axes[lower, free[j] % 6]
+                bend = 0.0
+                for c in range(6):
+                    bend += (own[i, c] + (turning[i, c] if j < i else 0.0)) * other[c]
+                matrix[i, j] = matrix[j, i] = -bend
+                if lower == joint:
+                    matrix[i, j] += tangents[n, joint, at, free[j] % 6]
+                    if j < i:
+                        matrix[j, i] += tangents[n, joint, free[j] % 6, at]
+
+
+class HeldChain:
+    """An unloaded, weightless chain on joint laws, and what is prescribed of its poses.
+
+    Attributes
+    ----------
+    free : (n,) coordinates that may move; the others stay zero.
+    values : (R, P) of each law, as of the model's effects.
+    frames : (J, 3, 3) and (J, 3) m. vectors : (k, 3, 3) of the prescriptions. units : (k,) m or rad.
+    asked : (k,) which prescriptions are tilts, and their bodies; (f,) free coordinates.
+    """
+
+    def __init__(
+        self, model: SpineModel, prescriptions: tuple[Prescription, ...], free: Flags
+    ) -> None:
+        if any(scoped.effect.kind is not Kind.JOINT_LAW for scoped in model.effects):
+            raise ValueError("a chain is held in place on joint laws alone")
+        self.effects, self.free, self.prescriptions = model.effects, free, prescriptions
+        self.values = tuple(scoped.values for scoped in model.effects)
+        self.frames = (
+            np.array([frame.rotation for frame in model.frames]),
+            np.array([frame.origin for frame in model.frames]),
+        )
+        self.vectors = np.array([one.vectors for one in prescriptions])
+        self.units = np.array([one.unit for one in prescriptions])
+        self.asked = (
+            np.array([one.is_tilt for one in prescriptions]),
+            np.array([one.body for one in prescriptions]),
+            np.flatnonzero(free),
+        )
+
+    def with_values(self, values: Sequence[Array]) -> "HeldChain":
+        """The same with other values of the laws."""
+        other = copy(self)
+        other.values = tuple(values)
+        return other
+
+    def motion(self, q: Array) -> tuple[Array, Array, Array]:
+        """(J, 6, 6) axes and displacements of vertebrae at q (n,), as of `statics.many.Survey`."""
+        rotations, origins = self.frames
+        axes, turned, shifted = placed(rotations[None], origins[None], q.reshape(1, -1, 6))
+        return axes[0], turned[0], shifted[0]
+
+    def reached(self, q: Array) -> Array:
+        """(k,) m and rad, what is prescribed as it is at q (n,)."""
+        (_, turned, shifted), (tilts, bodies, _) = self.motion(q), self.asked
+        wrench, by_twist = np.empty(6), np.empty((3, 6))
+        each = zip(tilts, bodies, self.vectors, strict=True)
+        return np.array([_pull(t, v, turned[b], shifted[b], wrench, by_twist) for t, b, v in each])
 
 
 @dataclass(frozen=True)
@@ -204,23 +339,105 @@ class Answers:
         return q, found[count:]
 
 
+class Trial(NamedTuple):
+    """A pose q (n,) and pushes (k,) of a chain, where one of Newton's steps is asked for.
+
+    Attributes
+    ----------
+    wanted : (k,) m and rad, value of each prescription. compliance : of the holder.
+    """
+
+    chain: HeldChain
+    q: Array
+    pushes: Array
+    wanted: Array
+    compliance: float
+
+
+class NewtonStep(NamedTuple):
+    """Change (f + k,) of the free coordinates and the pushes, NaN where the equations have none.
+
+    Attributes
+    ----------
+    matrix : (f + k, f + k) derivative of the equations.
+    """
+
+    step: Array
+    matrix: Array
+
+
+Ask = Callable[[Trial], NewtonStep | None]
+"""One of Newton's steps; None beyond the ends of a law."""
+
+
+def newton_steps(trials: Sequence[Trial]) -> list[NewtonStep | None]:
+    """Newton's steps from N poses of chains that differ in numbers alone, at once."""
+    chains = [one.chain for one in trials]
+    first, (tilts, bodies, free) = chains[0], chains[0].asked
+    q, pushes, wanted = (np.array([one[at] for one in trials]) for at in (1, 2, 3))
+    rotations, origins = (np.array([one.frames[at] for one in chains]) for at in (0, 1))
+    motion, held = placed(rotations, origins, q.reshape(len(q), -1, 6)), _held(chains, q)
+    asked = (tilts, bodies, np.array([one.vectors for one in chains]), free)
+    load, tangent = held.load.reshape(q.shape), held.tangent.reshape(len(q), -1, 6, 6)
+    count, size = len(free), len(free) + len(bodies)
+    missing, matrix = np.empty((len(q), size)), np.empty((len(q), size, size))
+    _assemble(motion, asked, pushes, (load, tangent), (missing, matrix))
+    given = np.array([one.compliance for one in trials])[:, None] * first.units**2
+    missing[:, count:] += given * pushes - wanted
+    matrix[:, range(count, size), range(count, size)] = given
+    inside = np.isfinite(load).all(axis=1)
+    matrix[~inside], missing[~inside] = np.eye(size), 0.0  # have no step
+    steps = _solved(matrix, -missing)
+    found = map(NewtonStep, steps, matrix)
+    return [one if there else None for one, there in zip(found, inside, strict=True)]
+
+
+def _held(chains: Sequence[HeldChain], q: Array) -> Holding:
+    """What the joints of all chains hold at q (N, n)."""
+    joints, laws = q.shape[1] // 6, []
+    for number, scoped in enumerate(chains[0].effects):
+        own = np.array(scoped.joints)
+        at = (joints * np.arange(len(chains))[:, None] + own).ravel()
+        values = np.concatenate([chain.values[number] for chain in chains])
+        if not scoped.effect.per_joint:
+            values = np.repeat(values, len(own), axis=0)
+        laws.append(ActiveLaw(cast(JointLaw, scoped.effect), number, at, values, True))
+    return hold(Placed(q.reshape(-1, 6), _NOTHING, _NOTHING, {}), laws, NO_STATES, moved=False)
+
+
+def _solved(matrices: Array, right: Array) -> Array:
+    """(N, m) solutions of matrices (N, m, m), NaN of singular ones."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, right[..., None]), dtype=np.float64)[..., 0]
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full(right.shape, np.nan)
+        each = zip(matrices, right, strict=True)
+        return np.concatenate([_solved(one[None], other[None]) for one, other in each])
+
+
+def answered(asked: Sequence[tuple[int, Trial]]) -> list[NewtonStep | None]:
+    """The steps of searches that advance in lockstep (`calibrate.lockstep`)."""
+    return newton_steps([trial for _, trial in asked])
+
+
+def alone(trial: Trial) -> NewtonStep | None:
+    """The step of one chain."""
+    return newton_steps([trial])[0]
+
+
 def hold_at(
-    system: System,
-    prescriptions: Sequence[Prescription],
-    wanted: Array,
-    free: Flags,
-    start: Held | None = None,
+    chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone
 ) -> Held:
-    """The pose in which an unloaded, weightless chain is held.
+    """The pose in which a chain is held.
 
     Parameters
     ----------
     wanted : (k,) m and rad, value of each prescription.
-    free : (n,) coordinates that may move; the others stay zero.
     start : a pose near by, with its pushes; the neutral pose without.
     """
-    problem = _Problem(system, tuple(prescriptions), free)
-    rest = Held(np.zeros(len(free)), np.zeros(len(wanted)), wanted, Ended.CONVERGED, "", 0)
+    problem = _Problem(chain, ask)
+    rest = Held(np.zeros(len(chain.free)), np.zeros(len(wanted)), wanted, Ended.CONVERGED, "", 0)
     for near in filter(None, (start, rest)):
         found = problem.newton(near, wanted, 0.0)
         if found is not None and found.status is Ended.CONVERGED:
@@ -231,44 +448,30 @@ def hold_at(
 class _Problem:
     """The equations of a held chain."""
 
-    def __init__(
-        self, system: System, prescriptions: tuple[Prescription, ...], free: Flags
-    ) -> None:
-        self.system, self.prescriptions, self.free = system, prescriptions, free
-        self.count = int(free.sum())
-        self.loading, self.states = system.slots.unloaded(), system.initial_states()
-        self.tolerance = np.tile(STEP_TOLERANCE, len(free) // 6)[free]
-        self.units = np.array([one.unit for one in prescriptions])
-
-    def values(self, q: Array) -> Array:
-        """(k,) of the prescriptions at q."""
-        return self._values(ChainMotion(self.system.chain, q))
-
-    def _values(self, motion: ChainMotion) -> Array:
-        return np.array([one.value(motion) for one in self.prescriptions])
+    def __init__(self, chain: HeldChain, ask: Ask) -> None:
+        self.chain, self.free, self.ask = chain, chain.free, ask
+        self.count = int(chain.free.sum())
+        self.tolerance = np.tile(STEP_TOLERANCE, len(chain.free) // 6)[chain.free]
+        self.units = chain.units
 
     def newton(self, start: Held, wanted: Array, compliance: float) -> Held | None:
         """From a pose near by; None where the steps lead nowhere."""
         q, pushes = start.q.copy(), start.pushes.copy()
         step = np.zeros(self.count + len(wanted))
         for iteration in range(1, MOST_ITERATIONS + 1):
-            equations = self._equations(q, pushes, wanted, compliance)
-            if equations is None:  # beyond the ends of a law
-                step *= 0.5
+            found = self.ask(Trial(self.chain, q, pushes, wanted, compliance))
+            if found is None:  # beyond the ends of a law
+                step = 0.5 * step
                 q[self.free] -= step[: self.count]
                 pushes -= step[self.count :]
                 continue
-            missing, matrix = equations
-            try:
-                step = np.asarray(np.linalg.solve(matrix, -missing), dtype=np.float64)
-            except np.linalg.LinAlgError:
-                return None
+            step = found.step
             q[self.free] += step[: self.count]
             pushes += step[self.count :]
             if not np.abs(q.reshape(-1, 6)[:, 3:]).max() < LARGEST_ROTATION:
                 return None
             if self._arrived(step, pushes):
-                return self._ended(q, pushes, wanted, matrix, iteration)
+                return self._ended(q, pushes, wanted, found.matrix, iteration)
         return None
 
     def _arrived(self, step: Array, pushes: Array) -> bool:
@@ -277,35 +480,10 @@ class _Problem:
         near = float(np.abs(pushed).max(initial=0.0)) < PUSH_TOLERANCE * largest
         return near and bool((np.abs(moved) < self.tolerance).all())
 
-    def _equations(
-        self, q: Array, pushes: Array, wanted: Array, compliance: float
-    ) -> tuple[Array, Array] | None:
-        """What is missing (f + k,) and its derivative; None beyond the ends of a law."""
-        balance = self.system.balance(q, self.loading, self.states)
-        if not np.isfinite(balance.residual).all():
-            return None
-        motion, free = ChainMotion(self.system.chain, q), self.free
-        slopes = np.array([one.slope(motion) for one in self.prescriptions])[:, free]
-        values = self._values(motion)
-        tangent = balance.tangent.copy()
-        for push, one in zip(pushes, self.prescriptions, strict=True):
-            tangent -= push * one.bend(motion)
-        matrix = np.zeros((self.count + len(wanted),) * 2)
-        matrix[: self.count, : self.count] = tangent[np.ix_(free, free)]
-        matrix[: self.count, self.count :] = -slopes.T
-        matrix[self.count :, : self.count] = slopes
-        given = compliance * self.units**2
-        matrix[self.count :, self.count :] = np.diag(given)
-        missing = [
-            balance.residual[free] - pushes @ slopes,
-            values - wanted + given * pushes,
-        ]
-        return np.concatenate(missing), matrix
-
     def _ended(
         self, q: Array, pushes: Array, wanted: Array, matrix: Array, iterations: int
     ) -> Held:
-        missed = wanted - self.values(q)
+        missed = wanted - self.chain.reached(q)
         answers = Answers(matrix, self.free)
         if self._stands(matrix):
             return Held(q, pushes, missed, Ended.CONVERGED, "", iterations, answers)
@@ -313,20 +491,22 @@ class _Problem:
 
     def _stands(self, matrix: Array) -> bool:
         """Whether the work grows along all that the prescriptions leave open."""
-        tangent, slopes = matrix[: self.count, : self.count], matrix[self.count :, : self.count]
+        tangent, by_q = matrix[: self.count, : self.count], matrix[self.count :, : self.count]
         given = np.diagonal(matrix)[self.count :]
         if given.any():
-            work = tangent + slopes.T @ (slopes / given[:, None])
+            work = tangent + by_q.T @ (by_q / given[:, None])
         else:
-            _, _, shut = svd(slopes)  # orthonormal ways that the prescriptions shut
-            left_open = np.eye(self.count) - shut.T @ shut
-            work = left_open @ tangent @ left_open + np.linalg.norm(tangent) * shut.T @ shut
-        sizes, _ = eigh(0.5 * (work + work.T))
-        return bool(sizes[0] > 0.0)
+            left_open = np.linalg.qr(by_q.T, mode="complete").Q[:, len(by_q) :]
+            work = left_open.T @ tangent @ left_open
+        try:
+            np.linalg.cholesky(0.5 * (work + work.T))
+        except np.linalg.LinAlgError:
+            return False
+        return True
 
     def led(self, rest: Held, wanted: Array) -> Held:
         """What is wanted in fractions, from the neutral pose; the nearest where the way ends."""
-        first, last = self.values(rest.q), rest
+        first, last = self.chain.reached(rest.q), rest
         reached, increment = 0.0, FIRST_INCREMENT
         while reached < 1.0:
             target = min(1.0, reached + increment)
@@ -344,7 +524,7 @@ class _Problem:
         near = self.nearest(rest, wanted)
         if np.abs(near.missed / self.units).max() > REACHED:
             return near
-        left = wanted - self.values(last.q)
+        left = wanted - self.chain.reached(last.q)
         return replace(last, missed=left, status=Ended.UNSTABLE, message=UNSTABLE)
 
     def nearest(self, rest: Held, wanted: Array) -> Held:
@@ -359,7 +539,7 @@ class _Problem:
                 break
             missed = found.missed
         if last is rest:
-            pushes, missed = rest.pushes, wanted - self.values(rest.q)
+            pushes, missed = rest.pushes, wanted - self.chain.reached(rest.q)
             return Held(rest.q, pushes, missed, Ended.NOT_CONVERGED, UNREACHABLE, 0)
         pose = (last.q, last.pushes, last.missed)
         return Held(*pose, Ended.UNREACHABLE, UNREACHABLE, last.iterations, last.answers)

@@ -368,3 +368,24 @@ def survey(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Survey:
     axes, applied, rows, blocks, slopes, turned, shifted = numbers
     fixed = loads.supports.fixed
     return Survey(axes, applied, rows, blocks, slopes, turned, shifted, fixed)
+
+
+@compiled
+def _place(
+    rotations: Array, origins: Array, q: Array, axes: Array, turned: Array, shifted: Array
+) -> None:
+    """Move every chain."""
+    for n in range(len(q)):
+        move(rotations[n], origins[n], q[n], axes[n], turned[n], shifted[n])
+
+
+def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Axes (N, J, 6, 6) and displacements of N chains at q (N, J, 6), as of `Survey`.
+
+    Parameters
+    ----------
+    rotations, origins : (N, J, 3, 3) and (N, J, 3) m, joint frames of each.
+    """
+    axes, turned, shifted = (np.empty((*q.shape[:2], *s)) for s in ((6, 6), (3, 3), (3,)))
+    _place(rotations, origins, q, axes, turned, shifted)
+    return axes, turned, shifted

@@ -14,7 +14,7 @@ import pandas as pd
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.scoliosis.errors import REFERENCE, by_patient, of_group, squares, whole
+from spinepipe.studies.scoliosis.errors import REFERENCE, mean_squares, of_group, squares
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, GROUPS, MEASURES
@@ -51,33 +51,37 @@ def accuracy_rows(
         "cobb": np.sqrt(READINGS_OF_AN_ANGLE) * sd[1],
         "ferguson": np.nan,
     }
+    about = {
+        model: _about(positions[positions["model"] == model])
+        for model in positions["model"].unique()
+    }
     for group in GROUPS:
         chosen = [of_group(one, group) for one in (positions, displacements, curves)]
         for measure, (unit, _) in MEASURES.items():
-            errors = squares(measure, *chosen)
+            of_patients = mean_squares(squares(measure, *chosen))
             rows = [
                 {
                     "films": group,
                     "measure": measure,
                     "model": model,
                     "unit": unit,
-                    **_pooled(errors[errors["model"] == model]),
+                    **_pooled(of_patients[of_patients["model"] == model]),
                     "reading_noise": _or_none(floors[measure]),
-                    **_about(positions[positions["model"] == model]),
+                    **about[model],
                 }
-                for model in positions["model"].unique()
+                for model in about
             ]
             yield from _with_reduction(rows)
 
 
-def _pooled(errors: pd.DataFrame) -> dict[str, Any]:
-    """Over the patients that have a pose on every film of the group."""
-    kept, own = whole(errors), by_patient(errors).to_numpy(float)
-    own = own[np.isfinite(own)]
+def _pooled(patients: pd.DataFrame) -> dict[str, Any]:
+    """Over the patients that have a pose on every film of the group, by their mean squares."""
+    square, n = patients["square"].to_numpy(float), patients["n"].to_numpy()
+    own = np.sqrt(square)
     return {
         "n_patients": len(own),
-        "n": len(kept),
-        "rmse": float(np.sqrt(kept["square"].mean())) if len(kept) else None,
+        "n": int(n.sum()),
+        "rmse": float(np.sqrt(square @ n / n.sum())) if len(own) else None,
         "mean_of_patients": float(own.mean()) if len(own) else None,
         "sd_of_patients": float(own.std(ddof=1)) if len(own) > 1 else None,
     }

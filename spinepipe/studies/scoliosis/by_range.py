@@ -14,7 +14,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.scoliosis.errors import REFERENCE, of_group, of_rotations, whole
+from spinepipe.studies.scoliosis.errors import REFERENCE, of_group, of_rotations
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables_of_errors import BEYOND, BY_RANGE, EVERY, GROUPS, RANGES
 from spinepipe.tables import from_rows, read_frames, write
@@ -40,7 +40,9 @@ def by_range_rows(displacements: pd.DataFrame) -> Iterator[dict[str, Any]]:
     )
     models = list(displacements["model"].unique())
     for group in GROUPS:
-        known = whole(of_group(errors, group))
+        known = of_group(errors, group)
+        posed = known["square"].notna().groupby([known["specimen"], known["model"]])
+        known = known[posed.transform("all")]  # patients that lack a pose on a film are left out
         for opposite, name in product((False, True), (*CLASSES, EVERY)):
             chosen = known[known["opposite"].astype(bool) == opposite]
             if name != EVERY:

@@ -37,10 +37,14 @@ def of_rotations(displacements: pd.DataFrame) -> "pd.Series[Any]":
     return error.astype(float)
 
 
-def whole(errors: pd.DataFrame) -> pd.DataFrame:
-    """The rows of each model's patients that have an error on every film."""
-    own = errors["square"].notna().groupby([errors["specimen"], errors["model"]])
-    return errors[own.transform("all")]
+def mean_squares(errors: pd.DataFrame) -> pd.DataFrame:
+    """Mean ``square`` and number ``n`` of errors of each ``specimen`` and ``model``.
+
+    Without patients that lack a pose on one of a model's films.
+    """
+    each = errors.groupby(["specimen", "model"], sort=False)["square"]
+    found = each.agg(square="mean", known="count", n="size").reset_index()
+    return found[found["known"] == found["n"]]
 
 
 def by_patient(errors: pd.DataFrame) -> pd.DataFrame:
@@ -48,7 +52,7 @@ def by_patient(errors: pd.DataFrame) -> pd.DataFrame:
 
     A patient without a pose on one of the films has none in that model.
     """
-    means = whole(errors).groupby(["specimen", "model"], sort=False)["square"].mean()
+    means = mean_squares(errors).set_index(["specimen", "model"])["square"]
     found: pd.DataFrame = np.sqrt(means).unstack("model")
     return found.reindex(index=errors["specimen"].unique(), columns=errors["model"].unique())
 

@@ -19,7 +19,7 @@ from spinepipe.calibrate.descent import Settled, descend, once
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Held
+from spinepipe.statics.prescribed import Ask, Held, alone
 from spinepipe.status import Ended
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
@@ -139,18 +139,20 @@ def by_numbers(numbers: Array, size: float) -> Array:
 
 
 class FilmFit:
-    """The films of one patient as a least squares problem; its chain is the one that is loaded."""
+    """The films of one patient as a least squares problem."""
 
-    def __init__(self, patient: Patient, sd: Array) -> None:
-        """Load the chain.
+    def __init__(self, patient: Patient, sd: Array, ask: Ask = alone) -> None:
+        """A problem without a first guess.
 
         Parameters
         ----------
         sd : (3,) m, m and rad, of a vertebra's place and tilt on a film less the model's.
+        ask : who answers the questions of Newton's method.
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        self.spine = patient.held(self._model(next(self._guesses(assumed(self.segments)))[:-TOPS]))
+        model = self._model(next(self._guesses(assumed(self.segments)))[:-TOPS])
+        self.spine = replace(patient.held(model), ask=ask)
         self.near: dict[str, Held] = {}
 
     def fit(self, population: Population, start: Fitted | None = None) -> Fitted:
@@ -224,7 +226,7 @@ class FilmFit:
         """
         numbers, tops = unknowns[:-TOPS], unknowns[-TOPS:].reshape(2, 3)
         laws = laws_of(numbers, self.size)
-        spine = self.spine.with_model(self._model(numbers))
+        spine = self.spine.with_values(self.spine.chain.values[0], laws)
         errors, slopes = [], []
         for film_number, position in enumerate((RIGHT, LEFT)):
             film = self.patient.read.films[position]
@@ -240,7 +242,7 @@ class FilmFit:
             top_by[:, at : at + 3] = np.diag(self.sd)
             change = posed.answers_to(held_by, top_by)
             off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
-            by = spine.film_by(posed.held.q)[:, :-1] @ change / self.sd[:, None, None]
+            by = posed.film_by[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())
             slopes.append(by.reshape(len(errors[-1]), -1))
         return np.concatenate(errors), np.vstack(slopes)

@@ -6,11 +6,15 @@ fitted anew and keeps its population: a profile likelihood (`calibrate.profile`)
 all that is tried, the ratio is the population's and no finding about the patient.
 """
 
+from functools import partial
+
 import numpy as np
 
 from spinepipe.calibrate.descent import Point, Settled, descend, once
+from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.profile import Best, Reach, profile_in_turn
 from spinepipe.effects.contract import Array
+from spinepipe.statics.prescribed import Ask, alone, answered
 from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, Fitted
 from spinepipe.studies.scoliosis.population import Population
 
@@ -26,11 +30,15 @@ OPEN = Reach(None, None, True, True)
 
 def regions(fit: FilmFit, population: Population, fitted: Fitted) -> tuple[Reach, ...]:
     """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
-    return tuple(region(fit, population, fitted, one) for one in range(fit.segments))
+    searches = [partial(region, fit, population, fitted, one) for one in range(fit.segments)]
+    return tuple(in_lockstep(searches, answered))
 
 
-def region(fit: FilmFit, population: Population, fitted: Fitted, segment: int) -> Reach:
+def region(
+    fit: FilmFit, population: Population, fitted: Fitted, segment: int, ask: Ask = alone
+) -> Reach:
     """95 % region of one segment's ratio."""
+    fit = FilmFit(fit.patient, fit.sd, ask)
     fit.near = dict(fitted.poses)
     numbers = by_ratio(fit.segments, len(fitted.unknowns), segment)
     point = once(_of_films(fit, population, segment, numbers))

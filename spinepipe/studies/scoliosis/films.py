@@ -14,6 +14,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.effects.contract import Array
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -154,6 +155,7 @@ class Read:
         return float(lengths[0] / lengths[1])
 
 
+@kept_with_cohort
 def read_films(cohort: Cohort, patient: str) -> Read:
     """The films of a patient; `checks` has seen to it that they are whole."""
     rows = cohort.further["films"]

@@ -8,7 +8,6 @@ anterior, up, right; the lowest vertebra is ground.
 """
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,14 +15,20 @@ import numpy as np
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import System
-from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import Held, Place, Prescription, Tilt, hold_at
+from spinepipe.model import Body, ScopedEffect, SpineModel
+from spinepipe.statics.prescribed import (
+    Ask,
+    Held,
+    HeldChain,
+    Place,
+    Prescription,
+    Tilt,
+    alone,
+    hold_at,
+)
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.settings import Profile
 from spinepipe.units import COORDINATES, MM_PER_M
-from spinepipe.world import Chain
 
 BENDING = COORDINATES.index("right_bending")
 ANTERIOR, UP, RIGHT = np.eye(3)
@@ -90,11 +95,28 @@ class Posed:
     Attributes
     ----------
     film : places and tilts of all vertebrae in the coronal plane. r : (S,) rad, turned since erect.
+    points, lines : (S, 3) m, centres, and lines through the endplates, of all but the lowest.
+    axes : (n, 6) twist of each coordinate: angular, and linear at the origin of ground.
     """
 
     held: Held
     film: Film
     r: Array
+    points: Array
+    lines: Array
+    axes: Array
+
+    @property
+    def film_by(self) -> Array:
+        """(3, S, n) change of right, up and tilt of all vertebrae but the lowest with q (n,)."""
+        around, along = self.axes[:, :3].T, self.axes[:, 3:].T
+        x, y, z = self.points.T[..., None]
+        right = along[2] + around[0] * y - around[1] * x
+        up = along[1] + around[2] * x - around[0] * z
+        x, y, z = self.lines.T[..., None]
+        tilt = around[0] - x * (around[1] * y + around[2] * z) / (y**2 + z**2)
+        carried = np.arange(len(self.axes)) // 6 <= np.arange(len(self.points))[:, None]
+        return np.stack([right, up, tilt]) * carried
 
     def answers_to(self, held_by: Array, top_by: Array | None = None) -> Array:
         """(n, m) change of the pose.
@@ -111,62 +133,55 @@ class Posed:
         return self.held.answers.to(held_by, np.vstack([top_by, level]))[0]
 
 
+@dataclass(frozen=True, eq=False)
 class HeldSpine:
-    """A model whose uppermost vertebra is put where a film has it."""
+    """A model whose uppermost vertebra is put where a film has it.
 
-    def __init__(self, model: SpineModel, erect: Film, level: bool) -> None:
-        """Load the chain; `level` tells whether the uppermost vertebra may not tip to the front."""
-        case = LoadCase("held", 1, (LoadStep(0, ()),))
-        self.system, self.erect = System(Chain(model), model, case), erect
-        self.free = np.tile([False] * 3 + [True] * 3, model.n_joints)
+    Attributes
+    ----------
+    ask : who answers Newton's questions.
+    """
+
+    chain: HeldChain
+    erect: Film
+    ask: Ask = alone
+
+    @classmethod
+    def of(cls, model: SpineModel, erect: Film, level: bool) -> "HeldSpine":
+        """The spine of a model; `level` tells whether its top may not tip to the front."""
         top = model.n_joints - 1
-        point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _line(erect.tilt[-1])
-        self.grips: tuple[Prescription, ...] = (
+        point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _lines(erect.tilt[-1])
+        grips: tuple[Prescription, ...] = (
             Place(top, point, RIGHT),
             Place(top, point, UP),
             Tilt(top, line, UP, RIGHT),
         )
         if level:
-            self.grips = (*self.grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
-        centres = [np.array([0.0, *at]) for at in zip(erect.up[1:], erect.right[1:], strict=True)]
-        self.shown: tuple[tuple[Prescription, ...], ...] = (
-            tuple(Place(body, at, RIGHT) for body, at in enumerate(centres)),
-            tuple(Place(body, at, UP) for body, at in enumerate(centres)),
-            tuple(Tilt(body, _line(t), UP, RIGHT) for body, t in enumerate(erect.tilt[1:])),
-        )
+            grips = (*grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
+        free = np.tile([False] * 3 + [True] * 3, model.n_joints)
+        return cls(HeldChain(model, grips, free), erect)
+
+    def with_values(self, *values: Array) -> "HeldSpine":
+        """The same spine with other values of its laws."""
+        return replace(self, chain=self.chain.with_values(values))
 
     def with_model(self, model: SpineModel) -> "HeldSpine":
         """The same spine on other stiffness."""
-        other = copy(self)
-        other.system = self.system.with_model(model)
-        return other
+        return self.with_values(*(scoped.values for scoped in model.effects))
 
     def at(self, top: Array, start: Held | None = None) -> Posed:
         """The pose with the uppermost vertebra at a place (right, up; m) and tilt (rad)."""
-        wanted = np.concatenate([top, np.zeros(len(self.grips) - len(top))])
-        held = hold_at(self.system, self.grips, wanted, self.free, start)
-        film = self.film(held.q)
-        return Posed(held, film, film.turned - self.erect.turned)
-
-    def film_by(self, q: Array) -> Array:
-        """(3, S, n) change of right, up and tilt of all vertebrae but the lowest with q (n,)."""
-        motion = ChainMotion(self.system.chain, q)
-        return np.array([[one.slope(motion) for one in each] for each in self.shown])
-
-    def film(self, q: Array) -> Film:
-        """What a film of the pose q (n,) shows."""
-        motion, erect = ChainMotion(self.system.chain, q), self.erect
-        right, up, tilt = [erect.right[0]], [erect.up[0]], [erect.tilt[0]]
-        for body in range(len(erect.tilt) - 1):
-            moved = motion.displacement(body)
-            point = moved.apply(np.array([0.0, erect.up[body + 1], erect.right[body + 1]]))
-            line = moved.rotation @ _line(erect.tilt[body + 1])
-            right.append(float(point[2]))
-            up.append(float(point[1]))
-            tilt.append(float(np.arctan2(line[2], line[1])))
-        return Film(np.array(right), np.array(up), np.array(tilt))
+        wanted = np.concatenate([top, np.zeros(len(self.chain.prescriptions) - len(top))])
+        held = hold_at(self.chain, wanted, start, self.ask)
+        erect, (axes, turned, shifted) = self.erect, self.chain.motion(held.q)
+        centres = np.column_stack([np.zeros(len(turned)), erect.up[1:], erect.right[1:]])
+        points = (turned @ centres[..., None])[..., 0] + shifted
+        lines = (turned @ _lines(erect.tilt[1:])[..., None])[..., 0]
+        above = (points[:, 2], points[:, 1], np.arctan2(lines[:, 2], lines[:, 1]))
+        film = Film(*(np.append(a[0], b) for a, b in zip(erect.rows, above, strict=True)))
+        return Posed(held, film, film.turned - erect.turned, points, lines, axes.reshape(-1, 6))
 
 
-def _line(tilt: float) -> Array:
-    """(3,) the line through the centres of a vertebra's endplates."""
-    return np.array([0.0, np.cos(tilt), np.sin(tilt)])
+def _lines(tilts: Array | float) -> Array:
+    """(..., 3) the lines through the centres of vertebrae's endplates."""
+    return np.stack([np.zeros_like(tilts), np.cos(tilts), np.sin(tilts)], axis=-1)

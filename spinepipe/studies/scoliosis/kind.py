@@ -57,6 +57,7 @@ class ScoliosisFiles(StudyFiles):
     """
 
     joined = (*OF_JOBS, "variants")
+    full = ("variants", "variation", "against_jalalian_2017")
     drawings = (
         Figure(
             "fitted_and_held_out",

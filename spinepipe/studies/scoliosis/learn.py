@@ -1,6 +1,6 @@
 """Job: the population of a cohort, learned from the films of all its patients.
 
-Patients are fitted one by one; what the films of each say near its fit is a parabola, on which
+Patients are fitted in lockstep, one stack for all; what the films of each say near its fit is a parabola, on which
 means and spreads of the population are learned until they stand still. Then all are fitted anew
 under it, as the parabolas hold near the fits alone.
 """
@@ -11,11 +11,13 @@ from functools import partial
 
 import numpy as np
 
+from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
+from spinepipe.statics.prescribed import Ask, answered
 from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, weighed_with
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
@@ -58,9 +60,8 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
     population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, Fitted]()
-    for number in range(1, MOST_ROUNDS + 1):
-        names = progress.through(list(patients), f"population, round {number}: patients")
-        fits = dict(_fits(names, patients, sd, population, fits))
+    for number in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
+        fits = dict(_fits(patients, sd, population, fits))
         before, population = population, _settled(population, [one.told for one in fits.values()])
         change = _change(before, population)
         if change < LAST_ROUND or not fits:
@@ -70,17 +71,18 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
 
 
 def _fits(
-    names: Iterator[str],
-    patients: Mapping[str, Patient],
-    sd: Array,
-    population: Population,
-    before: Mapping[str, Fitted],
+    patients: Mapping[str, Patient], sd: Array, population: Population, before: Mapping[str, Fitted]
 ) -> Iterator[tuple[str, Fitted]]:
-    for name in names:
+    """The patients that can be fitted, each from its fit before."""
+
+    def fitted(name: str, ask: Ask) -> Fitted | None:
         try:
-            yield name, FilmFit(patients[name], sd).fit(population, before.get(name))
+            return FilmFit(patients[name], sd, ask).fit(population, before.get(name))
         except NoFit:
-            continue
+            return None
+
+    found = in_lockstep([partial(fitted, name) for name in patients], answered)
+    return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 
 def _settled(population: Population, patients: list[Told]) -> Population:

@@ -76,8 +76,8 @@ class Patient:
         return self.read.films[ERECT]
 
     def held(self, model: SpineModel) -> HeldSpine:
-        """A model of the patient, to be held where films have its top; the one that is loaded."""
-        return HeldSpine(model, self.erect, self.level)
+        """A model of the patient, to be held where films have its top."""
+        return HeldSpine.of(model, self.erect, self.level)
 
     @cached_property
     def curves(self) -> tuple[Curve, ...]:
@@ -235,8 +235,7 @@ class _RegionFit:
     def missed(self, logs: Array) -> tuple[Array, Array] | None:
         """Errors of the angles, rad, right and left film, and by each logarithm."""
         patient, springs = self.patient, self.stiffness(logs)
-        model = with_springs(patient.chain, _with_bending(patient, springs))
-        spine = self.spine.with_model(model)
+        spine = self.spine.with_values(_with_bending(patient, springs))
         errors, slopes = [], []
         for position in (RIGHT, LEFT):
             film = patient.read.films[position]
@@ -248,7 +247,7 @@ class _RegionFit:
             held_by = np.zeros((*q.shape, len(logs)))
             held_by[:, BENDING] = (springs * q[:, BENDING])[:, None] * self.by_logs
             change = posed.answers_to(held_by.reshape(q.size, -1))
-            shown = spine.film_by(posed.held.q)[:2] @ change
+            shown = posed.film_by[:2] @ change
             for one in patient.curves:
                 errors.append(one.ferguson(posed.film) - one.ferguson(film))
                 slopes.append(np.einsum("av,avn->n", one.ferguson_by(posed.film)[:, 1:], shown))

@@ -158,24 +158,24 @@ def characterise(pairs: Pairs, shape: Shape, apical_nm: float) -> Laws:
     ----------
     apical_nm : the larger of the two moments about the apical segment, N m.
     """
+    loads = np.stack([shape.load(pairs.right), shape.load(pairs.left)], axis=1)
 
     def rmse(log_ratio: float) -> float:
-        return _laws(pairs, shape, float(np.exp(log_ratio)), apical_nm).rmse
+        return _laws(pairs, shape, loads, float(np.exp(log_ratio)), apical_nm).rmse
 
     tried = np.linspace(-FARTHEST_RATIO, FARTHEST_RATIO, RATIOS_TRIED)
     best = int(np.argmin([rmse(one) for one in tried]))
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
     found = minimize_scalar(rmse, bounds=(low, high), method="bounded", options={"xatol": 1e-10})
-    return _laws(pairs, shape, float(np.exp(found.x)), apical_nm)
+    return _laws(pairs, shape, loads, float(np.exp(found.x)), apical_nm)
 
 
-def _laws(pairs: Pairs, shape: Shape, ratio: float, apical_nm: float) -> Laws:
-    """The laws with forces of one ratio, regression through the origin (Eq 4)."""
+def _laws(pairs: Pairs, shape: Shape, loads: Array, ratio: float, apical_nm: float) -> Laws:
+    """The laws with forces of one ratio, regression of their loads (S, 2) through nought (Eq 4)."""
     force = apical_nm / max(pairs.arm_right[pairs.apex], ratio * pairs.arm_left[pairs.apex])
     moments = np.stack([force * pairs.arm_right, -ratio * force * pairs.arm_left], axis=1)
     rotations = np.stack([pairs.right, pairs.left], axis=1)
-    g = np.stack([shape.load(one) for one in rotations.T], axis=1)
-    asked = (moments * g).sum(axis=1) / (g**2).sum(axis=1)
+    asked = (moments * loads).sum(axis=1) / (loads**2).sum(axis=1)
     middle = float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
     stretch = np.clip(asked, LEAST_SHARE * middle, MOST_SHARE * middle)
     reached = np.stack([shape.rotation(one / stretch) for one in moments.T], axis=1)
