@@ -20,19 +20,14 @@ FULL_FOR_NOW = frozenset(
         "test_investigation_edges",
         "test_scoliosis_figures",
         "test_tracking_figures",
-        "test_posterior_job",
         "test_cohort_analysis",
-        "test_identification_figures",
-        "test_sensitivity_figures",
         "test_tracking_findings",
         "test_tracking_checks",
-        "test_figures",
         "test_tracking_page",
         "test_cohort_figures",
         "test_trunk_figures",
         "test_discrepancy_page",
         "test_nuisances",
-        "test_against_gould_2024a",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""
@@ -51,7 +46,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Slow tests and long files first, so that none of them runs alone at the end.
 
-    Tests that share projects, and those of long files, go to any worker, all others file by file.
+    Those of long files go to any worker, all others file by file; who looks at one shared project
+    goes to one worker, so that no other waits until it is built.
     """
 
     def short(item: pytest.Item) -> bool:
@@ -61,8 +57,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.stem in FULL_FOR_NOW:
             item.add_marker(pytest.mark.full)
-        if "shared" not in getattr(item, "fixturenames", ()) and item.path.stem not in SPREAD:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        looks_at = {"eight", "toy"}.intersection(getattr(item, "fixturenames", ()))
+        if item.path.stem not in SPREAD:
+            item.add_marker(pytest.mark.xdist_group(min(looks_at, default=item.path.stem)))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -86,13 +83,13 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
 
 @pytest.fixture(scope="session")
 def eight(shared: Shared) -> Project:
-    """A project whose studies, one of each kind, have been computed at once; not to be changed."""
+    """A project whose studies, one of each kind, were computed at once; not to be changed."""
 
     def build(folder: Path) -> Project:
-        from small_studies import eight_kinds
+        from small_studies import asked, eight_kinds
 
         project = eight_kinds(folder)
-        project.run()
+        project.run(*asked(project))
         return project
 
     return shared.project("eight", build)

@@ -169,6 +169,11 @@ class Evaluator:
         self._solver.forget()
         self._known.clear()
 
+    def start_at(self, x: Array) -> None:
+        """Begin the next searches at x (m,), wherever others have been; nothing is recalled."""
+        self._solver.start_at(self.problem.model, x)
+        self._known.clear()
+
     def at(self, x: Array) -> Evaluation:
         """Residuals and Jacobian with the unknowns moved by x (m,); known points are recalled."""
         return self.together([(0, x)])[0]
@@ -199,7 +204,9 @@ class Evaluator:
         """
         found, problem = self.at(x), self.problem
         model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
-        poses = held_against(self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE)
+        poses = held_against(
+            self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE
+        )
         if poses is None:
             return None
         chain = self._systems[0].chain

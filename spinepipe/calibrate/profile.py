@@ -173,11 +173,11 @@ def profile(
     ----------
     x, evaluation, at_bound : the optimum. noise : as in `uncertainty`.
     """
-    evaluator.forget()  # or regions would hang on where other starts have been
     problem = evaluator.problem
     if evaluation.residual is None or evaluation.jacobian is None:
         nothing = np.ones((2, len(x)), dtype=bool)
         return Profile(problem.lower.copy(), problem.upper.copy(), nothing[0], nothing[1], False)
+    evaluator.start_at(x)  # or regions would hang on where other starts have been
     bent = np.array([parameter.logarithmic for parameter in problem.free])
     measured, limits = (evaluation.residual, evaluation.jacobian), (problem.lower, problem.upper)
     best = Best(x, *measured, *limits, problem.scale, bent, along_bounds=problem.along_bounds)

@@ -46,10 +46,22 @@ class AtRest:
         self._cases = tuple(cases)
         self._stacks = _Stacks(self._cases)
         self._last: dict[int, tuple[Array, Array, Array]] = {}
+        self._first: tuple[Array, Array, Array] | None = None
+        self._first_of: SpineModel | None = None
 
     def forget(self) -> None:
         """Start the next points from the neutral pose."""
         self._last.clear()
+        self._first = None
+
+    def start_at(self, model: SpineModel, x: Array) -> None:
+        """Begin the next searches from the poses to which the loads lead a model at x (m,)."""
+        first, same = self._first, self._first_of is model
+        self.forget()
+        if first is None or not same or not np.array_equal(first[0], x):
+            self.solve([(0, x)], [model])
+            first = self._last.pop(0, None)
+        self._first, self._first_of = first, model
 
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
@@ -84,21 +96,31 @@ class AtRest:
 
     def _guesses(self, points: Sequence[tuple[int, Array]], stack: Stack) -> Array | None:
         """(L, J, 6) poses to start from, to first order; NaN for searches that have none."""
-        if not self._last:
+        if self._first is None and not self._last:
             return None
         nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
         guesses = []
         for number, x in points:
-            if number not in self._last:
+            known = self._last.get(number, self._first)
+            if known is None:
                 guesses.append(nothing)
                 continue
-            there, q, dq = self._last[number]
+            there, q, dq = known
             guesses.append(q + dq @ np.clip(x - there, -self._reach, self._reach))
         return np.concatenate(guesses)
 
     def record(self, model: SpineModel, x: Array) -> tuple[Array, ...] | str:
-        """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
-        return by_record(moved(model, self._free, x), self._cases)
+        """(T, n) poses of every case by the engine of record, or why not.
+
+        Both engines go the same way from the neutral pose (`tests.validation engines`): where the
+        stack gets through, the engine starts each step from where that has come.
+        """
+        self.start_at(model, x)
+        there = moved(model, self._free, x)
+        if self._first is None:
+            return by_record(there, self._cases)
+        ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
+        return by_record(there, self._cases, np.split(self._first[1], ends))
 
 
 class _Stacks:
@@ -143,6 +165,9 @@ class Settling:
     def forget(self) -> None:
         """Nothing: each run starts from the neutral pose."""
 
+    def start_at(self, model: SpineModel, x: Array) -> None:
+        """Nothing: each run starts from the neutral pose."""
+
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
     ) -> list[Seen | str]:
@@ -156,7 +181,9 @@ class Settling:
         models = models or [self._model] * len(points)
         bases = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
         steps = STEP * np.eye(len(self._free))
-        runs = [one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))]
+        runs = [
+            one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))
+        ]
         count, each = len(self._cases), 1 + len(steps)
         stack = self._stacks.of([model for model in models for _ in range(each)], runs)
         leads = np.arange(len(runs) * count).reshape(len(points), each, count)
@@ -165,7 +192,10 @@ class Settling:
         every = ends.q.reshape(len(points), each, count, -1, 6)
         result: list[Seen | str] = []
         for base, model, (_, x), lanes, q in zip(bases, models, points, leads, every, strict=True):
-            trouble = min(set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble), default=None)
+            trouble = min(
+                set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble),
+                default=None,
+            )
             self._sizes[id(model), x.tobytes()] = [ends.sizes[lane] for lane in lanes[0].tolist()]
             result.append(self._seen(base, model, q) if trouble is None else ends.trouble[trouble])
         return result
@@ -214,12 +244,20 @@ LEAST_MOTION = np.array([1e-4] * 3 + [1e-3] * 3)
 """m and rad: smaller motion is held against this."""
 
 
-def by_record(model: SpineModel, cases: Sequence[LoadCase]) -> tuple[Array, ...] | str:
-    """(T, n) poses of every case by the engine of record, from the neutral pose, or why not."""
+def by_record(
+    model: SpineModel, cases: Sequence[LoadCase], near: Sequence[Array] | None = None
+) -> tuple[Array, ...] | str:
+    """(T, n) poses of every case by the engine of record, or why not.
+
+    Parameters
+    ----------
+    near : (T, J, 6) of every case, where each step may start; None: from the neutral pose.
+    """
     chain = Chain(model)
     found = []
-    for case in cases:
-        solved = follow(System(chain, model, case))
+    for number, case in enumerate(cases):
+        guesses = None if near is None else [q.ravel() for q in near[number]]
+        solved = follow(System(chain, model, case), guesses)
         for step in solved:
             if not step.usable:
                 return step.equilibrium.message

@@ -127,6 +127,7 @@ def _possible(inertia: Array) -> Array:
     return possible
 
 
+@kept_with_cohort
 def followers(cohort: Cohort, specimen: str) -> dict[str, float]:
     """Tension in N of the follower load of each test that has one."""
     table = cohort.loads

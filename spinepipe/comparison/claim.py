@@ -36,9 +36,12 @@ class Run:
 
     tables: Mapping[str, pd.DataFrame]
     asked: Mapping[str, Any] = field(default_factory=dict)
+    _chosen: dict[Any, pd.DataFrame] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def rows(self, table: str, **where: Any) -> pd.DataFrame:
-        """Rows whose columns have the given values, at least one.
+        """Rows whose columns have the given values, at least one; many claims ask for the same.
 
         Raises
         ------
@@ -47,6 +50,9 @@ class Run:
         """
         if table not in self.tables:
             raise NotComputed(f"this run made no table {table}")
+        key = table, *where.items()
+        if key in self._chosen:
+            return self._chosen[key]
         frame = self.tables[table]
         chosen = np.ones(len(frame), dtype=bool)
         for column, value in where.items():
@@ -54,7 +60,8 @@ class Run:
         if not chosen.any():
             sought = ", ".join(f"{column} {value}" for column, value in where.items())
             raise NotComputed(f"this run's table {table} has no row of {sought or 'any kind'}")
-        return frame[chosen]
+        self._chosen[key] = frame[chosen]
+        return self._chosen[key]
 
     def row(self, table: str, **where: Any) -> "pd.Series[Any]":
         """The first such row."""

@@ -1,5 +1,6 @@
 """The spine model: rigid vertebrae on six-coordinate joints, with named effects. SI throughout."""
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -194,8 +195,13 @@ class SpineModel:
         )
 
     def with_effects(self, effects: tuple[ScopedEffect, ...]) -> "SpineModel":
-        """The same geometry and bodies with other effects."""
-        return replace(self, effects=effects)
+        """The same geometry and bodies, which are not looked at again, with other effects."""
+        other = copy(self)
+        object.__setattr__(other, "effects", effects)
+        problem = _effect_problem(other)
+        if problem:
+            raise RefusedModel(f"{self.specimen}: {problem}")
+        return other
 
 
 def _problem(model: SpineModel) -> str | None:

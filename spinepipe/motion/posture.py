@@ -119,18 +119,23 @@ def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, 
     """(F, n, n) and (F, n)."""
     off, slopes = Markers(watched, ask).with_slopes(q)
     rows = [(off, slopes @ whole)]
+    over, steep = (one.reshape(len(q), COUNT) for one in beyond(ask, q))
+    # what each coordinate costs by itself: the diagonal of its curvature, and its slope
+    curved, pulled = steep**2, over * steep
     if ask.loads:
         rest = np.zeros_like(q)
         load, by_motion, _ = Loads.of(watched, ask).with_slopes(ask.passive, (q, rest, rest))
         rows.append((load, by_motion[:, 0] @ whole))
     elif ask.passive is not None:
-        stretched, steep = _stretched(ask, q)
-        rows.append((stretched, steep[..., None] * whole[PELVIS + 6 :]))
-    over, beyond_slope = (one.reshape(len(q), COUNT) for one in beyond(ask, q))
-    rows.append((over, beyond_slope[..., None] * whole))
-    square = sum(np.swapaxes(slope, 1, 2) @ slope for _, slope in rows)
-    down = sum(np.einsum("frn,fr->fn", slope, one) for one, slope in rows)
-    return np.asarray(square), np.asarray(down)
+        stretched, stiff = _stretched(ask, q)
+        curved[:, PELVIS + 6 :] += stiff**2
+        pulled[:, PELVIS + 6 :] += stretched * stiff
+    square, down = whole.T @ (curved[..., None] * whole), pulled @ whole
+    for off, slope in rows:
+        turned = np.swapaxes(slope, 1, 2)
+        square += turned @ slope
+        down += (turned @ off[..., None])[..., 0]
+    return square, down
 
 
 def _stretched(ask: Ask, q: Array) -> tuple[Array, Array]:

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg.blas import dsyrk
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.asked import Ask, Watched
-from spinepipe.motion.banded import WIDE, Band, Factor, bordered_step
+from spinepipe.motion.banded import REACH, Band, Factor, bordered_step
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.points import COUNT
 from spinepipe.motion.skeleton import JOINTS
@@ -209,26 +208,31 @@ class Trajectory:
         self, trial: Watched, coefficients: Array, law: PassiveLaw | None
     ) -> tuple[Band, Array, Array]:
         count, worth = self.ask.parameters, self._worth(trial)
-        band = Band(trial.grid.coefficients, count)
+        band = Band.empty(trial.grid.coefficients, count)
         motion, weights = trial.grid.at_nodes(coefficients), trial.grid.weights
         squares, slopes = self._by_place(trial, motion)
+        frames, places = len(squares), weights[0]
         square, slope = np.zeros((count, count)), np.zeros(count)
         if self.ask.loads:
             off, by_motion, shared = Loads.of(trial, self.ask).with_slopes(law, motion)
-        placed = np.outer(weights[0], weights[0])
-        for node in range(len(squares)):
-            whole = np.kron(placed, squares[node])
-            down = np.kron(weights[0], slopes[node])
-            border = None
+            # (F, 3, 108, R): what each of a node's three coefficients does to its loads
+            each = np.swapaxes(
+                (weights.T @ by_motion.reshape(frames, REACH, -1)).reshape(by_motion.shape), 2, 3
+            )
+            flat = shared.reshape(off.size, count)
+            square += worth * (flat.T @ flat)
+            slope += worth * (flat.T @ off.ravel())
+        for i in range(REACH):
+            down = places[i] * slopes
             if self.ask.loads:
-                each = np.einsum("kc,krq->rcq", weights, by_motion[node]).reshape(-1, WIDE)
-                whole = dsyrk(1.0, each, 1.0, whole, trans=1, lower=1)
-                down += each.T @ off[node]
-                if count:
-                    border = worth * (each.T @ shared[node])
-                    square += worth * (shared[node].T @ shared[node])
-                    slope += worth * (shared[node].T @ off[node])
-            band.add(node, worth * whole, worth * down, border)
+                down += (each[:, i] @ off[..., None])[..., 0]
+                band.border[i : i + frames] += worth * (each[:, i] @ shared)
+            band.slope[i : i + frames] += worth * down
+            for j in range(i + 1):
+                block = places[i] * places[j] * squares
+                if self.ask.loads:
+                    block += each[:, i] @ np.swapaxes(each[:, j], 1, 2)
+                band.blocks[j : j + frames, i - j] += worth * block
         self._smoothed(band, trial, motion[2], worth)
         self._locked(band)
         return band, square, slope
@@ -250,54 +254,34 @@ class Trajectory:
             return
         share = worth / np.tile(self.ask.sizes.of_accelerations, COUNT // 6) ** 2
         curve = trial.grid.weights[2]
-        flat = acceleration.reshape(len(acceleration), COUNT) * share
-        size = band.coefficients * COUNT
+        frames = len(acceleration)
+        flat = acceleration.reshape(frames, COUNT) * share
+        diagonal = np.arange(COUNT)
         for i, first in enumerate(curve):
-            slope = np.zeros((band.coefficients, COUNT))
-            slope[i : i + len(flat)] += first * flat
-            band.slope += slope.reshape(size)
-            for j in range(i + 1):
-                rows = np.zeros((band.coefficients, COUNT))
-                rows[j : j + len(flat)] += first * curve[j] * share
-                band.lower[(i - j) * COUNT] += rows.reshape(size)
+            band.slope[i : i + frames] += first * flat
+            for j, second in enumerate(curve[: i + 1]):
+                band.blocks[j : j + frames, i - j, diagonal, diagonal] += first * second * share
 
     def _locked(self, band: Band) -> None:
         """Coordinates that are not there neither move nor are asked to."""
-        locked = np.tile(~self.ask.free.reshape(COUNT), band.coefficients)
-        if not locked.any():
-            return
-        at = np.flatnonzero(locked)
-        band.slope[at] = 0.0
-        band.border[at] = 0.0
-        band.lower[:, at] = 0.0
-        for below in range(1, WIDE):
-            rows = at[at >= below]
-            band.lower[below, rows - below] = 0.0
-        band.lower[0, at] = 1.0
+        locked = np.flatnonzero(~self.ask.free.reshape(COUNT))
+        band.slope[:, locked] = 0.0
+        band.border[:, locked] = 0.0
+        band.blocks[:, :, locked] = 0.0
+        band.blocks[..., locked] = 0.0
+        band.diagonal[:, locked] = 1.0
 
     def step(self, asked: _Asked, damping: float) -> tuple[list[Array], Array]:
         """Damped step of all coefficients and parameters."""
-        factors = [Factor.of(band, damping, self._least(band)) for band in asked.bands]
+        # every diagonal gets a little besides: what nothing asks about stays where it is
+        factors = [
+            Factor.of(band, damping, 1e-9 * float(band.diagonal.max())) for band in asked.bands
+        ]
         square = asked.square + damping * np.diag(np.diag(asked.square))
-        if self.held is None or not len(asked.slope):
-            return bordered_step(asked.bands, factors, square, asked.slope)
-        loose = ~self.held.astype(bool)
-        bands = [_with_columns(band, loose) for band in asked.bands]
-        steps, some = bordered_step(
+        loose = np.ones(len(square), dtype=bool) if self.held is None else ~self.held.astype(bool)
+        bands = [replace(band, border=band.border[..., loose]) for band in asked.bands]
+        shared = np.zeros(len(square))
+        steps, shared[loose] = bordered_step(
             bands, factors, square[np.ix_(loose, loose)], asked.slope[loose]
         )
-        shared = np.zeros(len(asked.slope))
-        shared[loose] = some
         return steps, shared
-
-    def _least(self, band: Band) -> Array:
-        """What every diagonal gets besides, so that what nothing asks about stays where it is."""
-        return np.full(len(band.slope), 1e-9 * float(band.lower[0].max()))
-
-
-def _with_columns(band: Band, columns: Array) -> Band:
-    """The band with some of its border's columns."""
-    found = replace(band, shared=int(columns.sum()))
-    found.lower, found.slope = band.lower, band.slope
-    found.border = band.border[:, columns]
-    return found

@@ -5,6 +5,8 @@ only, and its permutations take a second for 14 differences.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
+from itertools import combinations
 from math import factorial, prod
 
 import numpy as np
@@ -29,6 +31,9 @@ MOST_ARRANGEMENTS = 20_000
 
 FEWEST_FOR_CHI_SQUARED = 5
 """Values that every group needs before chi-squared is near the truth (Kruskal and Wallis 1952)."""
+
+ROUNDING = 1e-12
+"""Share within which sums of squared ranks are one."""
 
 SEED = 1952
 
@@ -114,8 +119,13 @@ def _p_of_groups(groups: Sequence[Array], approximate: float) -> tuple[float, st
 def _dealt_p(groups: Sequence[Array]) -> float:
     """Share of dealings, all or at random, with an H at least as large."""
     ranks = stats.rankdata(np.concatenate(groups))
-    dealt = np.split(ranks, np.cumsum([len(group) for group in groups])[:-1])
-    found = stats.permutation_test(
+    sizes = tuple(len(group) for group in groups)
+    if factorial(len(ranks)) // prod(map(factorial, sizes)) <= MOST_ARRANGEMENTS:
+        dealings = _dealings(sizes)  # the first is as the groups are
+        found = _between(*np.split(ranks[dealings], np.cumsum(sizes)[:-1], axis=1), axis=1)
+        return float(np.mean(found >= found[0] * (1.0 - ROUNDING)))
+    dealt = np.split(ranks, np.cumsum(sizes)[:-1])
+    at_random = stats.permutation_test(
         dealt,
         _between,
         vectorized=True,
@@ -123,7 +133,23 @@ def _dealt_p(groups: Sequence[Array]) -> float:
         alternative="greater",
         rng=np.random.default_rng(SEED),
     )
-    return float(found.pvalue)
+    return float(at_random.pvalue)
+
+
+@lru_cache(maxsize=4)
+def _dealings(sizes: tuple[int, ...]) -> NDArray[np.int8]:
+    """(ways, n) all ways to deal n places out to groups of these sizes, group after group."""
+    dealt = np.zeros((1, 0), dtype=np.int8)
+    left = np.arange(sum(sizes), dtype=np.int8)[None]
+    for size in sizes:
+        chosen = np.array(list(combinations(range(left.shape[1]), size)), dtype=np.int64)
+        others = np.array(
+            [np.setdiff1d(np.arange(left.shape[1]), one) for one in chosen], dtype=np.int64
+        ).reshape(len(chosen), -1)
+        taken = left[:, chosen].reshape(-1, size)
+        dealt = np.hstack([np.repeat(dealt, len(chosen), axis=0), taken])
+        left = left[:, others].reshape(len(dealt), -1)
+    return dealt
 
 
 def _between(*ranks: NDArray[np.float64], axis: int) -> Array:

@@ -31,6 +31,7 @@ DEGREES = tuple(f"{name}_deg" for name in ROTATIONS)
 MILLIMETRES = ("anterior_mm", "superior_mm", "right_mm")
 
 Tables = dict[str, pd.DataFrame]
+LEFT_OUT = ("stiffness", "errors")
 
 
 @dataclass
@@ -138,6 +139,23 @@ class Written:
         fit.run(str(self.root), STUDY, specimen, representation, fitted_to, **files)
         return _read(files)
 
+    def fit_all(
+        self, specimens: Sequence[str], representation: str, fitted_to: str = "all"
+    ) -> dict[str, tuple[Tables, Tables]]:
+        """Tables of the jobs ``fit`` and ``left_out`` of every specimen; each is fitted once."""
+        own, kept = {}, {}
+        for name in specimens:
+            own[name] = self.fit(name, representation, fitted_to)
+            kept[name] = str(
+                (self.root / "stiffness.parquet").rename(self.root / f"{name}.parquet")
+            )
+        found = {}
+        for name in specimens:
+            others, files = [kept[n] for n in specimens if n != name], self._files(*LEFT_OUT)
+            left_out.run(str(self.root), STUDY, others, name, representation, fitted_to, **files)
+            found[name] = own[name], _read(files)
+        return found
+
     def left_out(
         self, others: Sequence[str], specimen: str, representation: str, fitted_to: str = "all"
     ) -> Tables:
@@ -148,7 +166,7 @@ class Written:
             kept = self.root / f"{other}.parquet"
             (self.root / "stiffness.parquet").replace(kept)
             paths.append(str(kept))
-        files = self._files("stiffness", "errors")
+        files = self._files(*LEFT_OUT)
         root = str(self.root)
         left_out.run(root, STUDY, paths, specimen, representation, fitted_to, **files)
         return _read(files)

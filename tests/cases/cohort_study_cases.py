@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,12 @@ def cohort_of(size: Size) -> Cohort:
 
 def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
     """Rows of all tables that figures and findings read, those of ``changed`` in their place."""
+    return Tables({name: found.copy() for name, found in _made(size).items()} | changed)
+
+
+@cache
+def _made(size: Size) -> dict[str, pd.DataFrame]:
+    """These tables, to be copied."""
     rng = np.random.default_rng(5)
     rows = {
         "stiffness": _stiffness(size, rng),
@@ -108,8 +115,7 @@ def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
         "findings": iter(()),
         "statistics": iter(()),
     }
-    made = {name: frame(name, list(found)) for name, found in rows.items()}
-    return Tables(made | changed)
+    return {name: frame(name, list(found)) for name, found in rows.items()}
 
 
 def frame(name: str, rows: list[Row]) -> pd.DataFrame:

@@ -18,6 +18,7 @@ def sweep(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """As `pytest.mark.parametrize`, in one test; cases made by a function are made when it runs.
 
+    A case that is skipped leaves the others to run, and the test counts as skipped if none fails.
     Fixtures are those of the one test, but each case has a `tmp_path` of its own: a test that
     changes what another fixture gave is no sweep.
     """
@@ -26,7 +27,7 @@ def sweep(
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         @wraps(function)
         def swept(*args: Any, **fixtures: Any) -> None:
-            failed, count, folder = [], 0, fixtures.get("tmp_path")
+            failed, skipped, count, folder = [], set(), 0, fixtures.get("tmp_path")
             for count, case in enumerate(cases() if callable(cases) else cases, start=1):
                 values = case if len(arguments) > 1 else (case,)
                 name = None
@@ -37,6 +38,8 @@ def sweep(
                     fixtures["tmp_path"].mkdir()
                 try:
                     function(*args, **fixtures, **dict(zip(arguments, values, strict=True)))
+                except pytest.skip.Exception as lacking:
+                    skipped.add(str(lacking))
                 except Exception as fault:
                     name = name or ", ".join(map(str, map(title, values)))
                     fault.add_note(f"case {count}: {name}")
@@ -44,6 +47,8 @@ def sweep(
             assert count, "no cases"
             if failed:
                 raise ExceptionGroup(f"{len(failed)} of {count} cases fail", failed)
+            if skipped:
+                pytest.skip("; ".join(sorted(skipped)))
 
         given = inspect.signature(function)
         left = [one for one in given.parameters.values() if one.name not in arguments]

@@ -109,6 +109,7 @@ def test_hangs():
 """
 
 
+@pytest.mark.full
 def test_a_run_tells_the_first_that_fails_and_ends_what_hangs(tmp_path: Path) -> None:
     """Of files of their own, by a process that loads nothing beforehand."""
     (tmp_path / "test_it.py").write_text(RUNS)

@@ -8,16 +8,21 @@ is asked when the project is built (`small_project.Shared`).
 """
 
 import re
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from made_pages import SVG
 from small_project import Project
 from small_studies import SMALL
 
+from spinepipe.jobs.report import results_of
+from spinepipe.report.page.document import Picture
 from spinepipe.studies.read import check
-from spinepipe.studies.registry import files_of, kind_of
+from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study_files import StudyFiles
 
 pytestmark = pytest.mark.slow
@@ -48,15 +53,41 @@ def look_at_tables(project: Project, kind: str, full: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", SMALL)
-def test_results_are_whole_and_the_page_opens_alone(eight: Project, kind: str) -> None:
-    files = layout(eight, kind)
-    assert {name.removeprefix("results/") for name in files.results()} <= set(eight.files())
-    assert not list(eight.path(f"results/{kind}").rglob("*.log"))
-    page = eight.path(f"{files.folder}/report.html").read_text()
-    for name in files.figures(full=False):
+def test_a_page_is_written_from_the_tables_of_all(eight: Project, kind: str) -> None:
+    """All that it reads is there without those of `full`; its figures are left empty."""
+    files, (study, cohort) = layout(eight, kind), check(eight.folder, kind)
+    module = import_module(f"{PACKAGE}.{kind}.page")
+    titles = {one.name: one.title for one in kind_of(kind).figures}
+    tables = [str(eight.path(name)) for name in files.table_files(files.tables, full=False)]
+    others = files.other_files(files.told_in_report)
+    others = {name: str(eight.path(path)) for name, path in others.items()}
+    results = results_of(module.READ, titles, tables, [], [], others)
+    drawn = files.figures(full=False)
+    pictures = {name: Picture.of(name, titles[name], SVG, "Words.") for name in drawn}
+    document = module.document(study, cohort, replace(results, pictures=pictures))
+    look_at_page(document.html(study, cohort), files, full=False)
+    assert document.findings
+
+
+def look_at_page(page: str, files: StudyFiles, full: bool) -> None:
+    for name in files.figures(full):
         assert f'id="figure-{name}"' in page, name
     assert "default-src 'none'" in page
     assert not FETCHES.search(page)
+
+
+def look_at_results(project: Project, kind: str, full: bool) -> None:
+    files = layout(project, kind)
+    assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
+    assert not list(project.path(f"results/{kind}").rglob("*.log"))
+    page = project.path(f"{files.folder}/report.html").read_text()
+    look_at_page(page, files, full=False)
+    if files.adds:
+        assert "`make full` makes them" in page
+
+
+def test_a_study_that_is_all_computed_is_whole(eight: Project) -> None:
+    look_at_results(eight, "range_of_motion", full=False)
 
 
 def test_full_remakes_nothing_of_all(eight: Project, tmp_path: Path) -> None:
@@ -73,9 +104,11 @@ def test_full_makes_all_tables_and_all_after_it_has_nothing_to_do(
     eight: Project, tmp_path: Path
 ) -> None:
     project = eight.copy(tmp_path / "project")
+    project.run("all")
     before = project.files()
     again = project.rerun("full")
     assert not again & set(before)
     assert project.planned("all") == set()
     for kind in SMALL:
         look_at_tables(project, kind, full=True)
+        look_at_results(project, kind, full=True)

@@ -5,6 +5,7 @@ the lane belongs to.
 """
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,6 +121,12 @@ class Bound:
         self.cables = {n: cable for n, cable in enumerate(cables) if len(cable.lanes)}
         self.states = States(of, lasting)
 
+    def with_share(self, share: Array) -> "Bound":
+        """The same with another share (N,) of loads across joints."""
+        other = copy(self)
+        other.share = share
+        return other
+
     def _there(
         self, one: Acting, number: int, runs: Indices
     ) -> tuple[Indices, Indices, tuple[int, Indices, Array, bool]]:
@@ -149,6 +156,9 @@ class Bound:
         """Loads (N, J, 6) and tangents (N, J, 6, 6) of the joints at q (N, J, 6)."""
         found = self.held_by_laws(q)
         load, tangent = found.load.reshape(q.shape), found.tangent.reshape(*q.shape, 6)
+        if not self.cables:
+            return Holding(load, tangent)
+        load, tangent = load.copy(), tangent.copy()
         for one in self.cables.values():
             own = one.effect.across(q[one.lanes], one.neutral, one.values)
             on = one.there * self.share[one.lanes, None]

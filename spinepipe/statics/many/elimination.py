@@ -230,5 +230,6 @@ def answers(seen: Survey, changes: Changes) -> tuple[Array, Flags]:
     rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
     _carry(seen.numbers, seen.fixed, tuple(changes), rates, signs)
     good: Flags = (signs != 0) & np.isfinite(rates).all(axis=(1, 2, 3))
-    rates[~good] = 0.0
+    if not good.all():
+        rates[~good] = 0.0
     return rates, good

@@ -39,13 +39,16 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arra
     last, taken = np.full(len(q), np.inf), np.zeros_like(q)
     bound, acting = laws(left), loads
     for _ in range(MOST_ITERATIONS):
-        held = bound.held(q[left])
-        step, solved = newton_step(chains, acting, q[left], held.load, held.tangent)
+        here = q[left]
+        held = bound.held(here)
+        step, solved = newton_step(chains, acting, here, held.load, held.tangent)
         beyond = _without_limit(held.load)
-        step[beyond], solved[beyond] = -0.5 * taken[beyond], taken[beyond].any(axis=(1, 2))
-        q[left] += step
+        some_beyond = beyond.any()
+        if some_beyond:
+            step[beyond], solved[beyond] = -0.5 * taken[beyond], taken[beyond].any(axis=(1, 2))
+        q[left] = here = here + step
         size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
-        inside = np.abs(q[left][..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
+        inside = np.abs(here[..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
         going = solved & inside & (size < 4.0 * last)
         there = going & (size < 1.0) & ~beyond
         arrived[left[there]] = True
@@ -53,7 +56,8 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Arra
         going &= ~there
         if not going.any():
             break
-        step[beyond] *= -1.0  # as much of the step before is left
+        if some_beyond:
+            step[beyond] *= -1.0  # as much of the step before is left
         last, taken = np.where(beyond, last, size)[going], step[going]
         if not going.all():
             left = left[going]

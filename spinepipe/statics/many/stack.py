@@ -10,16 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf
 
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array, Indices, Neutral
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
+from spinepipe.statics.equilibrium import NOT_POSITIVE
 from spinepipe.statics.many.bound import Bound, PathStates
 from spinepipe.statics.many.continuation import Increment, continued
 from spinepipe.statics.many.dead import with_dead_loads
+from spinepipe.statics.many.dynamics import tangents_of
 from spinepipe.statics.many.lanes import Acting, Effects
 from spinepipe.statics.many.newton import settled
-from spinepipe.statics.many.survey import FREE, Chains, Loads, Supports, part
+from spinepipe.statics.many.survey import FREE, Chains, Loads, Supports, part, survey
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
 from spinepipe.status import Status
@@ -164,6 +167,27 @@ class Stack:
             status[lanes] = Status.UNSTABLE.value
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
+
+    def warnings(self, q: Array) -> dict[int, str]:
+        """By lane at a stable pose q (L, J, 6), what the engine of record would warn of.
+
+        Only for runs without memory.
+        """
+        lanes = np.flatnonzero(~np.isnan(q[:, 0, 0]))
+        held = self.bound(lanes, self.initial_states()).held(q[lanes])
+        tangents = tangents_of(
+            survey(self.chains, part(self.loads, lanes), q[lanes], held.tangent)
+        )
+        found = {}
+        for lane, tangent in zip(lanes.tolist(), tangents, strict=True):
+            both = tangent + tangent.T
+            if self.loads.supports.there:
+                free = ~self.loads.supports.fixed[lane].ravel()
+                both = both[free][:, free]
+            _, refused = dpotrf(both, lower=True)
+            if refused:
+                found[lane] = NOT_POSITIVE
+        return found
 
     def chunks(self, runs: Indices, stepwise: bool = False) -> Iterator[Indices]:
         """Runs in portions that are worked on together: all their steps, or a step at a time."""

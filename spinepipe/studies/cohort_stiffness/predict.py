@@ -1,20 +1,21 @@
 """Motion of a specimen under all its tests with a given stiffness, and its errors."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.statics import System, follow, observe
+from spinepipe.statics.many import Stack, readings
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven, stiff_model
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, less_step_0
-from spinepipe.world import Chain
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, from_si, less_step_0
 
 Row = dict[str, Any]
 
@@ -29,26 +30,28 @@ def predicted(
 ) -> list[tuple[Array | None, Status, str]]:
     """(T, J, 6) m and rad of each case as it was measured, or why there is none.
 
+    All cases are solved together, from the neutral pose.
+
     Parameters
     ----------
     k : (J, 6) stiffness, SI. others : effects besides the bushings.
     """
     try:
         model = stiff_model(cohort, specimen, frames, k, others)
-        chain = Chain(model)
-        systems = [System(chain, model, one.case) for one in tested]
     except RefusedModel as error:
         return [(None, Status.REFUSED, str(error)) for _ in tested]
-    return [_motion(system, cohort.zeroed_at_step_0) for system in systems]
-
-
-def _motion(system: System, zeroed: bool) -> tuple[Array | None, Status, str]:
-    steps = follow(system)
-    for step in steps:
-        if not step.usable:
-            return None, step.equilibrium.status, step.equilibrium.message
-    q = np.stack([observe(system, step.equilibrium.q, k) for k, step in enumerate(steps)])
-    return less_step_0(q, zeroed), Status.CONVERGED, ""
+    stack = Stack.of([model], [(0, one.case) for one in tested])
+    poses = stack.solve()
+    seen = readings(stack, poses.q)
+    found: list[tuple[Array | None, Status, str]] = []
+    for first, end in pairwise(stack.first.tolist()):
+        lost = next((at for at in range(first, end) if not Status(poses.status[at]).usable), None)
+        if lost is not None:
+            found.append((None, Status(poses.status[lost]), poses.messages[lost]))
+        else:
+            motion = less_step_0(seen[first:end], cohort.zeroed_at_step_0)
+            found.append((motion, Status.CONVERGED, ""))
+    return found
 
 
 def error_rows(
@@ -70,64 +73,53 @@ def error_rows(
         loaded = driven([one for one, _ in here])
         failed = [end for _, end in here if end[0] is None]
         status, message = (failed[0][1], failed[0][2]) if failed else (Status.CONVERGED, "")
-        for joint, name in enumerate(cohort.joint_names):
-            for place, coordinate in enumerate(COORDINATES):
-                numbers = _numbers(here, joint, place, lost=bool(failed))
-                if numbers is not None:
-                    rows.append(
-                        {
-                            "test": test,
-                            "joint": name,
-                            "coordinate": coordinate,
-                            "loaded": loaded == coordinate,
-                            "unit": COORDINATE_UNITS[coordinate],
-                            **numbers,
-                            "status": status.value,
-                            "message": message,
-                        }
-                    )
+        numbers, measured = _numbers(here, lost=bool(failed))
+        for joint, place in np.argwhere(measured).tolist():
+            coordinate = COORDINATES[place]
+            found = {name: values[joint][place] for name, values in numbers.items()}
+            rows.append(
+                {
+                    "test": test,
+                    "joint": cohort.joint_names[joint],
+                    "coordinate": coordinate,
+                    "loaded": loaded == coordinate,
+                    "unit": COORDINATE_UNITS[coordinate],
+                    **{name: None if np.isnan(one) else one for name, one in found.items()},
+                    "readings": int(found["readings"]),
+                    "status": status.value,
+                    "message": message,
+                }
+            )
     return rows
 
 
 def _numbers(
-    here: Sequence[tuple[MeasuredCycle, tuple[Array | None, Status, str]]],
-    joint: int,
-    place: int,
-    lost: bool,
-) -> Row | None:
-    """Mean errors of one joint and coordinate over steps and cycles; None where not measured."""
-    border = BORDER_PER_SI[place]
-    measured = [one.readings[:, joint, place] * border for one, _ in here]
-    read = [np.isfinite(values) for values in measured]
-    if not any(known.any() for known in read):
-        return None
-    known_peak = np.array([known[one.peak] for known, (one, _) in zip(read, here, strict=True)])
-    sizes = np.concatenate(
-        [np.abs(values[known]) for values, known in zip(measured, read, strict=True)]
-    )
-    at_peak = np.array([values[one.peak] for values, (one, _) in zip(measured, here, strict=True)])
-    row: Row = {
-        "readings": len(sizes),
-        "measured": float(sizes.mean()),
-        "measured_peak": float(at_peak[known_peak].mean()) if known_peak.any() else None,
+    here: Sequence[tuple[MeasuredCycle, tuple[Array | None, Status, str]]], lost: bool
+) -> tuple[dict[str, list[list[float]]], NDArray[np.bool_]]:
+    """Mean errors (J, 6) over steps and cycles in mm and deg, NaN for none; what was measured."""
+    measured = np.concatenate([from_si(one.readings) for one, _ in here])
+    firsts = np.cumsum([0, *(len(one.readings) for one, _ in here[:-1])])
+    peaks = firsts + [one.peak for one, _ in here]
+    errors = np.full(measured.shape, np.nan)
+    if not lost:
+        errors = np.concatenate([from_si(end[0]) for _, end in here if end[0] is not None])
+        errors = errors - measured
+    read = np.isfinite(measured)
+    found = {
+        "measured": _mean(np.abs(measured), read),
+        "measured_peak": _mean(measured[peaks], read[peaks]),
+        "bias": _mean(errors, read),
+        "mae": _mean(np.abs(errors), read),
+        "rmse": np.sqrt(_mean(errors**2, read)),
+        "peak_error": _mean(errors[peaks], read[peaks]),
     }
-    if lost:
-        return row | dict.fromkeys(("bias", "mae", "rmse", "peak_error"))
-    errors = [
-        _error(end[0], joint, place, values)
-        for (_, end), values in zip(here, measured, strict=True)
-    ]
-    every = np.concatenate([error[known] for error, known in zip(errors, read, strict=True)])
-    peaks = np.array([error[one.peak] for error, (one, _) in zip(errors, here, strict=True)])
-    return row | {
-        "bias": float(every.mean()),
-        "mae": float(np.abs(every).mean()),
-        "rmse": float(np.sqrt(np.mean(every**2))),
-        "peak_error": float(peaks[known_peak].mean()) if known_peak.any() else None,
-    }
+    numbers = {"readings": read.sum(axis=0).astype(float), **found}
+    return {name: values.tolist() for name, values in numbers.items()}, read.any(axis=0)
 
 
-def _error(motion: Array | None, joint: int, place: int, measured: Array) -> Array:
-    assert motion is not None
-    error: Array = motion[:, joint, place] * BORDER_PER_SI[place] - measured
-    return error
+def _mean(values: Array, read: NDArray[np.bool_]) -> Array:
+    """(J, 6) over what was read of (N, J, 6); NaN where nothing was."""
+    count = read.sum(axis=0)
+    total = np.where(read, values, 0.0).sum(axis=0)
+    found: Array = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return found

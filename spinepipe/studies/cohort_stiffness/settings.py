@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
+from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.studies.base_model import Base
 from spinepipe.studies.cohort_stiffness.representations import FITTED, UNLESS_ASKED, named
 from spinepipe.studies.parts import (
@@ -174,8 +175,12 @@ NOBODY = "nobody"
 
 def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
     """The study's tests: those chosen, else all that have a reading."""
-    if study.tests:
-        return study.tests
+    return study.tests or _read_tests(cohort)
+
+
+@kept_with_cohort
+def _read_tests(cohort: Cohort) -> tuple[str, ...]:
+    """The tests that have a reading."""
     assert cohort.motion is not None
     read = cohort.motion[list(COORDINATE_COLUMNS)].notna().any(axis=1)
     moved = set(cohort.motion.loc[read, "test"])

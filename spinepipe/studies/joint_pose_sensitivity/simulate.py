@@ -1,17 +1,22 @@
 """Job: motion of one specimen, joint pose and stiffness set under all its tests."""
 
-import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen
 from spinepipe.effects.contract import Array
+from spinepipe.files import Stamp, stamp
+from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics import Program, System, follow, settle
+from spinepipe.statics import Program, System, settle
+from spinepipe.statics.many import Stack
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
@@ -19,10 +24,10 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     specimen_inputs,
     study_and_cohort,
 )
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set, ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
-from spinepipe.tables import read_frame, to_arrow, write
+from spinepipe.tables import read, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
 
@@ -45,15 +50,16 @@ def run(
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
     frames, no_frames = sampled_poses(poses).of(specimen, int(pose))
-    values, no_values = _stiffness(calibration, best, specimen, stiffness)
-    model, reason = None, no_frames or no_values
-    if frames is not None and values is not None:
-        try:
-            model = bushing_model(settings, cohort, specimen, frames, values)
-        except RefusedModel as error:
-            reason = str(error)
-    ended = _solve_all(settings, inputs, model, reason)
-    tested = [one.in_frames(inputs.frames, frames or inputs.frames) for one in inputs.tested]
+    if frames is None:
+        ended, tested = _refused(inputs, no_frames), inputs.tested
+    elif calibration:
+        (ended,) = _solve_all(settings, cohort, inputs, frames, [_calibrated(calibration)])
+        tested = _in_frames(inputs, frames)
+    else:
+        where = settings, root, specimen, int(pose), stamp(poses), stamp(best)
+        ranked, tested = _ranked_ends(*where)
+        lacking = f"fewer fits in the reduced dataset than {stiffness} asks for"
+        ended = ranked.get(stiffness) or _refused(inputs, lacking)
     rows = [
         {**row, "stiffness": stiffness, "joint": cohort.joint_names[row["joint"]]}
         for one, steps in zip(tested, ended, strict=True)
@@ -65,18 +71,34 @@ def run(
     write(to_arrow(TABLE, columns), output, made_by)
 
 
-def _stiffness(calibration: str, best: str, specimen: str, name: str) -> tuple[Array | None, str]:
-    """Stiffness (J or 1, 6) to simulate with, or None and the reason."""
-    if calibration:
-        rows = read_frame(calibration)
-        values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
-        if np.isfinite(values).all():
-            return values, ""
-        return None, f"not calibrated: {rows['message'].iloc[0]}"
-    ranked = ranked_set(best, specimen, name)
-    if ranked:
-        return np.array(json.loads(ranked)), ""
-    return None, f"fewer fits in the reduced dataset than {name} asks for"
+def _calibrated(path: str) -> Array | str:
+    """Stiffness (J or 1, 6) that was calibrated, or why there is none."""
+    rows = read(path, [*STIFFNESS_COLUMNS, "message"])
+    values = np.array([rows[name].to_numpy(zero_copy_only=False) for name in STIFFNESS_COLUMNS]).T
+    if np.isfinite(values.astype(float)).all():
+        return values
+    return f"not calibrated: {rows['message'][0].as_py()}"
+
+
+@lru_cache(maxsize=8)
+def _ranked_ends(
+    settings: JointPoseSensitivity, root: str, specimen: str, pose: int, poses: Stamp, best: Stamp
+) -> tuple[dict[str, "_Ends"], tuple[MeasuredCycle, ...]]:
+    """How each ranked set of a specimen ends in one pose, and what was measured, in its frames.
+
+    Their jobs follow each other: together they cost little more than the first of them alone.
+    """
+    _, cohort = study_and_cohort(root, settings.study)
+    inputs = specimen_inputs(root, settings.study, specimen, cohort.digest)
+    frames, _ = sampled_poses(poses[0]).of(specimen, pose)
+    assert frames is not None
+    sets = {one["name"]: np.array(one["stiffness"]) for one in ranking(best[0]).get(specimen, [])}
+    ends = _solve_all(settings, cohort, inputs, frames, list(sets.values()))
+    return dict(zip(sets, ends, strict=True)), _in_frames(inputs, frames)
+
+
+def _in_frames(inputs: MeasuredSpecimen, frames: tuple[Pose, ...]) -> tuple[MeasuredCycle, ...]:
+    return tuple(one.in_frames(inputs.frames, frames) for one in inputs.tested)
 
 
 @dataclass(frozen=True)
@@ -89,33 +111,70 @@ class _Ended:
     remaining: Array | None = None
 
 
+_Ends = list[list[_Ended]]
+"""Of all steps of all cases."""
+
+
+def _refused(inputs: MeasuredSpecimen, reason: str) -> _Ends:
+    refused = _Ended(None, Status.REFUSED, reason)
+    return [[refused] * len(case.steps) for case in inputs.cases]
+
+
 def _solve_all(
-    settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: SpineModel | None, reason: str
-) -> list[list[_Ended]]:
-    """Ends of all steps of all cases; refused with the reason when there is no model."""
-    if model is None:
-        refused = _Ended(None, Status.REFUSED, reason)
-        return [[refused] * len(case.steps) for case in inputs.cases]
-    chain = Chain(model)
-    solve = _settle if settings.loading == "settle" else _balance
-    return [solve(settings, System(chain, model, case)) for case in inputs.cases]
+    settings: JointPoseSensitivity,
+    cohort: Cohort,
+    inputs: MeasuredSpecimen,
+    frames: tuple[Pose, ...],
+    sets: Sequence[Array | str],
+) -> list[_Ends]:
+    """Ends of all steps of all cases with each set of stiffness; refused where there is none."""
+    ends: list[_Ends | None] = []
+    models: list[SpineModel] = []
+    for values in sets:
+        try:
+            if isinstance(values, str):
+                raise RefusedModel(values)
+            models.append(bushing_model(settings, cohort, inputs.specimen, frames, values))
+            ends.append(None)
+        except RefusedModel as error:
+            ends.append(_refused(inputs, str(error)))
+    if settings.loading == "settle":
+        found = iter([_settle(settings, inputs, model) for model in models])
+    else:
+        found = iter(_balance(inputs, models))
+    return [next(found) if one is None else one for one in ends]
 
 
-def _balance(settings: JointPoseSensitivity, system: System) -> list[_Ended]:
-    """Equilibrium under each load step."""
-    ends = [step.equilibrium for step in follow(system)]
-    return [_Ended(e.q if e.status.usable else None, e.status, e.message) for e in ends]
+def _balance(inputs: MeasuredSpecimen, models: Sequence[SpineModel]) -> list[_Ends]:
+    """Equilibrium under each load step, of all models in one stack."""
+    if not models:
+        return []
+    runs = [(number, case) for number in range(len(models)) for case in inputs.cases]
+    stack = Stack.of(models, runs)
+    found = stack.solve()
+    messages = stack.warnings(found.q) | found.messages
+    each = zip(found.q.reshape(len(found.q), -1), found.status.tolist(), strict=True)
+    ended = [
+        _Ended(None if np.isnan(q[0]) else q, Status(status), messages.get(lane, ""))
+        for lane, (q, status) in enumerate(each)
+    ]
+    by_run = [ended[first:end] for first, end in pairwise(stack.first.tolist())]
+    count = len(inputs.cases)
+    return [by_run[first : first + count] for first in range(0, len(runs), count)]
 
 
-def _settle(settings: JointPoseSensitivity, system: System) -> list[_Ended]:
+def _settle(settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: SpineModel) -> _Ends:
     """Where each load step, switched on in the neutral pose, has brought the chain in time."""
-    ended = []
-    for step in system.case.steps:
-        program = Program.constant(system.slots.loading(step.wrenches))
-        end = settle(system, program, settings.settle_time_s)
-        pose = end.q if end.status.usable else None
-        ended.append(_Ended(pose, end.status, end.message, end.remaining))
-    return ended
+    chain, ends = Chain(model), []
+    for case in inputs.cases:
+        system, ended = System(chain, model, case), []
+        for step in case.steps:
+            program = Program.constant(system.slots.loading(step.wrenches))
+            end = settle(system, program, settings.settle_time_s)
+            pose = end.q if end.status.usable else None
+            ended.append(_Ended(pose, end.status, end.message, end.remaining))
+        ends.append(ended)
+    return ends
 
 
 def _zeroed(ended: list[_Ended]) -> list[_Ended]:

@@ -1,4 +1,4 @@
-"""Job: motion of one specimen with one set of joint frames, in all tests with all stiffness sets."""
+"""Job: motion of one specimen with one set of joint frames, all tests and stiffness sets."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

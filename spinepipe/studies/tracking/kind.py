@@ -61,6 +61,9 @@ _OF_MOTIONS = ("tracked", "fits", "drawn")
 _OF_PROFILES = ("profiles", "profile_points")
 _OF_RECORDINGS = ("clusters", "remarks", "sizes")
 
+FULL = ("weights",)
+"""Motions anew with loads counting more and less."""
+
 
 @dataclass(frozen=True)
 class TrackingFiles(StudyFiles):
@@ -71,6 +74,7 @@ class TrackingFiles(StudyFiles):
     taken : calibration that each motion takes over, by specimen, trial and approach; None for none.
     """
 
+    full = FULL
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
         Figure(

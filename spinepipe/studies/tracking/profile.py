@@ -86,16 +86,20 @@ def profiled(ask: Ask, seen: Sequence[Watched], held: Array, ratios: Array) -> A
     middle = int(np.argmin(np.abs(np.log(ratios))))
     known = [begun(ask, one) for one in seen]
     seen, begin = [one for one, _ in known], [start for _, start in known]
-    for order in (range(middle, len(ratios)), range(middle, -1, -1)):
-        starts, parameters = begin, np.zeros(ask.parameters)
+    first = begin, np.zeros(ask.parameters)
+    # from the middle upwards, then from where the middle ended downwards
+    for order in (range(middle, len(ratios)), range(middle - 1, -1, -1)):
+        starts, parameters = first
         for k in order:
             parameters = np.where(held, np.log(ratios[k]), parameters)
             solved = solve(ask, seen, starts, parameters, held)
             if not solved.status.usable:
                 break
             starts, parameters = list(solved.coefficients), solved.parameters
+            if k == middle:
+                first = starts, parameters
             prior = float(np.sum((parameters[held] / ask.sizes.size) ** 2))
-            found[k] = min(found[k], solved.costs.total - prior)
+            found[k] = solved.costs.total - prior
     return found
 
 

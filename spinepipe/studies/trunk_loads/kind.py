@@ -54,6 +54,9 @@ _AGAINST = Job(
     ("against_ghezelbash_2016",),
 )
 
+FULL = ("simplified", *TUNED, *_AGAINST.writes)
+"""Wrong simplifications, what is tuned to a volunteer, and the paper, which does both."""
+
 
 @dataclass(frozen=True)
 class TrunkFiles(StudyFiles):
@@ -64,6 +67,7 @@ class TrunkFiles(StudyFiles):
     rebuilt : whether the cohort stands for that of a paper.
     """
 
+    full = FULL
     joined = (*HELD, "simplified", "responses")
     drawings = (
         Figure(

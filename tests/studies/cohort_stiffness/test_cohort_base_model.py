@@ -1,5 +1,8 @@
 """A model file beneath a cohort study: its effects act in every model, besides the bushings.
 
+Seen here: an effect that acts in fits and not in predictions, values of a specimen told of itself, a
+file that does not fit and passes, a result that does not know its model.
+
 Straight chains turn joint by joint, so the motion of a joint with k q + r q^3 is the root of a cubic.
 """
 
@@ -221,14 +224,12 @@ FAULTS = [
 # fmt: on
 
 
-@pytest.mark.parametrize(("model", "place", "says"), FAULTS)
-def test_a_file_that_does_not_fit_is_refused(
-    model: str, place: str, says: str, tmp_path: Path
-) -> None:
-    (told,) = complaints(tmp_path, model)
-    assert told.startswith("model.yaml")
-    assert place in told
-    assert says in told
+def test_a_file_that_does_not_fit_is_refused(tmp_path: Path) -> None:
+    for number, (model, place, says) in enumerate(FAULTS):
+        (told,) = complaints(tmp_path / str(number), model)
+        assert told.startswith("model.yaml")
+        assert place in told
+        assert says in told
 
 
 def test_paths_count_from_the_project_wherever_one_stands(

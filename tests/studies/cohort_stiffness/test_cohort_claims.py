@@ -1,4 +1,7 @@
-"""What decides the claims about a cohort: numbers worked by hand."""
+"""What decides the claims about a cohort: numbers worked by hand.
+
+Seen here: a claim decided by the wrong test, interval, correction or side.
+"""
 
 import numpy as np
 import pandas as pd

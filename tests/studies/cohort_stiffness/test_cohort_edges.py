@@ -1,4 +1,8 @@
-"""What a cohort study does with data that are not complete, not sound, or not enough."""
+"""What a cohort study does with data that are not complete, not sound, or not enough.
+
+Seen here: a specimen that is refused for another, a NaN in a file, a stiffness told that nothing
+tells of, a message without who and why.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,8 @@
-"""Jobs of cohort studies on straight chains, whose motion is moment over stiffness, by hand."""
+"""Jobs of cohort studies on straight chains, whose motion is moment over stiffness, by hand.
+
+Seen here: a stiffness, error, criterion or label that is not what the closed form says; readings,
+cycles or steps used that should not be.
+"""
 
 from pathlib import Path
 from typing import Any

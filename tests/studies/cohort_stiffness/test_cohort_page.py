@@ -1,4 +1,7 @@
-"""The report of a cohort study: doubts first, true to its tables, fetching nothing."""
+"""The report of a cohort study: doubts first, true to its tables, fetching nothing.
+
+Seen here: a number or word that the tables do not say, a doubt told late, a page that fetches.
+"""
 
 import re
 from pathlib import Path

@@ -1,4 +1,8 @@
-"""Which coordinates are fitted at which cost, and whole studies of few data."""
+"""Which coordinates are fitted at which cost, and whole studies of few data.
+
+Seen here: a stiffness told that no reading tells of, a likelihood of readings that share an error,
+a pool that has not settled taken for one that has, tests whose main load is not what they drive.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +28,6 @@ from cohort_edge_cases import TESTS, TRUTH, A, made_of_jobs, no_nan
 from spinepipe.calibrate import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
-from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness import findings, mae, pool, ranking
 from spinepipe.studies.cohort_stiffness import significance as statistics
 from spinepipe.studies.cohort_stiffness.kind import KIND, CohortLayout
@@ -168,18 +171,6 @@ def test_readings_under_no_load_are_fitted_to_nothing(tmp_path: Path) -> None:
     no_nan(tmp_path)
 
 
-def test_every_table_is_made_of_a_small_study(tmp_path: Path) -> None:
-    project = Chains(TRUTH, noise_deg=0.02).write(tmp_path)
-    study, _ = studies.check(tmp_path, STUDY)
-    assert isinstance(study, CohortStiffness)
-    project.literature("a")
-    no_nan(tmp_path)
-    project.fit("a", "per_specimen")
-    no_nan(tmp_path)
-    project.pool()
-    no_nan(tmp_path)
-
-
 def analysed(project: Written) -> Tables:
     """All tables of the study: job files made, joined and analysed, each by its job."""
     settings, cohort = study_of_kind(CohortStiffness, str(project.root), STUDY)
@@ -246,8 +237,15 @@ def with_a_pull(chains: Chains, instead_of: str, translations: bool) -> Chains:
 PULLED = "free: [extension, right_bending, superior]\nrepresentations: [per_specimen]\nstarts: 1\n"
 
 
-@pytest.mark.parametrize("translations", [True, False])
-@pytest.mark.parametrize("tests", [TESTS, (TESTS[0], TESTS[2])])
+@pytest.mark.parametrize(
+    ("tests", "translations"),
+    [
+        (TESTS, True),
+        ((TESTS[0], TESTS[2]), False),
+        pytest.param(TESTS, False, marks=pytest.mark.full),
+        pytest.param((TESTS[0], TESTS[2]), True, marks=pytest.mark.full),
+    ],
+)
 def test_a_test_that_only_pulls(tests: tuple[str, ...], translations: bool, tmp_path: Path) -> None:
     """It drives a translation where that was read; errors of rotations are of what turned."""
     chains = Chains(TRUTH, tests, noise_deg=0.02, study=PULLED)

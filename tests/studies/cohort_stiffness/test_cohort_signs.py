@@ -1,4 +1,7 @@
-"""Does each joint move with the load? Flipped signs are found, and nowhere else."""
+"""Does each joint move with the load? Flipped signs are found, and nowhere else.
+
+Seen here: a flipped sign or a wrong unit that passes, or a sound joint that is accused.
+"""
 
 import shutil
 from pathlib import Path

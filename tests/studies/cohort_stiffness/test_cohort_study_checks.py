@@ -1,4 +1,7 @@
-"""Settings of cohort studies: every fault located and explained, and what the cohort must have."""
+"""Settings of cohort studies: every fault located and explained, and what the cohort must have.
+
+Seen here: a fault that passes, is told of another line or key, or without what to do.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,13 +84,21 @@ CASES = [
 # fmt: on
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.about.replace(" ", "-"))
-def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path) -> None:
-    problems = complaints(chains(case.study + "\n"), tmp_path)
-    listing = "\n".join(map(str, problems))
-    here = [p for p in problems if (p.file, p.row, p.column) == (FILE, case.row, case.key)]
-    assert any(case.says in str(p) and case.remedy in p.remedy for p in here), listing
-    assert all(p.found and p.allowed and p.remedy for p in problems), listing
+def test_faults_of_the_study_are_located_and_explained(tmp_path: Path) -> None:
+    chains().write(tmp_path)
+    study = tmp_path / FILE
+    head = study.read_text(encoding="utf-8")
+    missed = dict[str, str]()
+    for case in CASES:
+        study.write_text(f"{head}{case.study}\n", encoding="utf-8")
+        with pytest.raises(InputError) as caught:
+            studies.check(tmp_path, STUDY)
+        problems = caught.value.problems
+        here = [p for p in problems if (p.file, p.row, p.column) == (FILE, case.row, case.key)]
+        told = any(case.says in str(p) and case.remedy in p.remedy for p in here)
+        if not told or not all(p.found and p.allowed and p.remedy for p in problems):
+            missed[case.about] = "\n".join(map(str, problems))
+    assert not missed
 
 
 def test_weights_need_an_sd(tmp_path: Path) -> None:
@@ -134,31 +145,32 @@ def test_a_test_that_is_asked_for_must_have_been_measured(tmp_path: Path) -> Non
     assert problem.found == "test 'flexion', which has no motion"
 
 
-@pytest.mark.parametrize("name", ["all", "nothing", "all_but_flexion"])
-def test_names_of_tests_that_results_could_not_bear(name: str, tmp_path: Path) -> None:
+def with_a_test_called(name: str) -> Chains:
     made = chains()
     for table in (made.loads, made.motion):
         table["test"] = table["test"].replace("left_lateral_bending", name)
-    (problem,) = complaints(made, tmp_path)
-    assert (problem.file, problem.column) == ("chains/loads.csv", "test")
-    assert problem.found == f"test {name!r}"
-    assert "rename" in problem.remedy
+    return made
 
 
-@pytest.mark.parametrize("name", ["a/b", "a=b", "{a}", ".a", "a\x07b"])
-def test_names_that_no_table_may_have(name: str, tmp_path: Path) -> None:
-    made = chains()
-    for table in (made.loads, made.motion):
-        table["test"] = table["test"].replace("left_lateral_bending", name)
-    loads, motion = complaints(made, tmp_path)
-    assert (loads.file, motion.file) == ("chains/loads.csv", "chains/motion.csv")
-    if "\x07" in name:
-        assert "control character" in loads.found
-        return
-    assert loads.column == "test"
-    assert f"'{name}'" in loads.found
-    assert loads.allowed == ALLOWED
-    assert "rename" in loads.remedy
+def test_names_of_tests_that_results_could_not_bear(tmp_path: Path) -> None:
+    for name in ("all", "nothing", "all_but_flexion"):
+        (problem,) = complaints(with_a_test_called(name), tmp_path / name)
+        assert (problem.file, problem.column) == ("chains/loads.csv", "test")
+        assert problem.found == f"test {name!r}"
+        assert "rename" in problem.remedy
+
+
+def test_names_that_no_table_may_have(tmp_path: Path) -> None:
+    for number, name in enumerate(("a/b", "a=b", "{a}", ".a", "a\x07b")):
+        loads, motion = complaints(with_a_test_called(name), tmp_path / str(number))
+        assert (loads.file, motion.file) == ("chains/loads.csv", "chains/motion.csv")
+        if "\x07" in name:
+            assert "control character" in loads.found
+            continue
+        assert loads.column == "test"
+        assert f"'{name}'" in loads.found
+        assert loads.allowed == ALLOWED
+        assert "rename" in loads.remedy
 
 
 def test_a_test_that_is_not_chosen_may_be_called_anything(tmp_path: Path) -> None:

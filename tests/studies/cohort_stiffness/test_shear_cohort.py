@@ -1,10 +1,13 @@
 """A cohort of forces and translations: one joint pushed forwards and backwards, by hand.
 
+Seen here: degrees where millimetres are meant, in any table, claim, figure or message of the kind.
+
 The force acts at the joint's centre, so that the upper vertebra shifts and does not turn:
 displacement is force over stiffness.
 """
 
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -91,14 +94,15 @@ def frames(project: Written) -> Frames:
 
     for name in TRUE_N_PER_MM:
         keep(project.literature(name), specimen=name)
-        others = [other for other in TRUE_N_PER_MM if other != name]
-        for described in FITTED:
-            for label in (*TESTS, "all"):
-                where = {"specimen": name, "representation": described, "fitted_to": label}
-                keep(project.fit(name, described, label), **where)
-                keep(project.left_out(others, name, described, label), **where)
+    for described, label in product(FITTED, (*TESTS, "all")):
+        where = {"representation": described, "fitted_to": label}
+        for name, (own, predicted) in project.fit_all(
+            list(TRUE_N_PER_MM), described, label
+        ).items():
+            keep(own, specimen=name, **where)
+            keep(predicted, specimen=name, **where)
     for label in (*TESTS, "all"):
-        for without in ("nobody", *TRUE_N_PER_MM):
+        for without in ("nobody", *(TRUE_N_PER_MM if label == "all" else ())):
             found = project.pool(label, without)
             where = {"representation": "partially_pooled", "fitted_to": label}
             keep({"pooling": found.pop("pooling")}, without=without, **where)

@@ -13,7 +13,6 @@ from chain_cases import STUDY, Chains, Written, by_joint
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
-from spinepipe.studies.cohort_stiffness import left_out
 from spinepipe.studies.cohort_stiffness.findings import finding_rows
 from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
 from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
@@ -21,7 +20,7 @@ from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.significance import all_tests
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS, RANKING
 from spinepipe.studies.read import check, read
-from spinepipe.tables import Tables, from_rows, read_frame
+from spinepipe.tables import Tables, from_rows
 
 K = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 B = np.array([[8.0, 6.0, 20.0], [10.0, 5.0, 15.0], [6.0, 9.0, 30.0]])
@@ -134,17 +133,9 @@ def linear_and_stiffening(project: Written) -> Frames:
 
     for name in ("per_specimen", "stiffening"):
         where = {"representation": name, "fitted_to": "flexion"}
-        kept = {}
-        for specimen in SPECIMENS:
-            keep(project.fit(specimen, name, "flexion"), specimen=specimen, **where)
-            kept[specimen] = str(project.root / f"{specimen}.parquet")
-            (project.root / "stiffness.parquet").replace(kept[specimen])
-        for specimen in SPECIMENS:
-            others = [path for other, path in kept.items() if other != specimen]
-            files = {key: str(project.root / f"{key}.parquet") for key in ("stiffness", "errors")}
-            left_out.run(str(project.root), STUDY, others, specimen, name, "flexion", **files)
-            found = {key: read_frame(path) for key, path in files.items()}
-            keep(found, specimen=specimen, **where)
+        for specimen, tables in project.fit_all(list(SPECIMENS), name, "flexion").items():
+            for found in tables:
+                keep(found, specimen=specimen, **where)
     for specimen in SPECIMENS:
         keep(project.literature(specimen), specimen=specimen)
     frames = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}

@@ -1,4 +1,4 @@
-"""A search for missing effects from end to end: rules, search, figures and report, on two chains.
+"""A search for missing effects as Snakemake runs it, on two chains.
 
 A straight chain turns joint by joint, so its flexion under a law k q + r q^3 is the root of a
 cubic, solved here by numpy: the hidden truth is stiffening, and nothing of spinepipe makes it.
@@ -41,10 +41,6 @@ def test_every_result_holds_the_rows_of_its_study(eight: Project) -> None:
     assert rows.pop("next_tests") == rows.pop("tabulated") == 0  # all is named
     assert min(rows.values()) > 0
     assert eight.path(f"{FOLDER}/design.csv").read_text().startswith("effect_or_pair,test,")
-    figures = {path.stem for path in eight.path(f"{FOLDER}/figures").glob("*.svg")}
-    assert figures == {path.stem for path in eight.path(f"{FOLDER}/figures").glob("*.png")}
-    page = eight.path(f"{FOLDER}/report.html").read_text()
-    assert "The model lacks nonlinear stiffening" in page
 
 
 @pytest.mark.full
