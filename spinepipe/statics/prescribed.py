@@ -381,13 +381,11 @@ def newton_steps(trials: Sequence[Trial]) -> list[NewtonStep | None]:
     given = np.array([one.compliance for one in trials])[:, None] * first.units**2
     holder = (pushes, wanted, given)
     _assemble(motion, asked, holder, (load, tangent), (missing, matrix))
-    inside = [bool(one) for one in np.isfinite(load).all(axis=1)]
-    if not all(inside):
-        beyond = np.flatnonzero(~np.array(inside))
+    beyond = np.unique(np.nonzero(~np.isfinite(load))[0]).tolist()
+    if beyond:
         matrix[beyond], missing[beyond] = np.eye(size), 0.0  # have no step
-    steps = _solved(matrix, -missing)
-    found = map(NewtonStep, steps, matrix)
-    return [one if there else None for one, there in zip(found, inside, strict=True)]
+    each = enumerate(zip(_solved(matrix, -missing), matrix, strict=True))
+    return [None if number in beyond else NewtonStep(*one) for number, one in each]
 
 
 def _held(chains: Sequence[HeldChain], q: Array) -> tuple[Array, Array]:
