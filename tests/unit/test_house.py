@@ -54,7 +54,7 @@ LARGEST_BYTES = 1_500_000
 LARGE_ON_PURPOSE: frozenset[str] = frozenset()
 """Tracked files that may be larger, as paths from the root."""
 
-CHANGING = ("progress.Progress", "studies.trunk_loads.tune.Volunteer", "motion.banded.Band")
+CHANGING = ("progress.Progress", "studies.trunk_loads.tune.Volunteer")
 """Dataclasses that are not frozen."""
 
 # Put together here, so that this file does not itself hold what it forbids.
