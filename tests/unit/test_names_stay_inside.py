@@ -94,7 +94,7 @@ NAMES = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(NAMES)
 def test_any_accepted_name_stays_below_the_folder_of_its_study(
     paths: list[tuple[str, str]], name: str
