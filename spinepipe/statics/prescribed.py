@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects import JointLaw, Kind
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics.equilibrium import (
     FIRST_INCREMENT,
@@ -246,7 +246,8 @@ class HeldChain:
     ----------
     free : (n,) coordinates that may move; the others stay zero.
     values : (R, P) of each law, as of the model's effects.
-    frames : (J, 3, 3) and (J, 3) m. vectors : (k, 3, 3) of the prescriptions. units : (k,) m or rad.
+    frames : (J, 3, 3) and (J, 3) m, of the joints.
+    vectors, units : (k, 3, 3) and (k,) m or rad, of the prescriptions.
     asked : (k,) which prescriptions are tilts, and their bodies; (f,) free coordinates.
     """
 
@@ -426,9 +427,7 @@ def alone(trial: Trial) -> NewtonStep | None:
     return newton_steps([trial])[0]
 
 
-def hold_at(
-    chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone
-) -> Held:
+def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone) -> Held:
     """The pose in which a chain is held.
 
     Parameters

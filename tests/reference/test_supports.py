@@ -240,6 +240,7 @@ def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) 
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
     [

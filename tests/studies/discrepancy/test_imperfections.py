@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from imperfect_cases import JOINTS, SPECIMENS, alike, grounds_of, off_centre
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -129,7 +130,7 @@ def test_random_errors_are_seldom_called_common():
     assert alarms <= 20  # 1 % allowed for; 20 of 1000 have a probability of 0.3 % at 1 %
 
 
-@pytest.mark.parametrize("seed", range(3))
+@sweep("seed", range(3))
 def test_a_mean_is_that_of_generalised_least_squares(seed: int) -> None:
     """Sizes drawn towards zero as their covariance says, and correlated; by inverses."""
     rng, count = np.random.default_rng(seed), 7

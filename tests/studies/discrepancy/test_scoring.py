@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import beta
+from sweeps import sweep
 
 from tests.generators.hidden import CATALOGUE, KNOWN, Recipe, draw_hidden
 from tests.validation.discrepancy import report, run, seeds, store, tables, tune
@@ -89,8 +90,8 @@ ROWS = [
 LARGE = "one effect, gap >= 0.5, above its limit"
 
 
-@pytest.mark.parametrize(
-    ("what", "count", "n"),
+@sweep(
+    "what, count, n",
     [
         ("null and dirty null: NAMED, PART or SET", 1, 3),
         ("null and dirty null: not NULL", 2, 3),
@@ -138,9 +139,7 @@ def test_intervals_are_those_of_clopper_and_pearson() -> None:
     assert (found["met"], found["reached"]) == ("yes", "undecided")
 
 
-@pytest.mark.parametrize(
-    ("right", "of", "reached"), [(200, 200, "yes"), (20, 200, "no"), (190, 200, "undecided")]
-)
+@sweep("right, of, reached", [(200, 200, "yes"), (20, 200, "no"), (190, 200, "undecided")])
 def test_a_goal_is_reached_by_the_whole_interval(right: int, of: int, reached: str) -> None:
     flags = [True] * right + [False] * (of - right)
     assert share("", flags, Goal(low=0.95))["reached"] == reached
@@ -280,7 +279,7 @@ def test_words_about_code_do_not_change_its_digest(tmp_path: Path) -> None:
     assert store.digest([one]) != store.digest([other])
 
 
-@pytest.mark.parametrize("kind", DRAWN)
+@sweep("kind", DRAWN)
 def test_targets_of_a_seed_are_the_same(kind: str) -> None:
     assert DRAWN[kind](3, 20003) == DRAWN[kind](3, 20003)
 

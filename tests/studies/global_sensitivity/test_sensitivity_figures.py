@@ -1,4 +1,8 @@
-"""Figures and findings of global sensitivity, from indices of a linear function in closed form."""
+"""Figures and findings of global sensitivity, from indices of a linear function in closed form.
+
+Would catch bars, intervals, floors and names that do not stand where the table has them, and
+sentences with other numbers or without their conditions.
+"""
 
 from collections.abc import Sequence
 from itertools import product
@@ -8,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from chain_cases import JOINTS, Chains
 from drawn import caption, drawings
 from matplotlib.axes import Axes
@@ -207,9 +212,22 @@ def study(method: str = "sobol", **more: Any) -> GlobalSensitivity:
 
 def drawn(name: str, cohort: Cohort, **tables: pd.DataFrame) -> Figure:
     with style():
-        figure = DRAW[name](study(), cohort, Tables(tables))
-        assert picture(figure, "svg")
-    return figure
+        return DRAW[name](study(), cohort, Tables(tables))
+
+
+def test_every_figure_becomes_a_picture(cohort: Cohort) -> None:
+    found, (responses, design) = indices(), runs()
+    tables = Tables(
+        {
+            "indices": found,
+            "convergence": convergence(found),
+            "responses": responses,
+            "design": design,
+        }
+    )
+    with style():
+        for name, draw in DRAW.items():
+            assert picture(draw(study(), cohort, tables), "svg"), name
 
 
 def top_factors(
@@ -528,7 +546,7 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
     assert len(shown(panels, cohort.joint_names, 2)) == 2
 
 
-@pytest.mark.parametrize("method", LEFT_OUT)
+@sweep("method", LEFT_OUT)
 def test_failed_runs_are_told_with_the_rule(cohort: Cohort, method: str) -> None:
     found = Results(Tables({"indices": indices(method, failed=3)}), {}, {})
     sure = opening(study(method), cohort, found).how_sure

@@ -1,4 +1,8 @@
-"""Rows of patients and models keep their tables, and errors are pooled as they are told."""
+"""Rows of patients and models keep their tables, and errors are pooled as they are told.
+
+Would catch rows of other films or models than asked for, cells that no table takes, ends that are
+not where the study has them, and errors pooled over other rows.
+"""
 
 from pathlib import Path
 
@@ -19,7 +23,11 @@ from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, MEASURES
 from spinepipe.tables import from_rows
 from tests.generators import ais_films
 
-STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+STUDY = Scoliosis.model_validate(
+    {"study": "s", "kind": "scoliosis", "cohort": "ais", "film_regions": False}
+)
+"""Regions take longer than all else, and a run of the kind has them (`tests/workflow`)."""
+
 TABLES = (LAWS, POSITIONS, DISPLACEMENTS, CURVES)
 
 

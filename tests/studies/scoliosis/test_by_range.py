@@ -1,4 +1,7 @@
-"""Errors by how near the films come to the published ends: classes, counts and roots by hand."""
+"""Errors by how near the films come to the published ends: classes, counts and roots by hand.
+
+Would catch a rotation in the wrong class, and errors pooled over patients that lack a pose.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -6,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.studies.scoliosis.by_range import by_range_rows, classes
@@ -46,8 +50,8 @@ def table(rows: list[dict[str, Any]]) -> pd.DataFrame:
     return found.set_index(["films", "opposite", "range", "model"])
 
 
-@pytest.mark.parametrize(
-    ("share", "name"),
+@sweep(
+    "share, name",
     [
         (0.0, "below_0.2"),
         (0.199, "below_0.2"),

@@ -1,10 +1,15 @@
-"""Everything that may be wrong with films is told, with film, vertebra and remedy."""
+"""Everything that may be wrong with films is told, with film, vertebra and remedy.
+
+Would catch a fault of films that passes, sound films that are blamed, and words that do not name
+the film, the vertebra or what to do.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import Document
@@ -120,8 +125,8 @@ def unbent(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
+@sweep(
+    "change, words",
     [
         (radians, ["film erect", "radians? multiply by 57.3"]),
         (mirrored("right_bending"), ["film right_bending", "mirrored"]),

@@ -1,4 +1,8 @@
-"""Fits of tangents to both bending films: derivatives, films of the model itself, what they say."""
+"""Fits of tangents to both bending films: derivatives, films of the model itself, what they say.
+
+Would catch wrong derivatives of laws and films, a fit that does not come back to the laws which
+made the films, intervals too narrow, and a ratio called known that films leave open.
+"""
 
 from dataclasses import replace
 

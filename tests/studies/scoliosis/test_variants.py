@@ -1,4 +1,7 @@
-"""Variants of the published model, and what stiffness in all does in space."""
+"""Variants of the published model, and what stiffness in all does in space.
+
+Would catch a variant that varies something else, and wrong derivatives of regions.
+"""
 
 from dataclasses import replace
 
