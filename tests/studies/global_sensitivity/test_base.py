@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 import yaml
 from chain_cases import JOINTS, Chains
 from scipy.optimize import minimize
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.global_sensitivity import base, design, respond
@@ -182,7 +182,8 @@ def test_samples_start_from_the_fit(tmp_path: Path) -> None:
     assert turned.between(-1.15 * 3.44, -0.85 * 3.44).all()
 
 
-@sweep("predicted, measured, noise, verdict",
+@sweep(
+    "predicted, measured, noise, verdict",
     [
         (-0.5, -1.0, 0.0, "near"),
         (-0.49, -1.0, 0.0, "far"),

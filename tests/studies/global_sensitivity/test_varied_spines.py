@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import sweep
 from cohort_cases import add, both, cell, joints, swap, text, without, write
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
@@ -239,7 +239,8 @@ def test_samples_are_the_same_alone_and_together(cohort: Cohort) -> None:
         assert whole.cases[0].forces[i].tobytes() == alone.cases[0].forces[0].tobytes()
 
 
-@sweep("zeroed, gravity, all_steps, computed, from_first, stored",
+@sweep(
+    "zeroed, gravity, all_steps, computed, from_first, stored",
     [
         (False, True, False, [2], False, (2,)),
         (True, True, False, [0, 2], True, (2,)),

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from PIL import Image
 from study_cases import STUDY, Size, drawn, project, results
+from sweeps import sweep
 
 from spinepipe.report.marks import quartiles
 from spinepipe.report.panels import MOST_ROWS, rows_of
@@ -157,7 +157,8 @@ def test_quartiles_of_a_known_sample() -> None:
     assert found.iqr == 2.0
 
 
-@sweep("value, text",
+@sweep(
+    "value, text",
     [
         (20640.0, "20\u2009600"),
         (0.01344, "0.0134"),

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from scipy import stats
 from study_cases import START, STUDY, TABLES, Size, project, results
+from sweeps import sweep
 
 from spinepipe.designs import sample_log_uniform
 from spinepipe.studies.joint_pose_sensitivity import (
@@ -191,7 +191,8 @@ def test_precision_is_read_between_sampled_sds() -> None:
     assert required_precision(sds, errors, 1.0, 0.9, 20, 1).sd == pytest.approx(1.4)
 
 
-@sweep("error, message",
+@sweep(
+    "error, message",
     [(0.5, "3 mm will do, the largest"), (np.inf, "1 mm will not do, the smallest")],
 )
 def test_precision_outside_the_sampled_sds(error: float, message: str) -> None:
@@ -365,7 +366,8 @@ def test_one_joint_of_a_fit_that_is_an_outlier_takes_the_fit(tmp_path: Path) -> 
     assert not judged["near_start_all"].any()
 
 
-@sweep("size, options",
+@sweep(
+    "size, options",
     [
         pytest.param(Size(n_joints=1), {}, id="one joint"),
         pytest.param(Size(grouping="per_joint"), {}, id="per joint"),
@@ -743,7 +745,8 @@ def test_precision_where_every_pose_is_lost_is_not_silence(tmp_path: Path) -> No
     assert required["message"].str.contains("1 mm will not do").all()
 
 
-@sweep("nominal, says",
+@sweep(
+    "nominal, says",
     [(2.5, "misses by 2.5 times the limit"), (None, "own joint pose has no fit")],
 )
 def test_no_precision_is_told_where_the_nominal_pose_does_not_fit(
