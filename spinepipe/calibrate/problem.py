@@ -205,7 +205,7 @@ class Evaluator:
         found, problem = self.at(x), self.problem
         model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
         poses = held_against(
-            self._solver.record(problem.model, x), model, cases, found.poses, SAME_POSE
+            self._solver.record(x, problem.model), model, cases, found.poses, SAME_POSE
         )
         if poses is None:
             return None

@@ -109,12 +109,13 @@ class AtRest:
             guesses.append(q + dq @ np.clip(x - there, -self._reach, self._reach))
         return np.concatenate(guesses)
 
-    def record(self, model: SpineModel, x: Array) -> tuple[Array, ...] | str:
+    def record(self, x: Array, model: SpineModel | None = None) -> tuple[Array, ...] | str:
         """(T, n) poses of every case by the engine of record, or why not.
 
         Both engines go the same way from the neutral pose (`tests.validation engines`): where the
         stack gets through, the engine starts each step from where that has come.
         """
+        model = model or self._model
         self.start_at(model, x)
         there = moved(model, self._free, x)
         if self._first is None:
@@ -208,8 +209,9 @@ class Settling:
         poses = every[0].reshape(len(self._cases), -1)
         return Seen(*(tuple(one[at] for at in self._lanes) for one in (poses, seen, by_x)))
 
-    def record(self, model: SpineModel, x: Array) -> tuple[Array, ...] | str:
+    def record(self, x: Array, model: SpineModel | None = None) -> tuple[Array, ...] | str:
         """The poses (T, n) of every case by the engine of record, over the steps of `solve`."""
+        model = model or self._model
         there, sizes = moved(model, self._free, x), self._sizes[id(model), x.tobytes()]
         chain = Chain(there)
         ends = []

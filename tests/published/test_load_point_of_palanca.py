@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import sweep
 from scipy.optimize import least_squares, root
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.studies.joint_pose_sensitivity import load_point_effect, over_load_point, spread
 from spinepipe.tables import read_frame

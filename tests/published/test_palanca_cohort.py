@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 import yaml
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.anatomy import published
 from spinepipe.frames import joint_pose, zxy_angles

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from example_effects import loaded, spine
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
+from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit, fit_alike
 from spinepipe.calibrate.solvers import Seen, Settling
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
@@ -198,6 +198,24 @@ def test_a_truth_made_by_settling_comes_back(course: Course) -> None:
     assert found.cost == pytest.approx(2 * COST_PER_JOINT, rel=1e-2)
     at_rest = fit(problem_of(model, twice(case), measured, free))
     assert np.abs(at_rest.x - truth).max() > 0.02  # what lags is not at rest
+
+
+@pytest.mark.parametrize("course", [None, QUASI_STATIC])
+def test_fits_side_by_side_are_those_of_each_alone(course: Course | None) -> None:
+    """Of two starts, one with three times the damping: were models exchanged, ends would differ."""
+    model = spine(2)
+    free = free_parameters(model, 0, ROTATIONS, "per_specimen")
+    case = loaded(model, 1)
+    truth = moved(model, free, np.array([0.3, -0.2, 0.1]))
+    measured = with_errors(sampled(truth, case, QUASI_STATIC))
+    other = replace(moved(model, free, np.full(3, 0.2)), damping=3.0 * model.damping)
+    problems = [
+        problem_of(one, twice(case), measured, free, course=course) for one in (model, other)
+    ]
+    for found, alone in zip(fit_alike(problems), map(fit, problems), strict=True):
+        np.testing.assert_allclose(found.values, alone.values, rtol=1e-9)
+        assert (found.cost, found.status) == (pytest.approx(alone.cost, rel=1e-9), alone.status)
+        assert (found.evaluations, found.message) == (alone.evaluations, alone.message)
 
 
 def test_zeroed_readings_are_met_by_zeroed_ends() -> None:

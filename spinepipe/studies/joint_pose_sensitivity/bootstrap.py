@@ -1,6 +1,6 @@
 """Job: fits in a cohort's own joint poses, from sampled starts or with sampled damping.
 
-Fits of one way of loading are solved side by side: alone each would wait for numpy most of the time.
+Fits of one way of loading are solved side by side: of one alone, calls of numpy take the time.
 """
 
 from collections.abc import Sequence

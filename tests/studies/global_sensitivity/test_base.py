@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 import yaml
 from chain_cases import JOINTS, Chains
 from scipy.optimize import minimize
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.global_sensitivity import base, design, respond

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import sweep
 from cohort_cases import Change, add, both, cell, joints, line, swap, text, without, write
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.problems import InputError, Problem
 from spinepipe.sensitivity.global_indices.design import DUMMY

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from chain_cases import JOINTS, Chains
 from drawn import caption, drawings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from sweeps import sweep
 
 from spinepipe.cohort import Cohort, read
 from spinepipe.report.page.document import Picture, Results
@@ -312,7 +312,9 @@ def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> N
     assert not bands(sobol.axes[0])
     assert "the noise floor is too low to be seen" in said(sobol)
     assert "grey names: negligible in every panel" in said(sobol)
-    bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1], kinds=MOTION))
+    bare = drawn(
+        "factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1], kinds=MOTION)
+    )
     assert "no dummy, so no noise floor" in said(bare)
 
 

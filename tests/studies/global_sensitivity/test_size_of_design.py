@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import sweep
 from cohort_cases import write
 from SALib.sample import fast_sampler, latin, sobol
 from SALib.sample.morris import morris
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import sweep
 from cohort_cases import add, both, cell, joints, swap, text, without, write
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from study_cases import TABLES
+from sweeps import sweep
 
 from spinepipe.comparison.claim import (
     Claim,

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sweeps import sweep
 from identification_cases import identification
 from study_cases import FIGURES, STUDY, Size, drawing, project, results
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.report.style import picture, style

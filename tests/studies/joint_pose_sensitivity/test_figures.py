@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from PIL import Image
 from study_cases import STUDY, Size, drawn, project, results
+from sweeps import sweep
 
 from spinepipe.report.marks import quartiles
 from spinepipe.report.panels import MOST_ROWS, rows_of

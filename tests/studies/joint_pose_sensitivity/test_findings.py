@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from study_cases import STUDY, Size, project
+from sweeps import sweep
 
 from spinepipe.report.page.document import Results
 from spinepipe.studies.joint_pose_sensitivity.findings import findings

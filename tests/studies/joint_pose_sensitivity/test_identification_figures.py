@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from identification_cases import identification, write_table
 from matplotlib.figure import Figure
 from PIL import Image
 from study_cases import FIGURES, STUDY, Size, drawing, drawn, project, results
+from sweeps import sweep
 
 from spinepipe.report.panels import sections
 from spinepipe.report.style import DPI, WIDTH_MM

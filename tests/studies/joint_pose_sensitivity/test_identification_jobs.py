@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from scipy import stats
 from study_cases import START, STUDY, TABLES, Size, project, results
+from sweeps import sweep
 
 from spinepipe.designs import sample_log_uniform
 from spinepipe.studies.joint_pose_sensitivity import (

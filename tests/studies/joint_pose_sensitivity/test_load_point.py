@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweeps import sweep
 from pydantic import ValidationError
 from study_cases import STUDY, TABLES, Size, project
+from sweeps import sweep
 
 from spinepipe.comparison.claim import Run, judge
 from spinepipe.problems import InputError

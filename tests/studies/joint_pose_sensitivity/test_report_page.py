@@ -10,10 +10,9 @@ from tempfile import mkdtemp
 
 import numpy as np
 import pandas as pd
-import pytest
-from sweeps import sweep
 from identification_cases import METADATA, identification, write_table
 from study_cases import STUDY, Size, project, results
+from sweeps import sweep
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose

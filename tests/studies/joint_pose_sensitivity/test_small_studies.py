@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
-from sweeps import sweep
 from identification_cases import identification
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from study_cases import STUDY, Size, project, results
+from sweeps import sweep
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Picture, Results

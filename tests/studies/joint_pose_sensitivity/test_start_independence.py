@@ -7,7 +7,6 @@ the same stiffness to 1e-4, or says that it is not identifiable or that there ar
 from pathlib import Path
 
 import numpy as np
-import pytest
 from sweeps import sweep
 
 from spinepipe.anatomy import published
