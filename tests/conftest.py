@@ -21,17 +21,14 @@ FULL_FOR_NOW = frozenset(
         "test_scoliosis_figures",
         "test_tracking_figures",
         "test_posterior_job",
-        "test_cohort_analysis",
         "test_identification_figures",
         "test_sensitivity_figures",
         "test_tracking_findings",
         "test_tracking_checks",
         "test_figures",
         "test_tracking_page",
-        "test_cohort_figures",
         "test_trunk_figures",
         "test_discrepancy_page",
-        "test_nuisances",
         "test_against_gould_2024a",
     ]
 )
