@@ -18,18 +18,12 @@ settings.load_profile("same everywhere")
 FULL_FOR_NOW = frozenset(
     [
         "test_investigation_edges",
-        "test_scoliosis_figures",
         "test_tracking_figures",
-        "test_posterior_job",
-        "test_identification_figures",
-        "test_sensitivity_figures",
         "test_tracking_findings",
         "test_tracking_checks",
-        "test_figures",
         "test_tracking_page",
         "test_trunk_figures",
         "test_discrepancy_page",
-        "test_against_gould_2024a",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""

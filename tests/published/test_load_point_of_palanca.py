@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from scipy.optimize import least_squares, root
 from scipy.spatial.transform import Rotation
 
@@ -234,7 +235,7 @@ def extension_iqr(vertebra: str, sd_mm: float) -> float:
     return float(np.rad2deg(QUARTILES * np.sqrt(2.0) * sd_mm / height))
 
 
-@pytest.mark.parametrize(("joint", "vertebra"), [("L1L2", "L2"), ("L3L4", "L3")])
+@sweep("joint, vertebra", [("L1L2", "L2"), ("L3L4", "L3")])
 def test_spread_of_end_joints_in_closed_form(made: Path, joint: str, vertebra: str) -> None:
     """500 sets have an IQR to 5 %: three standard errors."""
     table = read_frame(made / "spread.parquet")

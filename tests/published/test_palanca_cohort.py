@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 import yaml
 from scipy.spatial.transform import Rotation
 
@@ -45,7 +46,7 @@ def table_8(joint: str, statistic: str) -> np.ndarray:
     return np.array([values[name] for name in ANGLES])
 
 
-@pytest.mark.parametrize("name", FILES)
+@sweep("name", FILES)
 def test_files_are_what_the_generator_writes(name: str, tmp_path: Path) -> None:
     runpy.run_path(str(GENERATOR))["write"](tmp_path)
     assert (tmp_path / name).read_bytes() == (FOLDER / name).read_bytes()
@@ -62,7 +63,7 @@ def test_cohort_yaml() -> None:
     assert published("gould_2024a")["doi"] in text["source"]
 
 
-@pytest.mark.parametrize("joint", JOINTS)
+@sweep("joint", JOINTS)
 def test_joint_origins_are_table_7(joint: str) -> None:
     points = landmarks_m()
     lower, upper = JOINTS[joint]
@@ -70,7 +71,7 @@ def test_joint_origins_are_table_7(joint: str) -> None:
     assert 1000.0 * origin == pytest.approx(table_7(joint, "median"), abs=ROUNDING_MM)
 
 
-@pytest.mark.parametrize("joint", ["L1L2", "L3L4"])
+@sweep("joint", ["L1L2", "L3L4"])
 def test_end_joint_orientations_are_table_8(joint: str) -> None:
     points = landmarks_m()
     lower, upper = JOINTS[joint]
@@ -138,7 +139,7 @@ def orientation_iqr(joint: str) -> np.ndarray:
     return iqr(np.rad2deg(zxy_angles(frames.as_matrix())))
 
 
-@pytest.mark.parametrize("joint", JOINTS)
+@sweep("joint", JOINTS)
 def test_origin_spread_is_table_7(joint: str) -> None:
     """Both are sampled: 500 poses give an IQR to 5 %, so 15 % is three standard errors."""
     samples = sampled_landmarks_mm()
@@ -147,13 +148,13 @@ def test_origin_spread_is_table_7(joint: str) -> None:
     assert iqr((facing[0] + facing[1]) / 2.0) == pytest.approx(table_7(joint, "iqr"), rel=0.15)
 
 
-@pytest.mark.parametrize("joint", ["L1L2", "L3L4"])
+@sweep("joint", ["L1L2", "L3L4"])
 def test_bending_and_rotation_spread_of_the_end_joints_is_table_8(joint: str) -> None:
     assert orientation_iqr(joint)[1:] == pytest.approx(table_8(joint, "iqr")[1:], rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("joint", "ratios"),
+@sweep(
+    "joint, ratios",
     [("L1L2", (0.44, None, None)), ("L2L3", (0.79, 0.74, 0.73)), ("L3L4", (0.59, None, None))],
 )
 def test_spread_that_table_8_prints_larger(joint: str, ratios: tuple[float | None, ...]) -> None:

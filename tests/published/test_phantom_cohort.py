@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe.anatomy import published
 from spinepipe.cohort import read
@@ -140,7 +141,7 @@ def test_no_specimen_is_symmetric() -> None:
 # --- truth --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("column", TABLE_3)
+@sweep("column", TABLE_3)
 def test_specimens_spread_as_in_table_3(column: str) -> None:
     """A specimen's geometric mean over its joints stands for a uniform stiffness as in Table 3."""
     specimens = np.log(truth()[column].to_numpy().reshape(6, 6)).mean(axis=1)
@@ -166,7 +167,7 @@ def test_translations_are_table_2() -> None:
 # --- loads --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("test", MAIN)
+@sweep("test", MAIN)
 def test_moments_rise_to_the_published_peak(test: str) -> None:
     table = pd.read_csv(FOLDER / "loads.csv")
     column, sign = MAIN[test]
@@ -177,7 +178,7 @@ def test_moments_rise_to_the_published_peak(test: str) -> None:
     assert set(of_test["vertebra"]) == {"T12"}
 
 
-@pytest.mark.parametrize("test", MAIN)
+@sweep("test", MAIN)
 def test_coupled_moments_are_small_smooth_and_never_the_same(test: str) -> None:
     table = pd.read_csv(FOLDER / "loads.csv")
     others = [name for name in MOMENTS if name != MAIN[test][0]]
@@ -200,7 +201,7 @@ def noise(of: Phantom) -> np.ndarray:
     return of.measured - (true - true[:, :, :, :1] if of.zeroed else true)
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_noise_is_as_cohort_yaml_says(zeroed: bool) -> None:
     """Zeroing puts step 0's noise into every reading of the cycle: two SDs in quadrature, of
     which half is common to all steps. 32,400 readings give an SD to 0.4 %, 3,240 cycles to 1.2 %.

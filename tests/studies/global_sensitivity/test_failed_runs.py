@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.status import Status
@@ -33,7 +34,7 @@ def rows(design: Design, how: Ends) -> pd.DataFrame:
     return table.to_pandas().set_index("factor")
 
 
-@pytest.mark.parametrize("method", SAMPLES)
+@sweep("method", SAMPLES)
 def test_runs_that_fail_at_one_end_are_told_there(method: str) -> None:
     """A soft joint with a tall load tips: where the first is low and the second high."""
     design = drawn(method)

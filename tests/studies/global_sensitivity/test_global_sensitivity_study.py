@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from cohort_cases import Change, add, both, cell, joints, line, swap, text, without, write
 from scipy import stats
 
@@ -169,8 +170,8 @@ def test_methods_have_the_indices_of_the_analysis() -> None:
     assert {method.value: names for method, names in INDICES.items()} == study_file.INDICES
 
 
-@pytest.mark.parametrize(
-    ("more", "specimens", "size"),
+@sweep(
+    "more, specimens, size",
     [
         ("", 1, 1),  # 64 x (2 x 11 + 2) = 1,536 runs
         ("", 2, 256),  # 3,072 runs
@@ -244,7 +245,7 @@ CASES = [
 # fmt: on
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: c.about.replace(" ", "-"))
+@sweep("case", CASES, title=lambda case: case.about)
 def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path) -> None:
     assert case.old is None or case.old in STUDY
     study = STUDY + case.new + "\n" if case.old is None else STUDY.replace(case.old, case.new, 1)
@@ -292,7 +293,7 @@ COHORT_CASES = [
 # fmt: on
 
 
-@pytest.mark.parametrize(("about", "factor", "changes", "key", "says"), COHORT_CASES)
+@sweep("about, factor, changes, key, says", COHORT_CASES)
 def test_factor_that_the_cohort_does_not_serve(
     about: str, factor: str, changes: list[Change], key: str, says: str, tmp_path: Path
 ) -> None:
@@ -316,7 +317,7 @@ def test_endplates_of_a_given_joint_may_make_the_next_one(tmp_path: Path) -> Non
     assert "no joint frame of a hangs" in problem.found
 
 
-@pytest.mark.parametrize("rows", [(FIRST,), (), (LANDMARK[:-1] + ", group: g}",) * 2])
+@sweep("rows", [(FIRST,), (), (LANDMARK[:-1] + ", group: g}",) * 2])
 def test_one_factor_has_nothing_to_be_compared_with(rows: tuple[str, ...], tmp_path: Path) -> None:
     rows = tuple(row.replace("axis: x", f"axis: {axis}") for row, axis in zip(rows, "xy"))  # noqa: B905
     text = only(*rows) if rows else only().replace("factors:", "factors: []")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from cohort_cases import write
 from SALib.sample import fast_sampler, latin, sobol
 from SALib.sample.morris import morris
@@ -54,8 +55,8 @@ def drawn(found: GlobalSensitivity) -> int:
     return len(sampler.sample(problem, n, seed=1))
 
 
-@pytest.mark.parametrize(
-    ("asked", "runs"),
+@sweep(
+    "asked, runs",
     [
         (study("sobol", 16), 16 * 12),
         (study("sobol", 16, second_order=False), 16 * 7),

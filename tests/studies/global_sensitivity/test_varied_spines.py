@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from cohort_cases import add, both, cell, joints, swap, text, without, write
 from scipy.spatial.transform import Rotation
 
@@ -86,7 +87,7 @@ def test_poses_that_are_given_stay_when_landmarks_move(tmp_path: Path) -> None:
     np.testing.assert_array_equal(moved.origins[0], [[0.0, 0.005, 0.0], [0.0, 0.041, 0.0]])
 
 
-@pytest.mark.parametrize("complete", ["both", "lower", "upper"])
+@sweep("complete", ["both", "lower", "upper"])
 def test_many_frames_are_those_of_joint_pose(complete: str) -> None:
     rng = np.random.default_rng(11)
     upright = np.array([[0, 26, 0], [0, 0, 0], [-20, 18, -15], [-20, 18, 15]]) / 1000.0
@@ -238,8 +239,8 @@ def test_samples_are_the_same_alone_and_together(cohort: Cohort) -> None:
         assert whole.cases[0].forces[i].tobytes() == alone.cases[0].forces[0].tobytes()
 
 
-@pytest.mark.parametrize(
-    ("zeroed", "gravity", "all_steps", "computed", "from_first", "stored"),
+@sweep(
+    "zeroed, gravity, all_steps, computed, from_first, stored",
     [
         (False, True, False, [2], False, (2,)),
         (True, True, False, [0, 2], True, (2,)),

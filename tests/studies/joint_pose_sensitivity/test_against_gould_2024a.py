@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from study_cases import TABLES
 
 from spinepipe.comparison.claim import (
@@ -282,8 +283,8 @@ def claim(value: float | None, low: float | None, high: float | None, wrong: str
     )
 
 
-@pytest.mark.parametrize(
-    ("value", "low", "high", "verdict"),
+@sweep(
+    "value, low, high, verdict",
     [
         (1.0, 1.0, 3.0, "inside"),
         (3.0, 1.0, 3.0, "inside"),
@@ -310,7 +311,7 @@ def test_reason_says_what_the_range_is_and_why_ours_is_outside() -> None:
     assert absent["ours"] is None
 
 
-@pytest.mark.parametrize("value", [2.0, 4.0, None])
+@sweep("value", [2.0, 4.0, None])
 def test_what_the_paper_contradicts_is_not_compared(value: float | None) -> None:
     row = judge(claim(value, 1.0, 3.0, "A1: 2 is not 3"), EMPTY_RUN)
     assert row["verdict"] == "contradicted"
@@ -365,8 +366,8 @@ def test_success_follows_the_rule_of_the_study() -> None:
     assert "ours: 500 of 500" in lax["reason"]
 
 
-@pytest.mark.parametrize(
-    ("name", "ours", "verdict"),
+@sweep(
+    "name, ours, verdict",
     [
         ("success.forward_run_default_step", 25.0, "inside"),
         ("reduced.stiffness.extension.median", 2.0, "outside"),
@@ -447,9 +448,7 @@ def test_what_is_not_computed_carries_the_message_of_the_table() -> None:
     assert message in row["reason"]
 
 
-@pytest.mark.parametrize(
-    ("error", "ours", "verdict"), [(0.5, 4.0, "inside"), (2.0, 1.0, "outside")]
-)
+@sweep("error, ours, verdict", [(0.5, 4.0, "inside"), (2.0, 1.0, "outside")])
 def test_required_precision_outside_the_sampled_sds(
     error: float, ours: float, verdict: str
 ) -> None:
@@ -513,7 +512,7 @@ def test_contradicted_cells() -> None:
     ]
 
 
-@pytest.mark.parametrize(("effect", "verdict"), [(0.15, "outside"), (-0.15, "inside")])
+@sweep("effect, verdict", [(0.15, "outside"), (-0.15, "inside")])
 def test_a_sign_that_the_paper_has_otherwise_is_outside(effect: float, verdict: str) -> None:
     """Table 6, L2L3, flexion: tau -0.18 to -0.12, of which -0.12 cannot be significant (A25)."""
     cell = {"family": "two-factor: extension_error at L2L3 against pose", "joint": "L2L3"}
@@ -532,8 +531,8 @@ def test_a_sign_that_the_paper_has_otherwise_is_outside(effect: float, verdict: 
     assert "A25: 0.12 of 123 values" in row["reason"]
 
 
-@pytest.mark.parametrize(
-    ("rho", "joint", "name", "verdict"),
+@sweep(
+    "rho, joint, name, verdict",
     [
         (0.18, "L2L3", "extension", "inside"),
         (-0.17, "L2L3", "extension", "outside"),
@@ -554,7 +553,7 @@ def test_error_against_measured_motion(rho: float, joint: str, name: str, verdic
     assert f"rho {rho:.2f}" in row["reason"]
 
 
-@pytest.mark.parametrize(("fits", "verdict"), [(3, "not_computed"), (10, "outside")])
+@sweep("fits, verdict", [(3, "not_computed"), (10, "outside")])
 def test_few_fits_tell_no_rate(fits: int, verdict: str) -> None:
     """Three of three leave 44 to 100 %: 3 / (3 + 1.96^2) and all."""
     rows = [{"method": "exact", "fits": fits, "successful": fits}]
@@ -572,8 +571,18 @@ def test_ids_are_unique_and_every_claim_has_a_reason() -> None:
     assert [claim.id for claim in CLAIMS if not (claim.outside or claim.contradicted)] == []
 
 
-@pytest.mark.parametrize("name", sorted(tables()))
-def test_a_missing_or_empty_table_is_told(name: str) -> None:
+@sweep("name", ["summary", "statistics"])
+def test_a_missing_table_is_told(name: str) -> None:
+    without(name)
+
+
+@pytest.mark.full
+@sweep("name", sorted(tables()))
+def test_any_missing_or_empty_table_is_told(name: str) -> None:
+    without(name)
+
+
+def without(name: str) -> None:
     """Nothing but what hangs on the table changes, and its rows say what is missing."""
     whole = tables()
     rest = {key: table for key, table in whole.items() if key != name}

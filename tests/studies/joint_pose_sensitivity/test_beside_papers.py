@@ -1,9 +1,14 @@
-"""A cohort stands beside the paper it was rebuilt from, in the kind of study that paper did."""
+"""A cohort stands beside the paper it was rebuilt from, in the kind of study that paper did.
+
+Would catch a comparison that other cohorts get, or another kind of study, and a paper's numbers in
+figures of another cohort.
+"""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from sweeps import sweep
 from identification_cases import identification
 from study_cases import FIGURES, STUDY, Size, drawing, project, results
 
@@ -33,8 +38,8 @@ def study_of(kind: str, cohort: str) -> Study:
     return kind_of(kind).settings(study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 
-@pytest.mark.parametrize(
-    ("kind", "cohort", "against"),
+@sweep(
+    "kind, cohort, against",
     [
         ("joint_pose_sensitivity", "palanca_l1l4", ["against_gould_2024a"]),
         ("joint_pose_sensitivity", "t12s1_phantom", []),
@@ -60,7 +65,8 @@ def test_numbers_of_a_paper_are_for_its_own_cohort_only() -> None:
     assert GOULD_2024A.beside("straight") is None
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.full
+@sweep("name", FIGURES)
 def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: Path) -> None:
     size = Size(("a",), 2, 12)
     folder = results(project(tmp_path, size), size)

@@ -1,10 +1,15 @@
-"""Figures: there for every kind of result, the same bytes twice, and honest about nothing."""
+"""Figures: there for every kind of result, the same bytes twice, and honest about nothing.
+
+Would catch figures that fail at some size of cohort, hang on the computer, or write other numbers
+into panels than the tables have.
+"""
 
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from PIL import Image
 from study_cases import STUDY, Size, drawn, project, results
 
@@ -20,26 +25,34 @@ FIRST = ("stiffness", "errors", "joint_pose")
 """Figures of the study's first part; the others: test_identification_figures."""
 
 SIZES = {
-    "two specimens": Size(),
     "one joint": Size(("a",), 1, 12, ("extension",)),
     "few poses": Size(("a",), 2, 3),
     "joint by joint": Size(("a", "b"), 3, 12, grouping="per_joint"),
     "twenty joints": Size(("a", "b", "c"), 20, 4, COORDINATES, "per_joint"),
-    "no solved row": Size(solved=False),
 }
 
 
-def draw(root: Path, size: Size) -> Path:
+def draw(root: Path, size: Size, names: tuple[str, ...] = FIRST) -> Path:
     """Figures of made-up results; returns their folder."""
     folder = results(project(root, size), size)
-    for name in FIRST:
+    for name in names:
         drawn(root, name)
     return folder / "figures"
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
-    folder = draw(tmp_path, size)
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Figures of two specimens, to be looked at."""
+    return draw(tmp_path_factory.mktemp("two"), Size())
+
+
+@pytest.fixture(scope="module")
+def unsolved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Figures of results without a solved row, to be looked at."""
+    return draw(tmp_path_factory.mktemp("unsolved"), Size(solved=False))
+
+
+def is_drawn(folder: Path) -> None:
     files = {path.name for path in folder.iterdir()}
     assert files == {f"{name}.{kind}" for name in FIRST for kind in ("svg", "png")}
     for name in FIRST:
@@ -48,22 +61,34 @@ def test_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
             assert np.asarray(picture.convert("L")).min() < 128, "nothing is drawn"
 
 
-def test_same_bytes_twice(tmp_path: Path) -> None:
-    first, second = draw(tmp_path / "1", Size()), draw(tmp_path / "2", Size())
-    for path in first.iterdir():
-        assert path.read_bytes() == (second / path.name).read_bytes(), path.name
+def test_figures_of_two_specimens_and_of_none_solved(two: Path, unsolved: Path) -> None:
+    is_drawn(two)
+    is_drawn(unsolved)
 
 
-def test_no_date_and_no_font_from_the_computer(tmp_path: Path) -> None:
-    text = (draw(tmp_path, Size()) / "errors.svg").read_text()
+@pytest.mark.full
+@sweep("size", SIZES.values())
+def test_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
+    is_drawn(draw(tmp_path, size))
+
+
+def test_same_bytes_twice(two: Path, tmp_path: Path) -> None:
+    again = draw(tmp_path, Size(), ("stiffness",))
+    for path in again.iterdir():
+        assert path.read_bytes() == (two / path.name).read_bytes(), path.name
+
+
+def test_no_date_and_no_font_from_the_computer(two: Path) -> None:
+    text = (two / "errors.svg").read_text()
     assert "<dc:date>" not in text
     assert "<text" not in text, "letters are outlines"
 
 
-def test_what_cannot_be_shown_is_said(tmp_path: Path) -> None:
-    folder = draw(tmp_path, Size(solved=False))
-    assert "No stiffness was found for any of 24 joint poses." in comments(folder / "stiffness.svg")
-    assert "none of 72 simulations" in comments(folder / "errors.svg")
+def test_what_cannot_be_shown_is_said(unsolved: Path) -> None:
+    assert "No stiffness was found for any of 24 joint poses." in comments(
+        unsolved / "stiffness.svg"
+    )
+    assert "none of 72 simulations" in comments(unsolved / "errors.svg")
 
 
 def comments(svg: Path) -> str:
@@ -74,7 +99,7 @@ def comments(svg: Path) -> str:
 
 def test_shares_and_medians_are_written_in_the_panels(tmp_path: Path) -> None:
     size = Size(("a",), 2, 40)
-    words = comments(draw(tmp_path, size) / "stiffness.svg")
+    words = comments(draw(tmp_path, size, ("stiffness",)) / "stiffness.svg")
     frame = pd.read_parquet(tmp_path / "results" / STUDY / "calibrations.parquet")
     lost = int((frame["extension_identifiable"] == False).sum())  # noqa: E712
     at_bound = int((frame["extension_nm_per_rad"] > 36_999).sum())
@@ -105,7 +130,7 @@ def test_no_median_is_told_of_what_most_fits_do_not_hold(tmp_path: Path) -> None
 
 def test_share_without_equilibrium_counts_runs_not_rows(tmp_path: Path) -> None:
     size = Size(("a",), 2, 12)
-    words = comments(draw(tmp_path, size) / "errors.svg")
+    words = comments(draw(tmp_path, size, ("errors",)) / "errors.svg")
     frame = pd.read_parquet(tmp_path / "results" / STUDY / "simulations.parquet")
     best = frame[frame["stiffness"] == "best01"]
     failed = int((best.groupby("pose")["status"].first() != "converged").sum())
@@ -132,8 +157,8 @@ def test_quartiles_of_a_known_sample() -> None:
     assert found.iqr == 2.0
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
+@sweep(
+    "value, text",
     [
         (20640.0, "20\u2009600"),
         (0.01344, "0.0134"),

@@ -1,4 +1,8 @@
-"""Figures of the study's later parts: drawn for any cohort, and their words true to the tables."""
+"""Figures of the study's later parts: drawn for any cohort, and their words true to the tables.
+
+Would catch figures that fail for some cohort, numbers in words that the tables do not have, and a
+paper's numbers where they do not belong.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from identification_cases import identification, write_table
 from matplotlib.figure import Figure
 from PIL import Image
@@ -32,10 +37,8 @@ NEW = (
 )
 ONE = Size(("a",), 2, 12)
 SIZES = {
-    "one specimen": ONE,
     "one joint": Size(("a",), 1, 12, ("extension",)),
     "many specimens": Size(tuple(f"s{n:02d}" for n in range(12)), 4, 4, COORDINATES, "per_joint"),
-    "nothing solved": Size(solved=False),
 }
 
 
@@ -59,24 +62,60 @@ def test_every_figure_can_be_drawn_and_has_a_caption() -> None:
         assert callable(drawing(figure.name)), figure.name
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+@pytest.fixture(scope="module")
+def one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project of one specimen with all new figures, to be looked at."""
+    root = tmp_path_factory.mktemp("one")
+    tables(root, ONE)
+    for name in NEW:
+        drawn(root, name)
+    return root
+
+
+@pytest.fixture(scope="module")
+def unsolved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same without a solved row."""
+    root = tmp_path_factory.mktemp("unsolved")
+    tables(root, Size(solved=False))
+    for name in NEW:
+        drawn(root, name)
+    return root
+
+
+def told_in(root: Path, name: str) -> str:
+    return words(root / "results" / STUDY / "figures" / f"{name}.svg")
+
+
+def is_drawn(svg: Path) -> None:
+    with Image.open(svg.with_suffix(".png")) as picture:
+        assert picture.width == int(WIDTH_MM / 25.4 * DPI), svg.stem
+        assert np.asarray(picture.convert("L")).min() < 128, f"{svg.stem}: nothing is drawn"
+
+
+def test_new_figures_of_one_specimen_and_of_none_solved(one: Path, unsolved: Path) -> None:
+    for root in (one, unsolved):
+        for name in NEW:
+            is_drawn(root / "results" / STUDY / "figures" / f"{name}.svg")
+
+
+@pytest.mark.full
+@sweep("size", SIZES.values())
 def test_new_figures_of_any_cohort(tmp_path: Path, size: Size) -> None:
     tables(tmp_path, size)
     for name in NEW:
-        with Image.open(drawn(tmp_path, name).with_suffix(".png")) as picture:
-            assert picture.width == int(WIDTH_MM / 25.4 * DPI), name
-            assert np.asarray(picture.convert("L")).min() < 128, f"{name}: nothing is drawn"
+        is_drawn(drawn(tmp_path, name))
 
 
-def test_new_figures_have_the_same_bytes_twice(tmp_path: Path) -> None:
+@pytest.mark.full
+def test_new_figures_have_the_same_bytes_twice(one: Path, tmp_path: Path) -> None:
     tables(tmp_path, ONE)
     for name in NEW:
-        first = drawn(tmp_path, name).read_bytes()
-        assert drawn(tmp_path, name).read_bytes() == first, name
+        first = one / "results" / STUDY / "figures" / f"{name}.svg"
+        assert drawn(tmp_path, name).read_bytes() == first.read_bytes(), name
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
+@sweep(
+    "name, told",
     [
         ("bootstrap", "No stiffness was found in any of 150 bootstrap fits."),
         ("success_by_method", "Not compared: no &lt;joint&gt; frame &amp; no fit."),
@@ -85,12 +124,11 @@ def test_new_figures_have_the_same_bytes_twice(tmp_path: Path) -> None:
         ("landmark_precision", "no sampled pose has a result at any landmark SD"),
     ],
 )
-def test_what_has_no_result_is_said(tmp_path: Path, name: str, told: str) -> None:
-    tables(tmp_path, Size(solved=False))
-    assert told in words(drawn(tmp_path, name))
+def test_what_has_no_result_is_said(unsolved: Path, name: str, told: str) -> None:
+    assert told in told_in(unsolved, name)
 
 
-@pytest.mark.parametrize("name", NEW)
+@sweep("name", NEW)
 def test_tables_without_rows_are_told_not_drawn(tmp_path: Path, name: str) -> None:
     folder = tables(tmp_path, ONE)
     for table in set(FIGURES[name]) - {"simulations"}:
@@ -106,14 +144,13 @@ def test_tables_without_rows_are_told_not_drawn(tmp_path: Path, name: str) -> No
     assert told[name] in words(svg)
 
 
-def test_bootstrap_tells_median_range_and_n_of_each_row(tmp_path: Path) -> None:
-    folder = tables(tmp_path, ONE)
-    told = words(drawn(tmp_path, "bootstrap"))
-    frame = pd.read_parquet(folder / "bootstrap.parquet")
+def test_bootstrap_tells_median_range_and_n_of_each_row(one: Path) -> None:
+    told = told_in(one, "bootstrap")
+    frame = pd.read_parquet(one / "results" / STUDY / "bootstrap.parquet")
     row = frame[(frame["bootstrap"] == "damping") & (frame["loading"] == "dynamic")]
-    one = row[row["joint"] == "V1V2"]
+    upper = row[row["joint"] == "V1V2"]
     for column in ("extension_nm_per_rad", "extension_error_deg"):
-        values = one[column]
+        values = upper[column]
         width = number(values.max() - values.min(), 2)
         assert f"{number(values.median())}, range {width}, n = 5" in told
     assert "75 fits of 75 with a stiffness" in told, "(20 + 5) sets under three loadings"
@@ -149,8 +186,8 @@ def test_pooled_bootstrap_is_relative_to_each_own_median() -> None:
     assert few.labels[-1] == "start, dynamic, s00", "the first specimen on top"
 
 
-@pytest.mark.parametrize(
-    ("sampled", "loading", "joint", "name", "ends", "median"),
+@sweep(
+    "sampled, loading, joint, name, ends, median",
     [  # Gould et al. 2024a, Tables 2 and 3
         ("damping", "quasi_static", "L2L3", "anterior", (0.415, 0.425), 0.42),
         ("damping", "quasi_static", "L2L3", "superior", (0.0, 0.35), 0.0005),
@@ -172,18 +209,22 @@ def test_published_median_and_range_are_drawn(
     assert not other.lines, "no paper, or a loading that the paper does not have"
 
 
-def test_success_tells_counts_of_each_method(tmp_path: Path) -> None:
-    told = words(drawn(tables(tmp_path, ONE).parents[1], "success_by_method"))
+def test_success_tells_counts_of_each_method(one: Path) -> None:
+    told = told_in(one, "success_by_method")
     for share in ("6 of 6 (100 %)", "1 of 6 (17 %)", "5 of 6 (83 %)", "least cost: 1 of 6"):
         assert share in told
     assert "all free stiffnesses within 1 % of the start" in told
 
 
-def test_agreement_tells_bias_and_limits(tmp_path: Path) -> None:
-    told = words(drawn(tables(tmp_path, ONE).parents[1], "agreement"))
+def test_agreement_tells_bias_and_limits(one: Path) -> None:
+    told = told_in(one, "agreement")
     assert told.count("bias 0.01 (\u22120.19 to 0.21), n = 12") == 4, "2 joints x 2 coordinates"
+
+
+@pytest.mark.full
+def test_many_panels_of_agreement_are_rows(tmp_path: Path) -> None:
     many = Size(("a", "b"), 4, 4)
-    rows = words(drawn(tables(tmp_path / "m", many).parents[1], "agreement"))
+    rows = words(drawn(tables(tmp_path, many).parents[1], "agreement"))
     assert "bias with 95 % interval" in rows, "16 panels do not fit on a page: rows"
 
 
@@ -199,8 +240,8 @@ def test_only_reduced_poses_are_readings_of_agreement(tmp_path: Path) -> None:
     assert all_ > few
 
 
-def test_shares_and_trees_are_told(tmp_path: Path) -> None:
-    told = words(drawn(tables(tmp_path, ONE).parents[1], "pose_against_stiffness"))
+def test_shares_and_trees_are_told(one: Path) -> None:
+    told = told_in(one, "pose_against_stiffness")
     for share in ("70 %", "20 %", "10 %"):
         assert told.count(share) == 8, "of errors and of their sizes"
     assert told.count("pose 80 %; 5 leaves, r² 0.60") == 4
@@ -227,8 +268,8 @@ def test_importance_is_summed_over_the_predictors_of_a_factor() -> None:
     assert list(found["predictors"]) == [2, 1]
 
 
-def test_required_precision_is_told_or_why_not(tmp_path: Path) -> None:
-    told = words(drawn(tables(tmp_path, ONE).parents[1], "landmark_precision"))
+def test_required_precision_is_told_or_why_not(one: Path) -> None:
+    told = told_in(one, "landmark_precision")
     assert "1.25 mm (1.00–1.50)" in told
     assert "too many poses are above the limit even at 0.5 mm" in told
     assert "95 % asked for" in told

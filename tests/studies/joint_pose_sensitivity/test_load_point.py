@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from pydantic import ValidationError
 from study_cases import STUDY, TABLES, Size, project
 
@@ -67,8 +68,8 @@ def asked(anterior: tuple[float, ...], superior: tuple[float, ...], *sds: float)
 # --- what the readings exclude -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("degrees", "unknowns", "limit"),
+@sweep(
+    "degrees, unknowns, limit",
     [(3, 2, 1 + 2 * 199.5), (12, 2, 1 + 2 * 4.103 / 10), (11, 1, 1 + 4.965 / 10)],
 )
 def test_the_cost_may_rise_by_what_tables_of_f_say(
@@ -111,7 +112,7 @@ def test_one_point_one_way_has_no_slope_that_way() -> None:
     assert found["per_mm_superior"] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("slope", "sd"), [(0.05, 1.0), (0.2, 1.0), (0.2, 0.5)])
+@sweep("slope, sd", [(0.05, 1.0), (0.2, 1.0), (0.2, 0.5)])
 def test_range_of_the_sum_of_two_normals(slope: float, sd: float) -> None:
     """log k moves by slope per mm: its SD is the root of (0.1 / 1.96)^2 + (slope SD)^2.
 
@@ -176,8 +177,8 @@ def test_places_without_a_fit_are_told() -> None:
 # --- settings and checks -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("wrong", "told"),
+@sweep(
+    "wrong, told",
     [
         ({"anterior_mm": [1, 2]}, "0 among them"),
         ({"superior_mm": [0, -1]}, "rising order"),
@@ -247,7 +248,7 @@ def test_finding_names_the_worst_of_several_specimens() -> None:
     assert "stiffness in b lies in" in words
 
 
-@pytest.mark.parametrize("specimens", [("a",), ("a", "b", "c")])
+@sweep("specimens", [("a",), ("a", "b", "c")])
 def test_figure_has_a_panel_for_each_stiffness_and_one_for_the_cost(
     tmp_path: Path, specimens: tuple[str, ...]
 ) -> None:

@@ -11,6 +11,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from identification_cases import METADATA, identification, write_table
 from study_cases import STUDY, Size, project, results
 
@@ -106,7 +107,7 @@ SIZES = {
 }
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+@sweep("size", SIZES.values())
 def test_nothing_is_fetched(size: Size) -> None:
     found, text = page(size)
     for tag, attributes in found.elements:
@@ -126,7 +127,7 @@ def test_same_bytes_twice(tmp_path: Path) -> None:
     assert made(tmp_path / "1", size)[0] == made(tmp_path / "2", size)[0]
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+@sweep("size", SIZES.values())
 def test_ids_are_unique_and_what_points_at_them_finds_them(size: Size) -> None:
     found, _ = page(size)
     ids = [attributes["id"] for _, attributes in found.elements if "id" in attributes]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 from identification_cases import identification
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -88,7 +89,7 @@ def overlaps(figure: Figure, along: str) -> bool:
     return False
 
 
-@pytest.mark.parametrize("size", [Size(("a", "b"), 2, 4, FOUR), Size(("a",), 3, 4)])
+@sweep("size", [Size(("a", "b"), 2, 4, FOUR), Size(("a",), 3, 4)])
 def test_rows_and_ticks_of_the_bootstrap_can_be_read(tmp_path: Path, size: Size) -> None:
     study, cohort, tables = made(tmp_path, size)
     with style():

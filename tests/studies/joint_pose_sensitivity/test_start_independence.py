@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.anatomy import published
 from spinepipe.calibrate import Fit, Problem, fit
@@ -68,7 +69,7 @@ def says_so(found: Fit, unknown: int) -> bool:
     return not found.uncertainty.identifiable[unknown] or found.n_optima > 1
 
 
-@pytest.mark.parametrize("pose", range(12))
+@sweep("pose", range(4))
 def test_starts_in_the_papers_box_end_in_the_same_stiffness(pose: int) -> None:
     rng = np.random.default_rng(100 + pose)
     expected = fit(problem(pose, START), starts=4, seed=pose)

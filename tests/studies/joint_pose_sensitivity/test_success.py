@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe.studies.joint_pose_sensitivity.filters import above_start, near_start
 from spinepipe.studies.joint_pose_sensitivity.success import count_by_method
@@ -73,8 +74,8 @@ def test_fits_are_counted_by_method() -> None:
     assert (fewer["solved"], fewer["successful"], fewer["arrived"]) == (3, 1, 2)
 
 
-@pytest.mark.parametrize(
-    ("successes", "of", "low", "high"),
+@sweep(
+    "successes, of, low, high",
     [(81, 263, 0.2553, 0.3662), (1, 29, 0.0061, 0.1718), (0, 20, 0.0, 0.1611)],
 )
 def test_shares_have_the_published_intervals(
