@@ -193,9 +193,7 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     distance = np.einsum("bi,bi->b", string - centre, back)
     at = centre + np.maximum(rule.share * distance, rule.least_m)[:, None] * back
     at[:, 2] += string[:, 2]
-    return Bars(
-        np.searchsorted(owner[row], np.arange(len(muscles) + 1)), leg[row], of[number], at
-    )
+    return Bars(np.searchsorted(owner[row], np.arange(len(muscles) + 1)), leg[row], of[number], at)
 
 
 def _forwards(trunk: Trunk) -> Array:
