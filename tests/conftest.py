@@ -18,7 +18,6 @@ settings.load_profile("same everywhere")
 FULL_FOR_NOW = frozenset(
     [
         "test_investigation_edges",
-        "test_scoliosis_figures",
         "test_tracking_figures",
         "test_cohort_analysis",
         "test_tracking_findings",

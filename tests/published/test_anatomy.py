@@ -255,7 +255,8 @@ def test_gould_2024a_is_entered_twice() -> None:
     assert dict(leaves(published("gould_2024a"))) == expected
 
 
-@sweep("name, doi",
+@sweep(
+    "name, doi",
     [("gould_2024a", "10.3389/fbioe.2024.1304334"), ("gould_2024b", "10.3389/fbioe.2024.1372088")],
 )
 def test_every_table_names_its_source(name: str, doi: str) -> None:

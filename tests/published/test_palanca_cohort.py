@@ -153,7 +153,8 @@ def test_bending_and_rotation_spread_of_the_end_joints_is_table_8(joint: str) ->
     assert orientation_iqr(joint)[1:] == pytest.approx(table_8(joint, "iqr")[1:], rel=0.15)
 
 
-@sweep("joint, ratios",
+@sweep(
+    "joint, ratios",
     [("L1L2", (0.44, None, None)), ("L2L3", (0.79, 0.74, 0.73)), ("L3L4", (0.59, None, None))],
 )
 def test_spread_that_table_8_prints_larger(joint: str, ratios: tuple[float | None, ...]) -> None:

@@ -175,9 +175,7 @@ class Stack:
         """
         lanes = np.flatnonzero(~np.isnan(q[:, 0, 0]))
         held = self.bound(lanes, self.initial_states()).held(q[lanes])
-        tangents = tangents_of(
-            survey(self.chains, part(self.loads, lanes), q[lanes], held.tangent)
-        )
+        tangents = tangents_of(survey(self.chains, part(self.loads, lanes), q[lanes], held.tangent))
         found = {}
         for lane, tangent in zip(lanes.tolist(), tangents, strict=True):
             both = tangent + tangent.T

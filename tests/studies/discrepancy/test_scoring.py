@@ -1,6 +1,7 @@
 """Rates, goals and tables of the scored search, from rows made by hand."""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,11 @@ from tests.validation.discrepancy.row import scored
 from tests.validation.discrepancy.targets import COUNTS, DRAWN, NUMBER, Target, of_seeds, targets
 
 FIRST = 30000
+
+
+@cache
+def every_target() -> list[Target]:
+    return list(targets(FIRST))
 
 
 def row(
@@ -199,7 +205,7 @@ def test_tables_are_written_with_what_made_them(tmp_path: Path, capsys: Any) -> 
 
 
 def test_any_first_part_is_a_fair_sample() -> None:
-    every = targets(FIRST)
+    every = every_target()
     assert [target.seed for target in every] == list(range(FIRST, FIRST + NUMBER))
     part = every[: len(every) // 4]
     for kind, number in COUNTS.items():
@@ -209,7 +215,7 @@ def test_any_first_part_is_a_fair_sample() -> None:
 
 def test_half_of_the_cohorts_hide_a_formula_that_the_library_lacks() -> None:
     rows = [
-        {"target": {"kind": one.kind}, "recipe": one.recipe.as_dict()} for one in targets(FIRST)
+        {"target": {"kind": one.kind}, "recipe": one.recipe.as_dict()} for one in every_target()
     ]
     told = [formula_of(one) for one in rows if any(h["name"] in KNOWN for h in hidden(one))]
     assert np.mean([formula != "same" for formula in told]) >= 0.5
@@ -243,7 +249,7 @@ def test_seeds_and_kinds_choose_some() -> None:
     found = list(of_seeds(targets(FIRST, ("null",)), FIRST, FIRST + 99))
     assert found
     assert {target.kind for target in found} == {"null"}
-    assert found == [one for one in targets(FIRST)[:100] if one.kind == "null"]
+    assert found == [one for one in every_target()[:100] if one.kind == "null"]
 
 
 def test_seeds_are_scored_once(tmp_path: Path) -> None:
@@ -302,6 +308,7 @@ def _broken(*_: object) -> None:
     raise ZeroDivisionError("by nothing")
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_one_cohort_from_recipe_to_row(tmp_path: Path) -> None:
     """A strong asymmetry is named; the row is kept and not made again."""

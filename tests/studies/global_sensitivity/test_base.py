@@ -182,7 +182,8 @@ def test_samples_start_from_the_fit(tmp_path: Path) -> None:
     assert turned.between(-1.15 * 3.44, -0.85 * 3.44).all()
 
 
-@sweep("predicted, measured, noise, verdict",
+@sweep(
+    "predicted, measured, noise, verdict",
     [
         (-0.5, -1.0, 0.0, "near"),
         (-0.49, -1.0, 0.0, "far"),

@@ -170,7 +170,8 @@ def test_methods_have_the_indices_of_the_analysis() -> None:
     assert {method.value: names for method, names in INDICES.items()} == study_file.INDICES
 
 
-@sweep("more, specimens, size",
+@sweep(
+    "more, specimens, size",
     [
         ("", 1, 1),  # 64 x (2 x 11 + 2) = 1,536 runs
         ("", 2, 256),  # 3,072 runs

@@ -60,6 +60,7 @@ INDEX = {
     "fast": ("S1", "ST"),
 }
 FLOOR = {"PAWN": 0.1, "S1_RBD": 0.02, **dict.fromkeys(("S1", "ST", "mu_star", "sigma"), 1e-12)}
+MOTION = ("motion",)
 HALF = 0.03
 """Half width of all intervals."""
 
@@ -216,7 +217,7 @@ def drawn(name: str, cohort: Cohort, **tables: pd.DataFrame) -> Figure:
 
 
 def test_every_figure_becomes_a_picture(cohort: Cohort) -> None:
-    found, (responses, design) = indices(), runs()
+    found, (responses, design) = indices(kinds=MOTION), runs(100)
     tables = Tables(
         {
             "indices": found,
@@ -285,17 +286,17 @@ def test_a_bar_for_each_index_of_each_factor_in_order(cohort: Cohort) -> None:
 
 
 def test_intervals_are_drawn_at_their_ends(cohort: Cohort) -> None:
-    axis = drawn("factor_indices", cohort, indices=indices()).axes[0]
+    axis = drawn("factor_indices", cohort, indices=indices(kinds=MOTION)).axes[0]
     ends = {tuple(np.round(x_of(line), 9)) for line in axis.lines}
     share = 16.0 / WHOLE
     assert (round(share - HALF, 9), round(share + HALF, 9)) in ends
-    fast = drawn("factor_indices", cohort, indices=indices("fast"))
+    fast = drawn("factor_indices", cohort, indices=indices("fast", kinds=MOTION))
     assert "interval" not in said(fast)
     assert len(fast.axes[0].lines) == 1, "the line at 0"
 
 
 def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> None:
-    figure = drawn("factor_indices", cohort, indices=indices("latin_hypercube"))
+    figure = drawn("factor_indices", cohort, indices=indices("latin_hypercube", kinds=MOTION))
     axis = figure.axes[0]
     (band,) = bands(axis)
     assert band.get_x() + band.get_width() == pytest.approx(FLOOR["PAWN"])
@@ -307,21 +308,21 @@ def test_the_noise_floor_is_a_band_and_names_in_it_are_grey(cohort: Cohort) -> N
     assert set(colors[2:]) == {"#767676"}
     assert "noise floor, an interval" in said(figure)
     assert "grey names: above the noise floor in no panel" in said(figure)
-    sobol = drawn("factor_indices", cohort, indices=indices())
+    sobol = drawn("factor_indices", cohort, indices=indices(kinds=MOTION))
     assert not bands(sobol.axes[0])
     assert "the noise floor is too low to be seen" in said(sobol)
     assert "grey names: negligible in every panel" in said(sobol)
-    bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1]))
+    bare = drawn("factor_indices", cohort, indices=indices(factors=tuple(SLOPES)[:-1], kinds=MOTION))
     assert "no dummy, so no noise floor" in said(bare)
 
 
 def test_what_is_negligible_is_grey_beside_its_line(cohort: Cohort) -> None:
     """Mass has an ST of 0.2 %: its name is black while its interval reaches over 1 %."""
-    wide = drawn("factor_indices", cohort, indices=indices()).axes[0]
+    wide = drawn("factor_indices", cohort, indices=indices(kinds=MOTION)).axes[0]
     assert [0.01, 0.01] in [list(x_of(line)) for line in wide.lines]
     assert name_colors(wide)["mass"] == "#000000"
     assert name_colors(wide)["damping"] == "#767676"
-    narrow = indices()
+    narrow = indices(kinds=MOTION)
     of_mass = narrow["factor"].eq("mass") & narrow["index"].eq("ST")
     narrow.loc[of_mass, ["ci_high", "negligible"]] = [0.004, True]
     axis = drawn("factor_indices", cohort, indices=narrow).axes[0]
@@ -329,10 +330,10 @@ def test_what_is_negligible_is_grey_beside_its_line(cohort: Cohort) -> None:
 
 
 def test_panels_that_lack_failed_runs_have_a_dagger(cohort: Cohort) -> None:
-    figure = drawn("factor_indices", cohort, indices=indices(failed=3))
+    figure = drawn("factor_indices", cohort, indices=indices(failed=3, kinds=MOTION))
     assert all("\u2020\n" in title for title in titles(figure))
     assert "3 failed; \u2020: indices of inputs at which runs stand" in said(figure)
-    whole = drawn("factor_indices", cohort, indices=indices())
+    whole = drawn("factor_indices", cohort, indices=indices(kinds=MOTION))
     assert not any("\u2020" in title for title in titles(whole))
 
 
@@ -372,7 +373,7 @@ def test_several_specimens_are_means_with_dots(cohort: Cohort) -> None:
 
 def test_factors_without_effect_leave_room_for_the_others(cohort: Cohort) -> None:
     many = (*SLOPES, *(f"landmark_{n}" for n in range(40)))
-    figure = drawn("factor_indices", cohort, indices=indices(factors=many))
+    figure = drawn("factor_indices", cohort, indices=indices(factors=many, kinds=MOTION))
     assert len(labels(figure.axes[0])) == 7
     assert labels(figure.axes[0])[-1] == "dummy (no effect)"
     assert "38 more factors without any effect" in said(figure)
@@ -404,7 +405,7 @@ def test_factors_are_in_order_over_outputs_of_different_units(cohort: Cohort) ->
 
 
 def test_calibrated_stiffness_has_its_own_panels(cohort: Cohort) -> None:
-    found = indices()
+    found = indices(kinds=MOTION)
     own = found[(found["output"] == "motion") & (found["test"] == "flexion")]
     own = own[own["joint"] == JOINTS[0]].assign(output="stiffness", test="*", joint="*", step=None)
     figure = drawn("factor_indices", cohort, indices=pd.concat([found, own]))
@@ -548,12 +549,12 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
 
 @sweep("method", LEFT_OUT)
 def test_failed_runs_are_told_with_the_rule(cohort: Cohort, method: str) -> None:
-    found = Results(Tables({"indices": indices(method, failed=3)}), {}, {})
+    found = Results(Tables({"indices": indices(method, failed=3, kinds=MOTION)}), {}, {})
     sure = opening(study(method), cohort, found).how_sure
     assert "at most 3 failed" in sure
     assert LEFT_OUT[method] in sure
     assert "3\u2009036 runs or more" in sure
-    none = Results(Tables({"indices": indices(method)}), {}, {})
+    none = Results(Tables({"indices": indices(method, kinds=MOTION)}), {}, {})
     assert "none failed" in opening(study(method), cohort, none).how_sure
 
 
@@ -628,7 +629,6 @@ def test_the_page_opens_with_the_answer_and_fetches_nothing(cohort: Cohort) -> N
         return document(asked, cohort, Results(tables, {}, pictures)).html(asked, cohort)
 
     page = page_of(study(dummy=True))
-    assert page == page_of(study(dummy=True))
     assert '<p class="headline">Motion and joint load' not in page, "each output by its name"
     assert "Motion hangs most on load size; joint load on load size." in page
     places_ = [page.index(f'<section id="{name}"') for name in ("findings", "figures", "tables")]

@@ -55,7 +55,8 @@ def drawn(found: GlobalSensitivity) -> int:
     return len(sampler.sample(problem, n, seed=1))
 
 
-@sweep("asked, runs",
+@sweep(
+    "asked, runs",
     [
         (study("sobol", 16), 16 * 12),
         (study("sobol", 16, second_order=False), 16 * 7),

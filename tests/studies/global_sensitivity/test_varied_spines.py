@@ -239,7 +239,8 @@ def test_samples_are_the_same_alone_and_together(cohort: Cohort) -> None:
         assert whole.cases[0].forces[i].tobytes() == alone.cases[0].forces[0].tobytes()
 
 
-@sweep("zeroed, gravity, all_steps, computed, from_first, stored",
+@sweep(
+    "zeroed, gravity, all_steps, computed, from_first, stored",
     [
         (False, True, False, [2], False, (2,)),
         (True, True, False, [0, 2], True, (2,)),

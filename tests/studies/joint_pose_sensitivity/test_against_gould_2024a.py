@@ -283,7 +283,8 @@ def claim(value: float | None, low: float | None, high: float | None, wrong: str
     )
 
 
-@sweep("value, low, high, verdict",
+@sweep(
+    "value, low, high, verdict",
     [
         (1.0, 1.0, 3.0, "inside"),
         (3.0, 1.0, 3.0, "inside"),
@@ -365,7 +366,8 @@ def test_success_follows_the_rule_of_the_study() -> None:
     assert "ours: 500 of 500" in lax["reason"]
 
 
-@sweep("name, ours, verdict",
+@sweep(
+    "name, ours, verdict",
     [
         ("success.forward_run_default_step", 25.0, "inside"),
         ("reduced.stiffness.extension.median", 2.0, "outside"),
@@ -446,8 +448,7 @@ def test_what_is_not_computed_carries_the_message_of_the_table() -> None:
     assert message in row["reason"]
 
 
-@sweep("error, ours, verdict", [(0.5, 4.0, "inside"), (2.0, 1.0, "outside")]
-)
+@sweep("error, ours, verdict", [(0.5, 4.0, "inside"), (2.0, 1.0, "outside")])
 def test_required_precision_outside_the_sampled_sds(
     error: float, ours: float, verdict: str
 ) -> None:
@@ -530,7 +531,8 @@ def test_a_sign_that_the_paper_has_otherwise_is_outside(effect: float, verdict: 
     assert "A25: 0.12 of 123 values" in row["reason"]
 
 
-@sweep("rho, joint, name, verdict",
+@sweep(
+    "rho, joint, name, verdict",
     [
         (0.18, "L2L3", "extension", "inside"),
         (-0.17, "L2L3", "extension", "outside"),

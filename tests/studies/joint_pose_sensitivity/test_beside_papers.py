@@ -38,7 +38,8 @@ def study_of(kind: str, cohort: str) -> Study:
     return kind_of(kind).settings(study="s", kind=kind, cohort=cohort, **needed.get(kind, {}))
 
 
-@sweep("kind, cohort, against",
+@sweep(
+    "kind, cohort, against",
     [
         ("joint_pose_sensitivity", "palanca_l1l4", ["against_gould_2024a"]),
         ("joint_pose_sensitivity", "t12s1_phantom", []),

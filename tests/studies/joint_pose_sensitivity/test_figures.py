@@ -157,7 +157,8 @@ def test_quartiles_of_a_known_sample() -> None:
     assert found.iqr == 2.0
 
 
-@sweep("value, text",
+@sweep(
+    "value, text",
     [
         (20640.0, "20\u2009600"),
         (0.01344, "0.0134"),

@@ -148,7 +148,8 @@ def test_specimens_whose_medians_are_not_held_are_counted(study: JointPoseSensit
     assert "Not held by the data: flexion–extension in 2 of 3 specimens." in words
 
 
-@sweep("freedom, words",
+@sweep(
+    "freedom, words",
     [
         ([0, 0], "All fits are exact: as many readings as unknowns"),
         ([-1, 0], "All 2 fits have no more readings than unknowns"),

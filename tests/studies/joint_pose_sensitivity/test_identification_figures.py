@@ -114,7 +114,8 @@ def test_new_figures_have_the_same_bytes_twice(one: Path, tmp_path: Path) -> Non
         assert drawn(tmp_path, name).read_bytes() == first.read_bytes(), name
 
 
-@sweep("name, told",
+@sweep(
+    "name, told",
     [
         ("bootstrap", "No stiffness was found in any of 150 bootstrap fits."),
         ("success_by_method", "Not compared: no &lt;joint&gt; frame &amp; no fit."),
@@ -185,7 +186,8 @@ def test_pooled_bootstrap_is_relative_to_each_own_median() -> None:
     assert few.labels[-1] == "start, dynamic, s00", "the first specimen on top"
 
 
-@sweep("sampled, loading, joint, name, ends, median",
+@sweep(
+    "sampled, loading, joint, name, ends, median",
     [  # Gould et al. 2024a, Tables 2 and 3
         ("damping", "quasi_static", "L2L3", "anterior", (0.415, 0.425), 0.42),
         ("damping", "quasi_static", "L2L3", "superior", (0.0, 0.35), 0.0005),

@@ -1,4 +1,8 @@
-"""Analysis jobs of the identification study on small tables, with numbers worked out by hand."""
+"""Analysis jobs of the identification study on small tables, with numbers worked out by hand.
+
+Would catch means, filters, tests, shares and trees that are not those of their definition, and what
+fails without a reason told.
+"""
 
 import gc
 import json
@@ -26,6 +30,7 @@ from spinepipe.studies.joint_pose_sensitivity import (
 )
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.settings import SETS_PER_BATCH
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
@@ -186,7 +191,8 @@ def test_precision_is_read_between_sampled_sds() -> None:
     assert required_precision(sds, errors, 1.0, 0.9, 20, 1).sd == pytest.approx(1.4)
 
 
-@sweep("error, message",
+@sweep(
+    "error, message",
     [(0.5, "3 mm will do, the largest"), (np.inf, "1 mm will not do, the smallest")],
 )
 def test_precision_outside_the_sampled_sds(error: float, message: str) -> None:
@@ -360,7 +366,8 @@ def test_one_joint_of_a_fit_that_is_an_outlier_takes_the_fit(tmp_path: Path) -> 
     assert not judged["near_start_all"].any()
 
 
-@sweep("size, options",
+@sweep(
+    "size, options",
     [
         pytest.param(Size(n_joints=1), {}, id="one joint"),
         pytest.param(Size(grouping="per_joint"), {}, id="per joint"),
@@ -641,9 +648,10 @@ def test_sampled_starts_and_damping(tmp_path: Path) -> None:
 @sweep("loading", ["quasi_static", "dynamic"])
 def test_a_bootstrap_of_a_cohort_without_mass_is_refused(tmp_path: Path, loading: str) -> None:
     root, output = str(project(tmp_path, Size())), str(tmp_path / "fit.parquet")
-    bootstrap.run(root, STUDY, "a", "start", loading, "000", output)
+    bootstrap.run(root, STUDY, "a", "start", loading, "00001", output)
     rows = read_frame(output)
-    assert rows["joint"].tolist() == ["V2V3", "V1V2"]
+    assert rows["joint"].tolist() == ["V2V3", "V1V2"] * SETS_PER_BATCH
+    assert sorted(set(rows["set"])) == list(range(SETS_PER_BATCH, 100)), "the second batch of two"
     assert set(rows["status"]) == {"refused"}
     assert rows["message"].str.contains("mass and inertia").all()
     assert rows["extension_nm_per_rad"].isna().all()
@@ -655,7 +663,7 @@ def test_a_straight_spine_in_compression_and_flexion_in_closed_form(
 ) -> None:
     """1 N m turns each joint by 1.5 degrees, 20 N (all but cos 1.5) shorten it by 0.2 mm."""
     root, output = str(project(tmp_path, size)), str(tmp_path / "fit.parquet")
-    bootstrap.run(root, STUDY, "a", "start", "equilibrium", "007", output)
+    bootstrap.run(root, STUDY, "a", "start", "equilibrium", "00000", output)
     rows = read_frame(output)
     assert rows["superior_n_per_m"].tolist() == pytest.approx([20.0 / 0.2e-3] * len(rows), rel=2e-3)
     assert set(rows["status"]) == {"converged"}
@@ -737,7 +745,8 @@ def test_precision_where_every_pose_is_lost_is_not_silence(tmp_path: Path) -> No
     assert required["message"].str.contains("1 mm will not do").all()
 
 
-@sweep("nominal, says",
+@sweep(
+    "nominal, says",
     [(2.5, "misses by 2.5 times the limit"), (None, "own joint pose has no fit")],
 )
 def test_no_precision_is_told_where_the_nominal_pose_does_not_fit(
@@ -767,6 +776,7 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
     assert np.abs(offsets[1]).std() > 0.5
 
 
+@pytest.mark.full
 def test_landmark_errors_say_why_there_are_none(tmp_path: Path) -> None:
     """A joint without any stiffness in flexion tips over, in the cohort's own pose too."""
     root = project(tmp_path, Size(specimens=("a",), free=("superior",)))

@@ -68,7 +68,8 @@ def asked(anterior: tuple[float, ...], superior: tuple[float, ...], *sds: float)
 # --- what the readings exclude -------------------------------------------------------------------
 
 
-@sweep("degrees, unknowns, limit",
+@sweep(
+    "degrees, unknowns, limit",
     [(3, 2, 1 + 2 * 199.5), (12, 2, 1 + 2 * 4.103 / 10), (11, 1, 1 + 4.965 / 10)],
 )
 def test_the_cost_may_rise_by_what_tables_of_f_say(
@@ -176,7 +177,8 @@ def test_places_without_a_fit_are_told() -> None:
 # --- settings and checks -------------------------------------------------------------------------
 
 
-@sweep("wrong, told",
+@sweep(
+    "wrong, told",
     [
         ({"anterior_mm": [1, 2]}, "0 among them"),
         ({"superior_mm": [0, -1]}, "rising order"),

@@ -26,6 +26,7 @@ study: felt
 kind: joint_pose_sensitivity
 cohort: felt
 poses: {poses}
+best_models: 2
 stiffness: {{anterior_n_per_m: {0}, superior_n_per_m: {1}, right_n_per_m: {2},
   extension_nm_per_rad: {3}, right_bending_nm_per_rad: {4}, left_rotation_nm_per_rad: {5}}}
 calibration: {{free: [anterior, superior, extension]}}

@@ -74,7 +74,8 @@ def test_fits_are_counted_by_method() -> None:
     assert (fewer["solved"], fewer["successful"], fewer["arrived"]) == (3, 1, 2)
 
 
-@sweep("successes, of, low, high",
+@sweep(
+    "successes, of, low, high",
     [(81, 263, 0.2553, 0.3662), (1, 29, 0.0061, 0.1718), (0, 20, 0.0, 0.1611)],
 )
 def test_shares_have_the_published_intervals(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from scoliosis_cases import write_shipped
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -17,17 +18,16 @@ from spinepipe.problems import InputError
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import CENTRE, FILMS, PATIENTS
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from tests.generators import ais_films
 
 STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
-LEVELS = ais_films.LEVELS
+LEVELS = (*(f"L{n}" for n in range(4, 0, -1)), *(f"T{n}" for n in range(12, 1, -1)))
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cohort of one patient without a fault."""
     folder = tmp_path_factory.mktemp("films") / "ais"
-    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(folder, 1)
     return folder
 
 

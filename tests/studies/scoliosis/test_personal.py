@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scoliosis_cases import write_shipped
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -24,7 +25,6 @@ from spinepipe.studies.scoliosis.personal import (
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Pairs
-from tests.generators import ais_films
 
 STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
 
@@ -32,7 +32,7 @@ STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "
 @pytest.fixture(scope="module")
 def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
     folder = tmp_path_factory.mktemp("films") / "ais"
-    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(folder, 1)
     return cohorts.read(folder, (FILMS, PATIENTS))
 
 

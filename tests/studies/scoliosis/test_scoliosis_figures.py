@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from drawn import caption, drawings
 from matplotlib.figure import Figure
-from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of
+from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of, write_shipped
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -29,7 +29,6 @@ from spinepipe.studies.scoliosis.personal import patient_of, tangent
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.tables import DISPLACEMENTS
 from spinepipe.tables import from_rows
-from tests.generators import ais_films
 
 DRAW = drawings("scoliosis")
 SIZES = {
@@ -155,7 +154,7 @@ def test_errors_of_patients_leave_out_who_has_no_pose() -> None:
 
 def test_models_stand_where_their_poses_are(tmp_path: Path) -> None:
     """Places of the overlay are those of the solved pose, out of the plane and all."""
-    ais_films.write(tmp_path / "ais", ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(tmp_path / "ais", 1)
     cohort = cohorts.read(tmp_path / "ais", (FILMS, PATIENTS))
     study = study_of(Size(1))
     patient = patient_of(study, cohort, "p01")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from drawn import caption
-from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of
+from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of, write_shipped
 from study_cases import Size as OtherSize
 from study_cases import project
 from sweeps import sweep
@@ -23,7 +23,6 @@ from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.page import READ, document, left_out, shown_tables
 from spinepipe.tables import to_arrow, write
-from tests.generators import ais_films
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SIZES = {
@@ -103,7 +102,7 @@ def test_what_is_left_out_is_told_with_its_reason() -> None:
 def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
     project(tmp_path, OtherSize())
     root = tmp_path
-    ais_films.write(root / "config/cohorts/ais", ais_films.READINGS["ais18_phantom"], count=2)
+    write_shipped(root / "config/cohorts/ais", 2)
     text = "study: s\nkind: scoliosis\ncohort: ais\nmodels: [tangent, uniform]\n"
     (root / "config/studies/s.yaml").write_text(text)
     tables = tables_of(Size(2, errors={"tangent": 0.4, "uniform": 0.8}))
