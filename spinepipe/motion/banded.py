@@ -122,7 +122,7 @@ def bordered_step(
         flat = halves[-1].reshape(-1, shared + 1)
         gram = flat.T @ flat
         square, slope = square - gram[:shared, :shared], slope - gram[:shared, shared]
-    step: Array = -np.linalg.solve(square, slope) if shared else slope
+    step: Array = -np.asarray(np.linalg.solve(square, slope), dtype=float) if shared else slope
     weights = np.append(step, 1.0)
     return [
         -factor.backwards((half @ weights)[..., None])[..., 0]

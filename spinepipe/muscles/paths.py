@@ -197,7 +197,7 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
 
 
 def _forwards(trunk: Trunk) -> Array:
-    """(17, 3) across the spine at each vertebra, in the source's pose: from the centres about it."""
+    """(17, 3) across the spine at each vertebra, in the source's pose: by the centres about it."""
     centres = trunk.vertebrae
     line = np.concatenate([centres[:1], centres[:-1]]) - np.concatenate([centres[1:], centres[-1:]])
     across = np.stack([line[:, 1], -line[:, 0], np.zeros(len(line))], axis=1)
