@@ -183,6 +183,7 @@ def fluttering(mass: Array, tangent: Array, share: float) -> float | None:
     return factor if growth(mass / factor, tangent / factor) > 1e-6 else None
 
 
+@pytest.mark.slow
 @sweep("share", [0.9, 0.3, 1e-3])
 @sweep("n_joints", [1, 2, 4])
 def test_what_flutters_is_never_proven(n_joints: int, share: float) -> None:

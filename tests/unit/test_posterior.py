@@ -112,6 +112,7 @@ def measured(k: float, offset: float) -> Array:
     return -FORCES_N * (ARM_M - SD_M * offset) / k + 0.3 * NOISE_RAD * rng.normal(size=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("k", "number"),
     [
