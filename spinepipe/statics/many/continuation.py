@@ -64,18 +64,14 @@ def continued(
     """Poses (N, J, 6) under the whole load, and which lanes got there by stable equilibria."""
     q, count = start.copy(), len(start)
     reached, size = np.zeros(count), np.full(count, FIRST_INCREMENT)
-    slope = np.zeros_like(q)  # of the pose by the share, from the last two that were reached
     going = np.ones(count, dtype=bool)
     while going.any():
         lanes = np.flatnonzero(going)
-        size[lanes] = np.minimum(size[lanes], 1.0 - reached[lanes])
-        target = reached[lanes] + size[lanes]
+        target = np.minimum(1.0, reached[lanes] + size[lanes])
         share = increment.share(lanes, target)
         own, loads = increment.on(chains, lanes, target)
-        ahead = q[lanes] + slope[lanes] * size[lanes, None, None]
-        found, good = settled(own, loads, _on(laws, lanes, share), ahead)
+        found, good = settled(own, loads, _on(laws, lanes, share), q[lanes])
         there, lost = lanes[good], lanes[~good]
-        slope[there] = (found[good] - q[there]) / size[there, None, None]
         q[there], reached[there] = found[good], target[good]
         going[lost] = size[lost] > SMALLEST_FRACTION
         size[there] *= 2.0
