@@ -18,16 +18,12 @@ settings.load_profile("same everywhere")
 FULL_FOR_NOW = frozenset(
     [
         "test_investigation_edges",
-        "test_scoliosis_figures",
         "test_tracking_figures",
-        "test_cohort_analysis",
         "test_tracking_findings",
         "test_tracking_checks",
         "test_tracking_page",
-        "test_cohort_figures",
         "test_trunk_figures",
         "test_discrepancy_page",
-        "test_nuisances",
     ]
 )
 """Files of 50 s and more: `full` until each is made light. The list must become empty."""

@@ -4,8 +4,8 @@ OpenBLAS chooses its kernel by the processor, and results differ by it in roundi
 bring an OpenBLAS each. `OPENBLAS_CORETYPE` chooses another; a name that the library does not know
 is ignored by it, and one that the processor cannot run ends in an illegal instruction. So flags are
 asked first, and what took effect afterwards. `--one` asks for a kernel beside the newest that
-the processor can run, under which `make test` has run, and leaves out tests marked `full`; all
-other options are pytest's.
+the processor can run, under which `make test` has run, and leaves out tests marked `slow` or
+`full`; all other options are pytest's.
 """
 
 import json
@@ -82,7 +82,7 @@ def main(options: list[str]) -> int:
     kernels = runnable(flags(source.read_text()))
     numeric = "numeric"
     if options[:1] == ["--one"]:
-        options, numeric = options[1:], "numeric and not full"
+        options, numeric = options[1:], "numeric and not slow and not full"
         kernels = dict([one for one in kernels.items() if one[1]][1:2])
         if not kernels:
             print("this processor can run no further kernel")

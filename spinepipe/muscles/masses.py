@@ -9,6 +9,7 @@ here). Together 31.45 %; another generic male model has 32.1 %. Head and arms ar
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Literal
 
@@ -226,6 +227,7 @@ def arm_masses(side: str, shoulder: Array, hand: Array, subject: Subject) -> tup
     )
 
 
+@cache
 def centre_shares(sex: Literal["male", "female"]) -> tuple[float, ...]:
     """Where on the line from shoulder to hand each segment's centre lies, as a share; hand: 1."""
     starts = np.cumsum([0.0, *(segment.length_percent for segment in ARM)])

@@ -167,49 +167,39 @@ def _sides(muscles: Muscles) -> NDArray[np.int64]:
 
 
 def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
-    """Bars of the chosen muscles."""
-    rows: list[tuple[int, int, int, Array]] = []
-    for m in np.flatnonzero(chosen):
-        body, point = trunk.muscles.body[m], trunk.muscles.point[m]
-        for leg in range(int(np.sum(body != NO_BODY)) - 1):
-            found = _on_the_way(trunk, body[leg : leg + 2], point[leg : leg + 2], rule)
-            rows += [(int(m), leg, *one) for one in found]
-    owners = np.array([row[0] for row in rows], dtype=np.int64)
-    return Bars(
-        np.searchsorted(owners, np.arange(len(trunk.muscles) + 1)),
-        np.array([row[1] for row in rows], dtype=np.int64),
-        np.array([row[2] for row in rows], dtype=np.int64),
-        np.array([row[3] for row in rows]).reshape(-1, 3),
-    )
-
-
-def _on_the_way(
-    trunk: Trunk, body: NDArray[np.int64], point: Array, rule: Standoff
-) -> list[tuple[int, Array]]:
-    """Vertebrae between the ends of a leg, (2,) and (2, 3), from its first to its second: the body
-    each belongs to, and where its bar stands.
+    """Bars of the chosen muscles, each on a vertebra between the ends of a leg.
 
     A bar stands at the height of the vertebra's centre, as far to the side as the string, and
     behind the centre across the spine. Vertebrae that an end is fixed to are not passed, but those
     of the thorax, of which there are several, are where they lie below its point.
     """
-    low, high = sorted(body)
-    found = []
-    for number, vertebra in enumerate(SLICES):
-        centre, of = trunk.vertebrae[number], body_of(vertebra)
-        share = (centre[1] - point[0, 1]) / (point[1, 1] - point[0, 1])
-        if not (low < of < high or of == high == THORAX != low) or not 0.0 < share < 1.0:
-            continue
-        string = point[0] + share * (point[1] - point[0])
-        back = -_forwards(trunk, number)
-        behind = max(rule.share * float((string - centre) @ back), rule.least_m)
-        found.append((share, of, centre + behind * back + np.array([0.0, 0.0, string[2]])))
-    return [(of, at) for _, of, at in sorted(found, key=lambda one: one[0])]
+    muscles = trunk.muscles
+    legs = chosen[:, None] & (muscles.body[:, 1:] != NO_BODY)
+    owner, leg = np.nonzero(legs)
+    ends, start = muscles.body[owner, leg], muscles.point[owner, leg]
+    others, way = muscles.body[owner, leg + 1], muscles.point[owner, leg + 1] - start
+    low, high = np.minimum(ends, others)[:, None], np.maximum(ends, others)[:, None]
+    of = np.array([body_of(name) for name in SLICES])
+    # all legs (rows) against all vertebrae (columns): how far up a leg each centre lies
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (trunk.vertebrae[:, 1] - start[:, 1:2]) / way[:, 1:2]
+    between = (low < of) & (of < high) | (of == high) & (of == THORAX) & (low != THORAX)
+    row, number = np.nonzero(between & (share > 0.0) & (share < 1.0))
+    share = share[row, number]
+    order = np.lexsort((share, row))  # along each muscle
+    row, number, share = row[order], number[order], share[order]
+    string = start[row] + share[:, None] * way[row]
+    centre, back = trunk.vertebrae[number], -_forwards(trunk)[number]
+    distance = np.einsum("bi,bi->b", string - centre, back)
+    at = centre + np.maximum(rule.share * distance, rule.least_m)[:, None] * back
+    at[:, 2] += string[:, 2]
+    return Bars(np.searchsorted(owner[row], np.arange(len(muscles) + 1)), leg[row], of[number], at)
 
 
-def _forwards(trunk: Trunk, number: int) -> Array:
-    """(3,) across the spine at a vertebra, in the source's pose: from the centres about it."""
-    line = trunk.vertebrae[max(number - 1, 0)] - trunk.vertebrae[min(number + 1, len(SLICES) - 1)]
-    across = np.array([line[1], -line[0], 0.0])
-    found: Array = across / np.linalg.norm(across)
+def _forwards(trunk: Trunk) -> Array:
+    """(17, 3) across the spine at each vertebra, in the source's pose: from the centres about it."""
+    centres = trunk.vertebrae
+    line = np.concatenate([centres[:1], centres[:-1]]) - np.concatenate([centres[1:], centres[-1:]])
+    across = np.stack([line[:, 1], -line[:, 0], np.zeros(len(line))], axis=1)
+    found: Array = across / np.linalg.norm(across, axis=1, keepdims=True)
     return found

@@ -60,4 +60,8 @@ def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:
     """
     summed = np.cumsum(forces[..., :0:-1, :], axis=-2)[..., ::-1, :]
     turning = np.cumsum(moments[..., :0:-1, :], axis=-2)[..., ::-1, :]
-    return summed, turning - np.cross(centres, summed)
+    # cross products of the arms with the sums, component by component: (i, j, k) and its turns
+    after, last = [1, 2, 0], [2, 0, 1]
+    return summed, turning - (
+        centres[:, after] * summed[..., last] - centres[:, last] * summed[..., after]
+    )

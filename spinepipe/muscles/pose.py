@@ -1,13 +1,13 @@
 """Where the bodies of a trunk are: rotations given, translations of the joints by their forces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
-from spinepipe.muscles.trunk import BODIES, LEVELS, Mass, Trunk
+from spinepipe.muscles.trunk import Mass, Trunk
 
 _SMALL = 1e-9
 
@@ -65,6 +65,15 @@ class BodyPoses:
         found: Array = turned + self.places[body]
         return found
 
+    def moved(self, translations: Array) -> "BodyPoses":
+        """The same, not moved so far, with translations (7, 3) m of the joints."""
+        steps = np.einsum("kij,kj->ki", self.discs, translations)
+        shift = np.cumsum(steps, axis=0)
+        places, centres = self.places.copy(), self.centres.copy()
+        places[1:] += shift
+        centres[1:] += shift[:-1]
+        return replace(self, places=places, centres=centres)
+
     def masses(self, masses: tuple[Mass, ...]) -> Array:
         """(K, 3) m, where centres of mass are now."""
         body = np.array([mass.body for mass in masses], dtype=np.int64)
@@ -78,11 +87,10 @@ def rotations_of(chain: Chain, angles: Array) -> Array:
     about the axes of the disc between them: a spine that bends sideways bends in every disc and
     twists in none, however the discs lean.
     """
+    bent = np.diff(angles, axis=0)[:, [1, 2, 0]]  # about x, y, z
+    turns = chain.discs @ rotation_of_vector(bent) @ np.swapaxes(chain.discs, 1, 2)
     found = [rotation_zxy(*angles[0])]
-    for disc, (extension, bending, rotation) in zip(
-        chain.discs, np.diff(angles, axis=0), strict=True
-    ):
-        turn = disc @ rotation_of_vector(np.array([bending, rotation, extension])) @ disc.T
+    for turn in turns:
         found.append(found[-1] @ turn)
     return np.array(found)
 
@@ -95,42 +103,35 @@ def posed(chain: Chain, rotations: Array, translations: Array) -> BodyPoses:
     rotations : (8, 3, 3). translations : (7, 3) m, of the upper vertebra on the axes of the disc.
     """
     origins = chain.origins
-    places = np.zeros((len(BODIES), 3))
-    places[0] = origins[0]
-    centres = np.zeros((len(LEVELS), 3))
-    between = np.einsum("kij,kil->kjl", rotations[:-1], rotations[1:])
-    vectors = np.array([rotation_vector(one) for one in between])
-    halves = np.array([rotation_of_vector(0.5 * one) for one in vectors])
-    discs: Array = rotations[:-1] @ halves @ chain.discs
-    for level in range(len(LEVELS)):
-        arm = rotations[level] @ (chain.centres[level] - origins[level])
-        centres[level] = places[level] + arm
-        places[level + 1] = centres[level] + discs[level] @ translations[level]
+    vectors = rotation_vector(np.swapaxes(rotations[:-1], 1, 2) @ rotations[1:])
+    discs: Array = rotations[:-1] @ rotation_of_vector(0.5 * vectors) @ chain.discs
+    # from each body's own joint to the one above it
+    arms = np.einsum("kij,kj->ki", rotations[:-1], chain.centres - origins[:-1])
+    places = np.cumsum(np.vstack([origins[:1], arms]), axis=0)
     turned = np.einsum("kji,kj->ki", chain.discs, vectors)
-    return BodyPoses(rotations, places, origins, centres, discs, turned)
+    return BodyPoses(rotations, places, origins, places[1:], discs, turned).moved(translations)
 
 
 def rotation_vector(rotation: Array) -> Array:
-    """(3,) rad, axis times angle of a rotation by less than half a turn."""
-    twice_sine = np.array(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    sine = 0.5 * float(np.sqrt(twice_sine @ twice_sine))
-    angle = float(np.arctan2(sine, 0.5 * (np.trace(rotation) - 1.0)))
-    found: Array = twice_sine * (0.5 if sine < _SMALL else angle / (2.0 * sine))
-    return found
+    """(..., 3) rad, axis times angle of rotations (..., 3, 3) by less than half a turn."""
+    over, under = rotation[..., [2, 0, 1], [1, 2, 0]], rotation[..., [1, 2, 0], [2, 0, 1]]
+    twice_sine: Array = over - under
+    sine = 0.5 * np.sqrt(np.einsum("...i,...i->...", twice_sine, twice_sine))
+    angle = np.arctan2(sine, 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1.0))
+    straight = sine < _SMALL
+    share = np.where(straight, 0.5, angle / (2.0 * np.where(straight, 1.0, sine)))
+    return twice_sine * share[..., None]
 
 
 def rotation_of_vector(vector: Array) -> Array:
-    """(3, 3) of axis times angle (3,), Rodrigues' formula."""
-    angle = float(np.sqrt(vector @ vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine = 1.0 if angle < _SMALL else np.sin(angle) / angle
-    cosine = 0.5 if angle < _SMALL else (1.0 - np.cos(angle)) / angle**2
+    """(..., 3, 3) of axis times angle (..., 3), Rodrigues' formula."""
+    angle = np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None, None]
+    cross = np.zeros((*vector.shape, 3))
+    cross[..., [2, 0, 1], [1, 2, 0]] = vector
+    cross[..., [1, 2, 0], [2, 0, 1]] = -vector
+    straight = angle < _SMALL
+    size = np.where(straight, 1.0, angle)
+    sine = np.where(straight, 1.0, np.sin(size) / size)
+    cosine = np.where(straight, 0.5, (1.0 - np.cos(size)) / size**2)
     found: Array = np.eye(3) + sine * cross + cosine * (cross @ cross)
     return found

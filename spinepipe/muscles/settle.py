@@ -108,6 +108,26 @@ def angles_of(person: Person, task: Task) -> Array:
     return task.turned + person.upright if task.from_upright else task.turned
 
 
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """What of a posture forces do not change: the rotations are given.
+
+    Attributes
+    ----------
+    poses : without translations. unpressed : (7, 3) N m of joints without compression, disc axes.
+    """
+
+    poses: BodyPoses
+    unpressed: Array
+
+    @classmethod
+    def of(cls, person: Person, task: Task) -> "Turned":
+        """Of a person in a task."""
+        rotations = rotations_of(person.chain, angles_of(person, task))
+        poses = posed(person.chain, rotations, np.zeros((len(LEVELS), 3)))
+        return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
+
+
 def held(person: Person, task: Task, how: How = How(), tone: float | None = None) -> Held:
     """Muscle forces of a task.
 
@@ -134,24 +154,24 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
 
 def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Held:
     """The task with given muscle forces (M,) N, where the spine has moved to under them."""
-    rotations = rotations_of(person.chain, angles_of(person, task))
+    turned = Turned.of(person, task)
     pushes, how = np.zeros((len(LEVELS), 3)), How()
     for _ in range(rounds):
-        now = _at(person, task, how, 0.0, rotations, pushes, given=forces)
+        now = _at(person, task, how, 0.0, turned, pushes, given=forces)
         pushes = now.pushes
     return now
 
 
 def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> Held:
     """Rounds from a spine pressed by `start` (7,) N."""
-    rotations = rotations_of(person.chain, angles_of(person, task))
+    turned = Turned.of(person, task)
     pushes = np.zeros((len(LEVELS), 3))
     pushes[:, 1] = -start
     rounds: list[Round] = []
     trail: list[Array] = []
     step, last, beyond = 1.0, np.zeros_like(pushes), False
     while True:
-        now = _at(person, task, how, tone, rotations, pushes, beyond)
+        now = _at(person, task, how, tone, turned, pushes, beyond)
         beyond = not now.found.enough
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
@@ -215,7 +235,7 @@ def _at(
     task: Task,
     how: How,
     tone: float,
-    rotations: Array,
+    turned: Turned,
     pushes: Array,
     beyond: bool = False,
     given: Array | None = None,
@@ -223,11 +243,12 @@ def _at(
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
     moves = how.feedback and how.translates
     translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
-    poses = posed(person.chain, rotations, translations)
+    poses = turned.poses.moved(translations)
     pulls = person.lines.pulls(poses)
     loads = applied(person, task, poses)
     pressed = -pushes[:, 1]
-    joint = person.laws.moments(poses.turned, pressed)
+    stiffening = person.laws.stiffening(pressed)
+    joint = stiffening[:, None] * turned.unpressed
     weights, turning = above(loads.forces, loads.moments, poses.centres)
     required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))
     drawn, arms = above(pulls.forces, pulls.moments, poses.centres)
@@ -261,7 +282,7 @@ def _at(
         stretched,
         told,
         joint,
-        person.laws.stiffening(pressed),
+        stiffening,
     )
 
 

@@ -8,8 +8,9 @@ posture falls over, and more tone is needed (Bergmark 1989). Contacts of fascicl
 taken as fixed to the bodies, and pulls on the rectus sheath as dead loads.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.decomposition import eigh
@@ -22,6 +23,21 @@ LENGTH_M = 0.05
 """Makes moves comparable with turns: a move of so much counts like a turn of 1 rad."""
 
 _N = 6 * len(LEVELS)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """L straight pieces of fascicles that pull, from one body to another.
+
+    Attributes
+    ----------
+    at : (L, 2, 3) m, ends. on : (L, 2) their bodies. pull : (L, 3) N on the first, towards the
+        second.
+    """
+
+    at: Array
+    on: NDArray[np.int64]
+    pull: Array
 
 
 def smallest_eigenvalue(person: Person, held: Held, gain: float) -> float:
@@ -47,9 +63,10 @@ def stiffness(person: Person, held: Held, gain: float) -> Array:
     rising = person.passive.slopes(pulls.lengths, person.rest, person.fibres, strength)
     found: Array = slopes.T @ ((gain * forces / pulls.lengths + rising)[:, None] * slopes)
     found += _joints(person, held)
-    tensors, weights = _tensors(held)
+    lines = _lines(held)
+    tensors, weights = _tensors(held, lines)
     found += _changing_arms(tensors, weights)
-    found += _turning_lines(pulls.trace, pulls.traced, pulls.on, forces, held.poses.centres)
+    found += _turning_lines(lines, held.poses.centres)
     return found
 
 
@@ -67,13 +84,12 @@ def _joints(person: Person, held: Held) -> Array:
     return found
 
 
-def _tensors(held: Held) -> tuple[Array, Array]:
+def _tensors(held: Held, lines: _Lines) -> tuple[Array, Array]:
     """Of all forces above each joint: (7, 3, 3) sum of arm times force, N m, and (7, 3) sum, N."""
     loads = held.applied
-    pulls = held.pulls
-    at, on, pull = _line_forces(pulls.trace, pulls.traced, pulls.on, held.found.forces)
-    points, forces = np.vstack([loads.at, at]), np.vstack([loads.pushes, pull])
-    bodies = np.concatenate([loads.bodies, on])
+    points = np.vstack([loads.at, lines.at[:, 0], lines.at[:, 1]])
+    forces = np.vstack([loads.pushes, lines.pull, -lines.pull])
+    bodies = np.concatenate([loads.bodies, lines.on[:, 0], lines.on[:, 1]])
     tensors, weights = np.zeros((len(LEVELS), 3, 3)), np.zeros((len(LEVELS), 3))
     for level, centre in enumerate(held.poses.centres):
         above = bodies > level
@@ -109,73 +125,35 @@ def _changing_arms(tensors: Array, weights: Array) -> Array:
     return found
 
 
-@njit(cache=True)
-def _line_forces(
-    trace: Array, traced: NDArray[np.int64], body: NDArray[np.int64], forces: Array
-) -> tuple[Array, NDArray[np.int64], Array]:
-    """Points (K, 3), bodies (K,) and forces (K, 3) of strings, legs within a body left out."""
-    most = 2 * trace.shape[0] * trace.shape[1]
-    at, on, pull = np.zeros((most, 3)), np.zeros(most, dtype=np.int64), np.zeros((most, 3))
-    k = 0
-    for m in range(len(traced)):
-        for leg in range(traced[m] - 1):
-            if body[m, leg] == body[m, leg + 1] or forces[m] == 0.0:
-                continue
-            d = trace[m, leg + 1] - trace[m, leg]
-            u = d / np.sqrt(d @ d)
-            at[k], on[k], pull[k] = trace[m, leg], body[m, leg], forces[m] * u
-            at[k + 1], on[k + 1], pull[k + 1] = trace[m, leg + 1], body[m, leg + 1], -forces[m] * u
-            k += 2
-    return at[:k], on[:k], pull[:k]
+def _lines(held: Held) -> _Lines:
+    pulls, forces = held.pulls, held.found.forces
+    first, second = pulls.on[:, :-1], pulls.on[:, 1:]
+    there = np.arange(1, pulls.on.shape[1]) < pulls.traced[:, None]
+    m, leg = np.nonzero(there & (first != second) & (forces > 0.0)[:, None])
+    at = np.stack([pulls.trace[m, leg], pulls.trace[m, leg + 1]], axis=1)
+    way = at[:, 1] - at[:, 0]
+    tension = forces[m] / np.linalg.norm(way, axis=1)
+    on = np.stack([first[m, leg], second[m, leg]], axis=1)
+    return _Lines(at, on, tension[:, None] * way)
 
 
-@njit(cache=True)
-def _turning_lines(
-    trace: Array,
-    traced: NDArray[np.int64],
-    body: NDArray[np.int64],
-    forces: Array,
-    centres: Array,
-) -> Array:
+def _turning_lines(lines: _Lines, centres: Array) -> Array:
     """Stiffness of strings under tension against being moved across their line."""
-    levels = len(centres)
-    n = 6 * levels
-    found = np.zeros((n, n))
-    across = np.zeros((3, n))
-    for m in range(len(traced)):
-        if forces[m] <= 0.0:
-            continue
-        for leg in range(traced[m] - 1):
-            a, c = body[m, leg], body[m, leg + 1]
-            if a == c or a < 0 or c < 0:
-                continue
-            p, q = trace[m, leg], trace[m, leg + 1]
-            if a > c:
-                a, c = c, a
-                p, q = q, p
-            d = q - p
-            length = np.sqrt(d @ d)
-            u = d / length
-            across[:] = 0.0
-            for k in range(c):
-                r = d if k < a else q - centres[k]
-                at = 6 * k
-                across[0, at + 1], across[0, at + 2] = r[2], -r[1]
-                across[1, at], across[1, at + 2] = -r[2], r[0]
-                across[2, at], across[2, at + 1] = r[1], -r[0]
-                if k >= a:
-                    for i in range(3):
-                        across[i, at + 3 + i] = 1.0
-            for i in range(6 * c):
-                along = u[0] * across[0, i] + u[1] * across[1, i] + u[2] * across[2, i]
-                for j in range(3):
-                    across[j, i] -= along * u[j]
-            tension = forces[m] / length
-            for i in range(6 * c):
-                for j in range(6 * c):
-                    found[i, j] += tension * (
-                        across[0, i] * across[0, j]
-                        + across[1, i] * across[1, j]
-                        + across[2, i] * across[2, j]
-                    )
+    levels = np.arange(len(LEVELS))[:, None]
+    low, high = np.sort(lines.on, axis=1).T
+    order = np.argsort(lines.on, axis=1)[..., None]
+    lower, upper = np.swapaxes(np.take_along_axis(lines.at, order, axis=1), 0, 1)
+    way, length = upper - lower, np.linalg.norm(upper - lower, axis=1)
+    # a joint below both ends turns the whole line, one between them its upper end alone
+    below = levels < low
+    arms = np.where(below[..., None], way, upper - centres[:, None])
+    moved = np.zeros((len(LEVELS), 6, len(way), 3))
+    moved[:, :3] = np.cross(np.eye(3)[:, None], arms[:, None])
+    moved[:, 3:] = ~below[:, None, :, None] * np.eye(3)[:, None]
+    moved *= (levels < high)[:, None, :, None]
+    along = way / length[:, None]
+    across = moved - np.einsum("...i,...i->...", moved, along)[..., None] * along
+    tension = np.linalg.norm(lines.pull, axis=1) / length
+    rows = (across * np.sqrt(tension)[:, None]).reshape(_N, -1)
+    found: Array = rows @ rows.T
     return found

@@ -19,6 +19,12 @@ _STEPS = 50
 
 
 @njit(cache=True)
+def _dot(a: Array, b: Array) -> float:
+    """Of two vectors (3,): `@` would hand so few numbers to BLAS, which takes ten times as long."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@njit(cache=True)
 def _slide(ends: Array, at: Array, along: Array, s: Array, n: int) -> None:
     """Move n contacts along their bars until the string is shortest; Newton, tridiagonal."""
     upper, lower, right = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -30,19 +36,19 @@ def _slide(ends: Array, at: Array, along: Array, s: Array, n: int) -> None:
         middle[:], upper[:], right[:] = 0.0, 0.0, 0.0
         for i in range(n + 1):
             d = x[i + 1] - x[i]
-            length = np.sqrt(d @ d) + 1e-12
+            length = np.sqrt(_dot(d, d)) + 1e-12
             u = d / length
             if i > 0:
-                c = along[i - 1] @ u
+                c = _dot(along[i - 1], u)
                 right[i - 1] += c
                 middle[i - 1] += (1.0 - c * c) / length
             if i < n:
-                c = along[i] @ u
+                c = _dot(along[i], u)
                 right[i] -= c
                 middle[i] += (1.0 - c * c) / length
             if 0 < i < n:
-                a, b = along[i - 1] @ u, along[i] @ u
-                upper[i - 1] = -(along[i - 1] @ along[i] - a * b) / length
+                a, b = _dot(along[i - 1], u), _dot(along[i], u)
+                upper[i - 1] = -(_dot(along[i - 1], along[i]) - a * b) / length
         largest = 0.0
         for i in range(n):
             largest = max(largest, abs(right[i]))
@@ -64,13 +70,13 @@ def _slide(ends: Array, at: Array, along: Array, s: Array, n: int) -> None:
 def _gap(p: Array, q: Array, bar: Array, along: Array, behind: Array) -> tuple[float, float]:
     """How far the string from p to q passes behind a bar, and where along the bar."""
     d, w = q - p, p - bar
-    a, b, c = d @ d, d @ along, w @ along
+    a, b, c = _dot(d, d), _dot(d, along), _dot(w, along)
     rest = a - b * b
     t = 0.0
     if rest > 1e-18:
-        t = min(max(float((b * c - d @ w) / rest), 0.0), 1.0)
+        t = min(max(float((b * c - _dot(d, w)) / rest), 0.0), 1.0)
     x = w + t * d
-    return float(x @ behind), float(x @ along)
+    return _dot(x, behind), _dot(x, along)
 
 
 @njit(cache=True)
@@ -107,7 +113,9 @@ def _over(ends: Array, bars: Array, along: Array, behind: Array, touched: Array,
         pull, which = -1e-12, -1
         for j in range(k):
             back, on = x[j] - x[j + 1], x[j + 2] - x[j + 1]
-            push = -(back / np.sqrt(back @ back) + on / np.sqrt(on @ on)) @ behind[index[j]]
+            push = -_dot(
+                back / np.sqrt(_dot(back, back)) + on / np.sqrt(_dot(on, on)), behind[index[j]]
+            )
             if push < pull:
                 pull, which = push, index[j]
         if which < 0:
@@ -180,17 +188,20 @@ def tight(
             lying[m, k] = held[k] if held[k] >= 0 else -1 - held[k]
         for k in range(n - 1):
             d = x[k + 1] - x[k]
-            length = np.sqrt(d @ d)
+            length = np.sqrt(_dot(d, d))
             lengths[m] += length
             u = d / length if length > 0.0 else d
             for end in range(2):
                 on = lying[m, k + end]
                 pull = u if end == 0 else -u
                 forces[m, on] += pull
-                moments[m, on] += np.cross(x[k + end], pull)
+                at = x[k + end]
+                moments[m, on, 0] += at[1] * pull[2] - at[2] * pull[1]
+                moments[m, on, 1] += at[2] * pull[0] - at[0] * pull[2]
+                moments[m, on, 2] += at[0] * pull[1] - at[1] * pull[0]
         for k in range(1, n - 1):
             if held[k] < 0:
                 back, on_ = x[k - 1] - x[k], x[k + 1] - x[k]
-                push = back / np.sqrt(back @ back) + on_ / np.sqrt(on_ @ on_)
-                pushes[m] += np.sqrt(push @ push)
+                push = back / np.sqrt(_dot(back, back)) + on_ / np.sqrt(_dot(on_, on_))
+                pushes[m] += np.sqrt(_dot(push, push))
     return lengths, forces, moments, contacts, pushes, trace, traced, lying

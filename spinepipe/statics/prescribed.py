@@ -33,9 +33,7 @@ from spinepipe.statics.equilibrium import (
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
-from spinepipe.statics.holding import NO_STATES, ActiveLaw, Holding, hold
 from spinepipe.statics.many.survey import Plain, compiled, placed
-from spinepipe.statics.placement import Placed
 from spinepipe.status import Ended
 
 Flags = NDArray[np.bool_]
@@ -59,8 +57,6 @@ REACHED = 0.1
 
 UNREACHABLE = "no pose has all that is prescribed"
 UNSTABLE = "the spine buckles out of what is prescribed"
-
-_NOTHING = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +173,8 @@ def _pull(
 
 
 @compiled
-def _assemble(motion: Plain, asked: Plain, pushes: Array, held: Plain, found: Plain) -> None:
+def _assemble(motion: Plain, asked: Plain, holder: Plain, held: Plain, found: Plain) -> None:
     """Fill what is missing (N, f + k) and its derivative (N, f + k, f + k).
-
-    Of the last k rows only what is prescribed, as it is: neither what is wanted nor compliances.
 
     An axis changes by ad(t) s, t the twist of each coordinate below it, s its own (Featherstone
     2008, doi 10.1007/978-1-4899-7560-7); a second derivative is symmetric, its lower half is taken.
@@ -189,6 +183,7 @@ def _assemble(motion: Plain, asked: Plain, pushes: Array, held: Plain, found: Pl
     is_tilt, bodies, every_vectors, free = asked
     missings, matrices = found
     loads, tangents = held
+    every_push, wanted, given = holder
     count, wrench, by_twist = len(free), np.empty(6), np.empty((3, 6))
     own, turning, row = np.empty((count, 6)), np.empty((count, 6)), np.empty(6)
     for n in range(len(matrices)):
@@ -199,8 +194,8 @@ def _assemble(motion: Plain, asked: Plain, pushes: Array, held: Plain, found: Pl
         own[:] = 0.0
         turning[:] = 0.0
         for p in range(len(bodies)):
-            b, push = bodies[p], pushes[n, p]
-            missing[count + p] = _pull(
+            b, push = bodies[p], every_push[n, p]
+            value = _pull(
                 is_tilt[p],
                 every_vectors[n, p],
                 every_turned[n, b],
@@ -208,6 +203,8 @@ def _assemble(motion: Plain, asked: Plain, pushes: Array, held: Plain, found: Pl
                 wrench,
                 by_twist,
             )
+            missing[count + p] = value - wanted[n, p] + given[n, p] * push
+            matrix[count + p, count + p] = given[n, p]
             for i in range(count):
                 if free[i] // 6 > b:
                     continue
@@ -246,7 +243,8 @@ class HeldChain:
     ----------
     free : (n,) coordinates that may move; the others stay zero.
     values : (R, P) of each law, as of the model's effects.
-    frames : (J, 3, 3) and (J, 3) m. vectors : (k, 3, 3) of the prescriptions. units : (k,) m or rad.
+    frames : (J, 3, 3) and (J, 3) m, of the joints.
+    vectors, units : (k, 3, 3) and (k,) m or rad, of the prescriptions.
     asked : (k,) which prescriptions are tilts, and their bodies; (f,) free coordinates.
     """
 
@@ -376,33 +374,37 @@ def newton_steps(trials: Sequence[Trial]) -> list[NewtonStep | None]:
     first, (tilts, bodies, free) = chains[0], chains[0].asked
     q, pushes, wanted = (np.array([one[at] for one in trials]) for at in (1, 2, 3))
     rotations, origins = (np.array([one.frames[at] for one in chains]) for at in (0, 1))
-    motion, held = placed(rotations, origins, q.reshape(len(q), -1, 6)), _held(chains, q)
+    motion, (load, tangent) = placed(rotations, origins, q.reshape(len(q), -1, 6)), _held(chains, q)
     asked = (tilts, bodies, np.array([one.vectors for one in chains]), free)
-    load, tangent = held.load.reshape(q.shape), held.tangent.reshape(len(q), -1, 6, 6)
-    count, size = len(free), len(free) + len(bodies)
+    size = len(free) + len(bodies)
     missing, matrix = np.empty((len(q), size)), np.empty((len(q), size, size))
-    _assemble(motion, asked, pushes, (load, tangent), (missing, matrix))
     given = np.array([one.compliance for one in trials])[:, None] * first.units**2
-    missing[:, count:] += given * pushes - wanted
-    matrix[:, range(count, size), range(count, size)] = given
-    inside = np.isfinite(load).all(axis=1)
-    matrix[~inside], missing[~inside] = np.eye(size), 0.0  # have no step
-    steps = _solved(matrix, -missing)
-    found = map(NewtonStep, steps, matrix)
-    return [one if there else None for one, there in zip(found, inside, strict=True)]
+    holder = (pushes, wanted, given)
+    _assemble(motion, asked, holder, (load, tangent), (missing, matrix))
+    beyond = np.unique(np.nonzero(~np.isfinite(load))[0]).tolist()
+    if beyond:
+        matrix[beyond], missing[beyond] = np.eye(size), 0.0  # have no step
+    each = enumerate(zip(_solved(matrix, -missing), matrix, strict=True))
+    return [None if number in beyond else NewtonStep(*one) for number, one in each]
 
 
-def _held(chains: Sequence[HeldChain], q: Array) -> Holding:
-    """What the joints of all chains hold at q (N, n)."""
-    joints, laws = q.shape[1] // 6, []
+def _held(chains: Sequence[HeldChain], q: Array) -> tuple[Array, Array]:
+    """Loads (N, n) and tangents (N, J, 6, 6) of the joints of all chains at q (N, n)."""
+    seen, joints = q.reshape(-1, 6), q.shape[1] // 6
+    load, tangent = np.zeros(seen.shape), np.zeros((*seen.shape, 6))
     for number, scoped in enumerate(chains[0].effects):
-        own = np.array(scoped.joints)
-        at = (joints * np.arange(len(chains))[:, None] + own).ravel()
         values = np.concatenate([chain.values[number] for chain in chains])
         if not scoped.effect.per_joint:
-            values = np.repeat(values, len(own), axis=0)
-        laws.append(ActiveLaw(cast(JointLaw, scoped.effect), number, at, values, True))
-    return hold(Placed(q.reshape(-1, 6), _NOTHING, _NOTHING, {}), laws, NO_STATES, moved=False)
+            values = np.repeat(values, len(scoped.joints), axis=0)
+        at: slice | Indices = slice(None)
+        if scoped.joints != tuple(range(joints)):
+            at = (joints * np.arange(len(chains))[:, None] + np.array(scoped.joints)).ravel()
+        response = cast(JointLaw, scoped.effect).respond(seen[at], values, load[at])
+        if response.by_carried is not None:
+            tangent[at] += response.by_carried @ tangent[at]
+        tangent[at] += response.tangent
+        load[at] += response.load
+    return load.reshape(q.shape), tangent.reshape(len(q), joints, 6, 6)
 
 
 def _solved(matrices: Array, right: Array) -> Array:
@@ -426,9 +428,7 @@ def alone(trial: Trial) -> NewtonStep | None:
     return newton_steps([trial])[0]
 
 
-def hold_at(
-    chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone
-) -> Held:
+def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone) -> Held:
     """The pose in which a chain is held.
 
     Parameters

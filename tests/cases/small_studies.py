@@ -33,6 +33,7 @@ SCOLIOSIS = "study: small\nkind: scoliosis\ncohort: films\nmodels: [tangent]\n"
 TRUNK = (
     "study: small\nkind: trunk_loads\ncohort: trunk_volunteers\n"
     "drawn_tasks: [standing]\nsimplified_tasks: [flexion_50]\n"
+    "volunteer: {specimen: volunteer}\n"
     "uncertain: {tasks: [standing], samples: 4, samples_per_target: 100}\n"
 )
 

@@ -346,6 +346,11 @@ def against_rows() -> list[Row]:
 
 def tables_of(size: Size, **changed: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """All tables, some changed."""
+    return {name: rows.copy() for name, rows in _tables(size).items()} | changed
+
+
+@cache
+def _tables(size: Size) -> dict[str, pd.DataFrame]:
     errors = frame(ERRORS, list(error_rows(size)) if size.truth else [])
     profiles = list(profile_rows(size))
     ranges = [
@@ -367,4 +372,4 @@ def tables_of(size: Size, **changed: pd.DataFrame) -> dict[str, pd.DataFrame]:
         "errors": errors,
         "accuracy": frame(ACCURACY, list(accuracy_rows(errors))),
         "against_wang_2021": frame(AGAINST_WANG_2021, against_rows()),
-    } | changed
+    }

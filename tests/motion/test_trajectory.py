@@ -54,26 +54,44 @@ def test_a_spline_goes_through_its_nodes() -> None:
     np.testing.assert_allclose(spline(grid.times_s[1:-1], 2), acceleration[1:-1], atol=1e-8)
 
 
+def whole_of(band: Band) -> np.ndarray:
+    """The matrix of a band, all of it."""
+    count = len(band.blocks)
+    found = np.zeros((count, COUNT, count, COUNT))
+    for k in range(count):
+        for below in range(min(3, count - k)):
+            found[k + below, :, k] = band.blocks[k, below]
+            found[k, :, k + below] = band.blocks[k, below].T
+    return found.reshape(count * COUNT, count * COUNT)
+
+
+@pytest.mark.numeric
 def test_a_bordered_band_is_solved_as_the_whole_matrix_is() -> None:
+    """Block Cholesky and the Schur complement beside LAPACK on the whole; five coefficients, so
+    that there are some with both neighbours, some with one and one with none below."""
     rng = np.random.default_rng(1)
-    band, nodes, shared = Band(4, 3), 2, 3
-    size = 4 * COUNT
+    nodes, shared, count = 3, 3, 5
+    band, size = Band.empty(count, shared), count * COUNT
     whole = np.zeros((size + shared, size + shared))
     right = np.zeros(size + shared)
     for node in range(nodes):
-        rows, own = rng.normal(size=(400, 3 * COUNT)), rng.normal(size=(400, shared))
-        off = rng.normal(size=400)
-        band.add(node, rows.T @ rows, rows.T @ off, rows.T @ own)
+        both, off = rng.normal(size=(400, 3 * COUNT + shared)), rng.normal(size=400)
         at = [*range(node * COUNT, (node + 3) * COUNT), *range(size, size + shared)]
-        both = np.hstack([rows, own])
         whole[np.ix_(at, at)] += both.T @ both
         right[at] += both.T @ off
-    factor = Factor.of(band, 0.0, np.full(size, 1e-3))
-    square = whole[size:, size:]
+    blocks = whole[:size, :size].reshape(count, COUNT, count, COUNT)
+    for k in range(count):
+        for below in range(min(3, count - k)):
+            band.blocks[k, below] = blocks[k + below, :, k]
+    band.border[:] = whole[:size, size:].reshape(count, COUNT, shared)
+    band.slope[:] = right[:size].reshape(count, COUNT)
+    assert (whole_of(band) == whole[:size, :size]).all(), "nothing reaches further than three"
+    factor = Factor.of(band, 0.3, 1e-3)
+    square = whole[size:, size:].copy()
     (step,), params = bordered_step([band], [factor], square, right[size:])
-    whole[range(size), range(size)] += 1e-3
+    whole[range(size), range(size)] += 0.3 * np.diag(whole)[:size] + 1e-3
     expected = -np.linalg.solve(whole, right)
-    np.testing.assert_allclose(np.concatenate([step, params]), expected, atol=1e-8)
+    np.testing.assert_allclose(np.append(step, params), expected, atol=1e-8)
 
 
 @pytest.mark.parametrize("force_cost", ["squared", "minus_gravity", "level_difference"])
@@ -97,7 +115,7 @@ def test_slopes_of_the_cost_are_differences(force_cost: str) -> None:
         none = np.zeros(ask.parameters)
         apart = problem.costs(state.moved([step], none)).total
         apart -= problem.costs(state.moved([-step], none)).total
-        assert asked.bands[0].slope[k] == pytest.approx(apart / 4e-5, rel=1e-3, abs=0.1)
+        assert asked.bands[0].slope.ravel()[k] == pytest.approx(apart / 4e-5, rel=1e-3, abs=0.1)
     for k in range(ask.parameters):
         step = np.zeros(ask.parameters)
         step[k] = 1e-5
@@ -150,11 +168,9 @@ def test_curvatures_are_products_of_differences(force_cost: str) -> None:
     asked = problem.normal(state)
     band, count = asked.bands[0], len(columns)
     found = np.zeros_like(expected)
-    for i, one in enumerate(columns):
-        for j, other in enumerate(columns):
-            found[i, j] = band.lower[abs(one - other), min(one, other)]
-    found[:count, count:] = band.border[columns]
-    found[count:, :count] = band.border[columns].T
+    found[:count, :count] = whole_of(band)[np.ix_(columns, columns)]
+    border = band.border.reshape(-1, 4)[columns]
+    found[:count, count:], found[count:, :count] = border, border.T
     found[count:, count:] = asked.square
     # rows and columns of N, N m, m and rad: each beside its own size
     size = np.sqrt(np.diag(expected))
@@ -181,20 +197,19 @@ def test_a_step_is_that_of_the_whole_damped_matrix(
     problem = Trajectory(ask, (seen,), given)
     asked = problem.normal(_State((coefficients,), rng.normal(0.0, 0.2, 4)))
     band, whole = asked.bands[0], np.zeros((size + 4, size + 4))
-    for below in range(min(size, len(band.lower))):
-        at = np.arange(size - below)
-        whole[at + below, at] = whole[at, at + below] = band.lower[below, : size - below]
-    whole[:size, size:], whole[size:, :size] = band.border, band.border.T
+    whole[:size, :size] = whole_of(band)
+    border = band.border.reshape(size, 4)
+    whole[:size, size:], whole[size:, :size] = border, border.T
     whole[size:, size:] = asked.square
     whole += damping * np.diag(np.diag(whole))
-    whole[range(size), range(size)] += 1e-9 * band.lower[0].max()
+    whole[range(size), range(size)] += 1e-9 * band.diagonal.max()
     moves = np.concatenate([np.ones(size, dtype=bool), loose])
     expected = np.zeros(size + 4)
-    down = np.concatenate([band.slope, asked.slope])
+    down = np.concatenate([band.slope.ravel(), asked.slope])
     expected[moves] = -np.linalg.solve(whole[np.ix_(moves, moves)], down[moves])
     (step,), shared = problem.step(asked, damping)
     # beside what nothing asks about, which is 1e9 times as soft
-    found = np.concatenate([step, shared])
+    found = np.concatenate([step.ravel(), shared])
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
     assert not shared[~loose].any()
 

@@ -62,7 +62,7 @@ def test_the_vocabulary_is_all_there() -> None:
     assert len(UNKNOWN) >= 5
 
 
-@pytest.mark.parametrize("preload", [0.0, 200.0])
+@pytest.mark.parametrize("preload", [200.0, pytest.param(0.0, marks=pytest.mark.full)])
 def test_spinepipe_finds_the_same_null_motion_from_the_files(
     tmp_path: Path, preload: float
 ) -> None:

@@ -137,7 +137,7 @@ def test_each_effect_alone(effects: Sequence[Effect]) -> None:
     alone()
 
 
-@pytest.mark.parametrize("n_joints", [1, 2, 4, 8, 17])
+@pytest.mark.parametrize("n_joints", [1, 2, 4, 8, pytest.param(17, marks=pytest.mark.full)])
 def test_random_effects_beside_each_other(n_joints: int) -> None:
     """Models of one stack differ in effects, joints in scope and order."""
     rng = np.random.default_rng(n_joints)
@@ -150,7 +150,10 @@ def test_random_effects_beside_each_other(n_joints: int) -> None:
     compare(runs)
 
 
-@pytest.mark.parametrize(("n_joints", "share"), [(1, 20.0), (3, 10.0), (8, 5.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("n_joints", "share"), [(1, 20.0), (3, 10.0), pytest.param(8, 5.0, marks=pytest.mark.full)]
+)
 def test_loads_that_do_not_come_on_at_once(
     n_joints: int, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +240,7 @@ def named(*names: str) -> list[Effect]:
     return [next(one for one in VARIANTS if one.name == name) for name in names]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", [("nonlinear_stiffening",), BEFORE], ids=["laws", "every kind"])
 @EVERY
 def test_what_idle_effects_would_do(effects: Sequence[Effect], before: tuple[str, ...]) -> None:

@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from sweeps import sweep
 
 from spinepipe.jobs import code
 
@@ -53,7 +52,7 @@ def test_a_file_that_has_changed_since_is_read_again(kept: Path) -> None:
     assert code.code_digest(MODULE) == fresh
 
 
-@sweep("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
+@pytest.mark.parametrize("content", ["", "{", '{"python": "2.7", "files": {"a": 1}}', "[1]"])
 def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
     fresh = code.code_digest(MODULE)
     kept.write_text(content, "utf-8")
@@ -76,8 +75,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path
     return tmp_path / "spinepipe"
 
 
-@sweep(
-    "name, counts",
+@pytest.mark.parametrize(
+    ("name", "counts"),
     [
         *((f"used/published{suffix}", True) for suffix in code._DATA_SUFFIXES),
         ("published.csv", True),
@@ -102,8 +101,8 @@ def test_data_beside_imported_modules_counts(package: Path, name: str, counts: b
     assert (digest() != one) is counts
 
 
-@sweep(
-    "one, other, same",
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
     [
         ('"""Doc."""\nx = 1  # why\n', "x = 1\n", True),
         ("def f():\n    '''Doc.'''\n    return 1\n", "def f():\n\n    return 1\n", True),
@@ -128,8 +127,8 @@ OTHER = Table("other", "About it.", (), (Column("b", "text", meaning="what b is"
 """
 
 
-@sweep(
-    "was, becomes, counts",
+@pytest.mark.parametrize(
+    ("was", "becomes", "counts"),
     [
         ("what a is", "what it is", False),
         ("was not read", "nobody read it", False),
@@ -160,8 +159,8 @@ def test_of_tables_the_imported_ones_count_without_wording(
     assert (digest(TABLES) != digest(TABLES.replace(was, becomes))) is counts
 
 
-@sweep(
-    "own, counts",
+@pytest.mark.parametrize(
+    ("own", "counts"),
     [
         ("from spinepipe.effects import create\n", False),
         ("from spinepipe.effects import create\ncreate('creep')\n", True),

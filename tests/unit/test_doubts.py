@@ -66,17 +66,27 @@ def change(folder: Path, file: str, columns: list[str], factor: float, **where: 
     table.to_csv(folder / file, index=False)
 
 
-@pytest.mark.parametrize("folder", SHIPPED, ids=lambda path: str(path.name))
+@pytest.mark.parametrize(
+    "folder",
+    [
+        pytest.param(path, id=path.name, marks=[pytest.mark.full] * ("_sd" in path.name))
+        for path in SHIPPED
+    ],
+)
 def test_nothing_is_told_of_what_comes_along(folder: Path) -> None:
     assert told(folder) == ()
 
 
+@pytest.mark.full
 def test_nothing_is_told_of_a_further_phantom(tmp_path: Path) -> None:
     write_phantom(phantom(3), tmp_path / "further")
     assert told(tmp_path / "further") == ()
 
 
-@pytest.mark.parametrize(("design", "effect"), [("directions", "hysteresis"), ("two_shears", "")])
+@pytest.mark.parametrize(
+    ("design", "effect"),
+    [("two_shears", ""), pytest.param("directions", "hysteresis", marks=pytest.mark.full)],
+)
 def test_nothing_is_told_of_hidden_effects_and_forces(
     design: str, effect: str, tmp_path: Path
 ) -> None:
@@ -180,7 +190,9 @@ def test_a_fused_joint_is_no_unit(shipped: Callable[[str], Path]) -> None:
     assert told(folder) == ()
 
 
-@pytest.mark.parametrize("test", ANGLES_OF_TESTS)
+@pytest.mark.parametrize(
+    "test", ["flexion", pytest.param("left_lateral_bending", marks=pytest.mark.full)]
+)
 def test_signs_of_a_joint_and_of_a_test(shipped: Callable[[str], Path], test: str) -> None:
     folder = shipped("t12s1_phantom")
     column = ANGLES_OF_TESTS[test]

@@ -11,6 +11,7 @@ from pathlib import Path
 import grid_cases
 import pyarrow.parquet as pq
 import pytest
+from mistaken_cohorts import good
 
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.collect import StaleFile
@@ -48,8 +49,8 @@ def made(root: Path) -> Expected:
     draw.sample_frames(str(root), STUDY, "a", frames)
     draw.draw_stiffness(str(root), STUDY, sets)
     for path in told.files.job_files("range_of_motion", "a", "000"):
-        pose, stiffness = (part.split("=")[1].split(".")[0] for part in path.split("/")[-2:])
-        simulate.run(str(root), STUDY, frames, sets, "a", pose, stiffness, path)
+        pose = Path(path).stem.partition("=")[2]
+        simulate.run(str(root), STUDY, frames, sets, "a", pose, path)
     return told
 
 
@@ -192,7 +193,7 @@ def expected_of(root: Path, name: str) -> Expected:
 def poses(tmp_path: Path) -> Path:
     """The file of a joint-pose study in a project with the phantom."""
     cohort, studies = Path("config/cohorts", COHORT), tmp_path / "config/studies"
-    shutil.copytree(ROOT / cohort, tmp_path / cohort)
+    good(COHORT, tmp_path / cohort.parent)
     studies.mkdir()
     study = studies / "poses.yaml"
     study.write_text(JOINT_POSES)
@@ -223,7 +224,7 @@ def test_another_seed_samples_again_in_its_own_study_alone(tmp_path: Path) -> No
     again = changed(
         lambda: expected_of(tmp_path, "poses"), lambda: replace(study, "seed: 1", "seed: 2")
     )
-    assert {"table landmarks", "table simulations", "landmarks s03"} <= again
+    assert {"table landmarks", "table simulations", "landmarks s02"} <= again
     assert jobs(expected_of(tmp_path, "twin")) == twin
 
 
@@ -242,12 +243,12 @@ def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, stud
         shutil.copy2(ROOT / "config/studies" / f"{study}.yaml", studies)
     loads = tmp_path / "config/cohorts" / COHORT / "loads.csv"
     rows = loads.read_text().splitlines(keepends=True)
-    at = next(place for place, row in enumerate(rows) if row.startswith("s03,flexion,2,9,"))
+    at = next(place for place, row in enumerate(rows) if row.startswith("s02,flexion,2,9,"))
     rows[at] = re.sub(r"(\d)(\n)$", lambda m: f"{(int(m[1]) + 1) % 10}{m[2]}", rows[at])
     again = changed(lambda: expected_of(tmp_path, study), lambda: loads.write_text("".join(rows)))
     files = {name for name in jobs(expected_of(tmp_path, study)) if name.endswith(".parquet")}
     joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
-    own = {name for name in files if "specimen=s03/" in name}
+    own = {name for name in files if "specimen=s02/" in name}
     assert own
     assert again & files == own | joint
 

@@ -15,6 +15,7 @@ from spinepipe.sensitivity.global_indices.indices import indices
 SEEDS = range(40)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_known_sobol_indices_lie_in_their_intervals(name: str) -> None:
     function = FUNCTIONS[name]
@@ -29,6 +30,7 @@ def test_known_sobol_indices_lie_in_their_intervals(name: str) -> None:
     assert np.mean(inside) >= 0.9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_known_first_order_lies_in_the_intervals_of_rbd_fast(name: str) -> None:
     function = FUNCTIONS[name]
@@ -43,6 +45,7 @@ def test_known_first_order_lies_in_the_intervals_of_rbd_fast(name: str) -> None:
     assert np.mean(inside) >= 0.9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_known_elementary_effects_lie_in_their_intervals(name: str) -> None:
     function = FUNCTIONS[name]

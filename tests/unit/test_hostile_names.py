@@ -128,15 +128,21 @@ def test_settings_are_shown_as_text(results: Made) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:constrained_layout not applied:UserWarning")
-def test_no_name_becomes_an_element_of_a_figure(results: Made, tmp_path: Path) -> None:
-    """Text is drawn as outlines; what is left of it is a comment of matplotlib's."""
-    found = renamed(results, SHORT, tmp_path)
-    kind = kind_of(found.study.kind)
-    figures = [f for f in kind.figures if set(f.tables) <= set(found.tables)]
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=[pytest.mark.full] * (kind not in ("range_of_motion", "tracking")))
+        for kind in sorted(MAKERS)
+    ],
+)
+def test_no_name_becomes_an_element_of_a_figure(kind: str, tmp_path: Path) -> None:
+    """Text is drawn as outlines, by one style for all kinds; what is left is a comment."""
+    found = renamed(made(kind, tmp_path / "made"), SHORT, tmp_path)
+    figures = [f for f in kind_of(kind).figures if set(f.tables) <= set(found.tables)]
     figure = next((f for f in figures if set(f.reads) <= {*found.tables, "verdict.json"}), None)
     assert figure is not None
     with style():
-        drawing = drawings(found.study.kind)[figure.name](found.study, found.cohort, found.tables)
+        drawing = drawings(kind)[figure.name](found.study, found.cohort, found.tables)
         svg = picture(drawing, "svg")
     assert_is_a_drawing(marked(svg, ".svg", "0" * 64))
 

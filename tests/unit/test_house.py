@@ -54,7 +54,7 @@ LARGEST_BYTES = 1_500_000
 LARGE_ON_PURPOSE: frozenset[str] = frozenset()
 """Tracked files that may be larger, as paths from the root."""
 
-CHANGING = ("progress.Progress", "studies.trunk_loads.tune.Volunteer", "motion.banded.Band")
+CHANGING = ("progress.Progress", "studies.trunk_loads.tune.Volunteer")
 """Dataclasses that are not frozen."""
 
 # Put together here, so that this file does not itself hold what it forbids.
@@ -109,16 +109,16 @@ def dotted(path: Path) -> str:
 
 
 @cache
-def tree_of(path: Path) -> ast.Module:
-    """The syntax of a file."""
-    return ast.parse(path.read_bytes())
+def nodes_of(path: Path) -> list[ast.AST]:
+    """The syntax of a file, flat: every rule goes over it."""
+    return list(ast.walk(ast.parse(path.read_bytes())))
 
 
 @cache
 def imports(path: Path) -> list[tuple[int, str]]:
     """Line and full name of everything a file imports, also inside functions."""
     found: list[tuple[int, str]] = []
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             found += [(node.lineno, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -131,11 +131,11 @@ def imports(path: Path) -> list[tuple[int, str]]:
     return found
 
 
-def decompositions(tree: ast.Module) -> list[str]:
+def decompositions(nodes: list[ast.AST]) -> list[str]:
     """``line n: full name`` of every use of `DECOMPOSING`, and of norms by singular values."""
     known: dict[str, str] = {}
     found: set[tuple[int, str]] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 name = alias.asname or alias.name.split(".")[0]
@@ -144,7 +144,7 @@ def decompositions(tree: ast.Module) -> list[str]:
             for alias in node.names:
                 name = known[alias.asname or alias.name] = f"{node.module}.{alias.name}"
                 found |= {(node.lineno, name)} if DECOMPOSING.fullmatch(name) else set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute) and DECOMPOSING.fullmatch(name := full(node, known)):
             found.add((node.lineno, name))
         elif isinstance(node, ast.Call) and full(node.func, known).endswith("linalg.norm"):
@@ -218,7 +218,7 @@ def test_the_core_names_no_kind() -> None:
         f"{dotted(path)}:{node.lineno}: {node.value}"
         for path in MODULES
         if kind_named(dotted(path)) is None
-        for node in ast.walk(tree_of(path))
+        for node in nodes_of(path)
         if isinstance(node, ast.Constant) and node.value in KINDS
     ]
     assert not named, "a kind is found by its folder (spinepipe/studies/registry.py)"
@@ -361,12 +361,12 @@ def test_only_world_imports_pybullet() -> None:
     ],
 )
 def test_decompositions_are_seen_by_whatever_name(text: str, found: list[str]) -> None:
-    assert decompositions(ast.parse(text)) == found
+    assert decompositions(list(ast.walk(ast.parse(text)))) == found
 
 
 def test_only_one_module_decomposes() -> None:
     """Others would fail on some processors: see `spinepipe.decomposition`."""
-    wrong = {dotted(path): found for path in MODULES if (found := decompositions(tree_of(path)))}
+    wrong = {dotted(path): found for path in MODULES if (found := decompositions(nodes_of(path)))}
     assert set(wrong) <= {f"{PACKAGE}.decomposition"}, wrong
 
 
@@ -376,7 +376,7 @@ def test_data_are_frozen() -> None:
     found = {
         f"{dotted(path)}.{node.name}"
         for path in MODULES
-        for node in ast.walk(tree_of(path))
+        for node in nodes_of(path)
         if isinstance(node, ast.ClassDef)
         for by in node.decorator_list
         if "dataclass" in ast.unparse(by) and "frozen=True" not in ast.unparse(by)

@@ -80,8 +80,8 @@ def inward_slope(function: Callable[[float], Array], step: float) -> Array:
     return np.tensordot(weights, np.stack([function(n * step) for n in range(5)]), axes=1)
 
 
-def check_sensitivities(system: System, mixtures: int = 2) -> None:
-    """Derivatives of the solved poses against re-solved ones, along mixtures of all unknowns."""
+def check_sensitivities(system: System, mixtures: int = 1) -> None:
+    """Derivatives of the solved poses against re-solved ones, along a mixture of all unknowns."""
     free = unknowns(system)
     found = np.stack(by_parameters(system, follow(system), free))
     for mixed in np.random.default_rng(7).uniform(0.3, 1.0, (mixtures, len(free))):

@@ -186,6 +186,7 @@ def test_two_recordings_each_with_its_own_zero_are_noisier() -> None:
     assert reading_noise([3, 3], SD, zeroed=True).at(known).root.shape == (5, 6)
 
 
+@pytest.mark.full
 @sweep("curve, points", [(sigmoid, 21), (uneven, 31)])
 def test_intervals_of_the_neutral_zone_hold_it(curve: object, points: int) -> None:
     """95 % asked for; at least 80 % held: to first order, and the number of sigmoids is chosen."""

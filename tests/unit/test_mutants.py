@@ -30,6 +30,7 @@ def test_a_draw_hangs_on_its_seed_and_takes_each_place_once() -> None:
     assert all(mutant.path.startswith(AREAS[AREA][0]) for mutant in one)
 
 
+@pytest.mark.full
 def test_lengths_that_must_be_alike_are_not_spoilt() -> None:
     false = [one for one in drawn("trunk", 10_000, 1) if one.operator.endswith("TrueWithFalse")]
     lines = [(ROOT / one.path).read_text().splitlines()[one.line - 1] for one in false]

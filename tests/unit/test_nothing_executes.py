@@ -48,7 +48,10 @@ SUSPICIOUS = re.compile(
 )
 """Words without which a file need not be looked at closely."""
 
-PROGRAMS = {"cli/doctor.py": "starts this very Python, to see whether the engine crashes"}
+PROGRAMS = {
+    "cli/doctor.py": "starts this very Python, to see whether the engine crashes",
+    "jobs/if_changed.py": "starts the command that it is given, which is Snakemake",
+}
 """Files that start a program, and why."""
 
 BY_NAME = {

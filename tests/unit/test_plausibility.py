@@ -88,7 +88,8 @@ def test_good_cohorts_are_not_doubted(name: str, tmp_path_factory: Factory) -> N
         assert told(good(name, tmp_path_factory.mktemp("good"))) == ()
 
 
-@pytest.mark.parametrize("name", ["small", pytest.param("palanca_l1l4", marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["small", "palanca_l1l4"])
 def test_kinds_of_mistakes_that_came_later(name: str, tmp_path: Path) -> None:
     """A sample of what `python -m tests.validation plausibility` measures in eighteen cohorts."""
     found = scores(name, FRESH, tmp_path)

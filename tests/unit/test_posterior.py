@@ -115,7 +115,7 @@ def measured(k: float, offset: float) -> Array:
 @pytest.mark.parametrize(
     ("k", "number"),
     [
-        (15.0, 150),
+        (15.0, 100),
         pytest.param(15.0, 800, marks=pytest.mark.full),
         pytest.param(400.0, 800, marks=pytest.mark.full),
     ],
@@ -158,8 +158,8 @@ def test_without_readings_that_tell_the_posterior_is_the_prior() -> None:
     target = Target(target.evaluator, target.unknowns, loud)
     mode = modes(target, np.zeros((1, 2)))[0]
     np.testing.assert_allclose(mode.covariance, np.eye(2), atol=1e-3)
-    z = sample(target, mode, chains=2, warm_up=30, draws=150, seed=3).z.reshape(-1, 2)
-    assert np.abs(z.mean(axis=0)).max() < 0.2
+    z = sample(target, mode, chains=2, warm_up=30, draws=100, seed=3).z.reshape(-1, 2)
+    assert np.abs(z.mean(axis=0)).max() < 0.25
     assert np.abs(z.std(axis=0) - 1.0).max() < 0.2
 
 

@@ -15,10 +15,18 @@ from sweeps import sweep
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics import System
+from spinepipe.model import Body, ScopedEffect, SpineModel
 from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import Held, Place, Prescription, Tilt, hold_at
+from spinepipe.statics.prescribed import (
+    Held,
+    HeldChain,
+    Place,
+    Prescription,
+    Tilt,
+    Trial,
+    hold_at,
+    newton_steps,
+)
 from spinepipe.status import Ended
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
@@ -34,10 +42,6 @@ LEAST = 1e-4
 
 STRETCH = np.linspace(4.0, 9.0, COUNT)
 LOWER, UPPER = np.linspace(-0.12, -0.2, COUNT), np.linspace(0.22, 0.1, COUNT)
-
-
-def case() -> LoadCase:
-    return LoadCase("held", 1, (LoadStep(0, ()),))
 
 
 def model(mirrored: bool = False, aside: float = 1.0) -> SpineModel:
@@ -81,10 +85,12 @@ def rotations(n: int = COUNT) -> Array:
     return np.tile([False] * 3 + [True] * 3, n)
 
 
+def chain(made: SpineModel, side: float = 1.0) -> HeldChain:
+    return HeldChain(made, grips(side), rotations())
+
+
 def held(wanted: Array, mirrored: bool = False) -> Held:
-    spine_model = model(mirrored)
-    system = System(Chain(spine_model), spine_model, case())
-    return hold_at(system, grips(-1.0 if mirrored else 1.0), wanted, rotations())
+    return hold_at(chain(model(mirrored), -1.0 if mirrored else 1.0), wanted)
 
 
 class Planar:
@@ -164,11 +170,10 @@ def test_a_planar_chain_stands_where_its_energy_is_least(share: float) -> None:
 
 def test_from_its_own_end_nothing_is_left_to_do() -> None:
     """Newton has arrived at its first step; and is near it from a pose near by."""
-    spine_model, wanted = model(), bent_by(0.5)
-    system = System(Chain(spine_model), spine_model, case())
-    there = hold_at(system, grips(), wanted, rotations())
-    again = hold_at(system, grips(), wanted, rotations(), there)
-    near = hold_at(system, grips(), wanted + 1e-5, rotations(), there)
+    own, wanted = chain(model()), bent_by(0.5)
+    there = hold_at(own, wanted)
+    again = hold_at(own, wanted, there)
+    near = hold_at(own, wanted + 1e-5, there)
     assert (again.status, again.iterations) == (Ended.CONVERGED, 1)
     np.testing.assert_allclose(again.q, there.q, rtol=0, atol=1e-12)
     assert near.iterations < min(there.iterations, 5)
@@ -203,8 +208,7 @@ def test_stretching_all_laws_moves_nothing() -> None:
     values[:, 0] *= 10.0
     springs[:, 3:] *= 10.0
     stiffer = plain.with_effects((bushing.with_values(springs), law.with_values(values)))
-    system = System(Chain(stiffer), stiffer, case())
-    found, before = hold_at(system, grips(), wanted, rotations()), held(wanted)
+    found, before = hold_at(chain(stiffer), wanted), held(wanted)
     np.testing.assert_allclose(found.q, before.q, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.pushes, 10.0 * before.pushes, rtol=1e-6)
 
@@ -230,48 +234,85 @@ def test_a_chain_that_cannot_reach_misses_by_least() -> None:
 
 def test_a_chain_that_buckles_out_of_its_plane_is_unstable() -> None:
     """Pushed down by more than a column of such springs carries, with its top free to swerve."""
-    soft = model(aside=0.05)
-    system = System(Chain(soft), soft, case())
-    found = hold_at(system, grips(), bent_by(0.8), rotations())
+    found = hold_at(chain(model(aside=0.05)), bent_by(0.8))
     assert found.status is Ended.UNSTABLE
     assert "buckles" in found.message
     assert found.missed.any()
 
 
-def tilted() -> SpineModel:
-    plain = spine(3, gravity=False)
-    law = scoped(create("bounded_tangent", {}), (0, 1, 2), *((5.0, -0.3, 0.2),) * 3)
-    return plain.with_effects((plain.effects[0], law))
-
-
-@sweep(
-    "prescription",
-    [
-        Place(2, np.array([0.02, 0.12, -0.01]), np.array([0.6, 0.0, 0.8])),
-        Tilt(2, np.array([0.2, 0.9, -0.1]), UP, RIGHT),
-        Tilt(1, np.array([-0.3, 0.7, 0.4]), UP, RIGHT),
-    ],
+PRESCRIBED: tuple[Prescription, ...] = (
+    Place(2, np.array([0.02, 0.12, -0.01]), np.array([0.6, 0.0, 0.8])),
+    Tilt(2, np.array([0.2, 0.9, -0.1]), UP, RIGHT),
+    Tilt(1, np.array([-0.3, 0.7, 0.4]), UP, RIGHT),
 )
+
+
+@pytest.mark.parametrize("prescription", PRESCRIBED)
 def test_slopes_and_bends_are_those_of_the_value(prescription: Prescription) -> None:
-    chain, rng = Chain(tilted()), np.random.default_rng(3)
-    q = np.tile([2e-3] * 3 + [0.2] * 3, 3) * rng.normal(size=18)
-    motion = ChainMotion(chain, q)
-    slope, bend = prescription.slope(motion), prescription.bend(motion)
-    np.testing.assert_allclose(bend, bend.T, rtol=0, atol=1e-12)
+    """Also PyBullet's, which knows nothing of twists."""
+    plain, rng = spine(3, gravity=False), np.random.default_rng(3)
+    own = HeldChain(plain, (prescription,), np.ones(18, dtype=bool))
+    q, push = np.tile([2e-3] * 3 + [0.2] * 3, 3) * rng.normal(size=18), 300.0
+
+    def matrix(at: Array, pushed: float) -> Array:
+        (found,) = newton_steps([Trial(own, at, np.array([pushed]), np.zeros(1), 0.0)])
+        assert found is not None
+        return found.matrix
+
+    slope = matrix(q, push)[18, :18]
+    bend = (matrix(q, 0.0) - matrix(q, push))[:18, :18] / push
     for k in range(18):
         step = 1e-6 * np.eye(18)[k]
-        there, back = (ChainMotion(chain, q + sign * step) for sign in (1.0, -1.0))
-        by_value = (prescription.value(there) - prescription.value(back)) / 2e-6
-        by_slope = (prescription.slope(there) - prescription.slope(back)) / 2e-6
+        by_value = (own.reached(q + step) - own.reached(q - step))[0] / 2e-6
+        by_slope = (matrix(q + step, push) - matrix(q - step, push))[18, :18] / 2e-6
         assert slope[k] == pytest.approx(by_value, abs=1e-8)
         np.testing.assert_allclose(bend[:, k], by_slope, rtol=0, atol=1e-8)
+    motion = ChainMotion(Chain(plain), q)
+    if isinstance(prescription, Place):
+        by_bullet = motion.velocities(prescription.body, prescription.point)
+        np.testing.assert_allclose(slope, by_bullet @ prescription.direction, rtol=0, atol=1e-12)
+
+
+def test_steps_that_stand_together_are_those_of_each_alone() -> None:
+    """Chains of other frames, laws and grips; one beyond the ends of its law, one singular."""
+    rng, wanted = np.random.default_rng(5), bent_by(0.4)
+    chains = [chain(model()), chain(model(mirrored=True), -1.0), chain(model(aside=2.0))]
+    place = grips()[0]
+    assert isinstance(place, Place)
+    nothing = (replace(place, direction=np.zeros(3)), *grips()[1:])  # asks for what no push moves
+    poses = [0.01 * rng.normal(size=6 * COUNT) * rotations() for _ in range(4)]
+    poses[1] += np.where(np.arange(6 * COUNT) % 6 == BENDING, 1.0, 0.0)
+    pushes = rng.normal(size=(4, 3))
+    trials = [
+        Trial(one, q, push, wanted, 0.1 * number)
+        for number, (one, q, push) in enumerate(zip(chains, poses, pushes, strict=False))
+    ]
+    together = newton_steps(trials)
+    assert [one is None for one in together] == [False, True, False]
+    for one, trial in zip(together, trials, strict=True):
+        alone = newton_steps([trial])[0]
+        assert (one is None) == (alone is None)
+        if one is not None and alone is not None:
+            np.testing.assert_allclose(one.step, alone.step, rtol=1e-9, atol=1e-12)
+    singular = HeldChain(model(), nothing, rotations())
+    none, one = newton_steps([Trial(singular, poses[3], pushes[3], wanted, 0.0), trials[0]])
+    assert none is not None
+    assert np.isnan(none.step).all()
+    assert one is not None
+    assert np.isfinite(one.step).all()
+
+
+def test_effects_other_than_joint_laws_are_refused() -> None:
+    moved = spine(3, effects=(scoped(create("joint_centre_offset", {}), (1,)),))
+    with pytest.raises(ValueError, match="joint laws alone"):
+        HeldChain(moved, PRESCRIBED, rotations(3))
 
 
 def test_answers_are_the_derivatives_of_the_pose() -> None:
     """A change of the law's stretch at one joint, against solving again."""
     wanted, plain = bent_by(0.5), model()
-    system = System(Chain(plain), plain, case())
-    found = hold_at(system, grips(), wanted, rotations())
+    own = chain(plain)
+    found = hold_at(own, wanted)
     assert found.answers is not None
     law = plain.effects[1]
     at = found.q.reshape(-1, 6)
@@ -285,8 +326,7 @@ def test_answers_are_the_derivatives_of_the_pose() -> None:
         for sign in (1.0, -1.0):
             values = law.values.copy()
             values[joint, 0] += sign * 1e-4
-            other = plain.with_effects((plain.effects[0], replace(law, values=values)))
-            ends.append(hold_at(system.with_model(other), grips(), wanted, rotations()))
+            ends.append(hold_at(own.with_values((own.values[0], values)), wanted))
         by_q = (ends[0].q - ends[1].q) / 2e-4
         by_pushes = (ends[0].pushes - ends[1].pushes) / 2e-4
         np.testing.assert_allclose(dq[:, joint], by_q, rtol=1e-5, atol=1e-9)
@@ -296,13 +336,13 @@ def test_answers_are_the_derivatives_of_the_pose() -> None:
 def test_answers_to_other_places_are_the_derivatives_of_the_pose() -> None:
     """Each prescription moved a little, against solving again."""
     wanted, plain = bent_by(0.5), model()
-    system = System(Chain(plain), plain, case())
-    found = hold_at(system, grips(), wanted, rotations())
+    own = chain(plain)
+    found = hold_at(own, wanted)
     assert found.answers is not None
     moved = np.eye(len(wanted))
     dq, dpushes = found.answers.to(np.zeros((6 * COUNT, len(wanted))), moved)
     for number, step in enumerate(1e-6 * moved):
-        ends = [hold_at(system, grips(), wanted + s * step, rotations()) for s in (1.0, -1.0)]
+        ends = [hold_at(own, wanted + s * step) for s in (1.0, -1.0)]
         by_q = (ends[0].q - ends[1].q) / 2e-6
         by_pushes = (ends[0].pushes - ends[1].pushes) / 2e-6
         np.testing.assert_allclose(dq[:, number], by_q, rtol=1e-4, atol=1e-6)

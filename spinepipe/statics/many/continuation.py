@@ -64,20 +64,35 @@ def continued(
     """Poses (N, J, 6) under the whole load, and which lanes got there by stable equilibria."""
     q, count = start.copy(), len(start)
     reached, size = np.zeros(count), np.full(count, FIRST_INCREMENT)
-    going = np.ones(count, dtype=bool)
+    going, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while going.any():
-        lanes = np.flatnonzero(going)
-        target = np.minimum(1.0, reached[lanes] + size[lanes])
+        lanes, sizes = _tried(np.flatnonzero(going), size, lost)
+        target = np.minimum(1.0, reached[lanes] + sizes)
         share = increment.share(lanes, target)
         own, loads = increment.on(chains, lanes, target)
         found, good = settled(own, loads, _on(laws, lanes, share), q[lanes])
-        there, lost = lanes[good], lanes[~good]
-        q[there], reached[there] = found[good], target[good]
-        going[lost] = size[lost] > SMALLEST_FRACTION
-        size[there] *= 2.0
-        size[lost] *= 0.5
+        there, first = np.unique(lanes[good], return_index=True)
+        best = np.flatnonzero(good)[first]
+        missed = np.setdiff1d(lanes, there)
+        going[missed] = ~lost[missed] & (size[missed] > SMALLEST_FRACTION)
+        lost[missed], lost[there] = True, False
+        q[there], reached[there], size[there] = found[best], target[best], 2.0 * sizes[best]
+        size[missed] *= 0.5
         going &= reached < 1.0
     return q, reached >= 1.0
+
+
+def _tried(going: Indices, size: Array, lost: Flags) -> tuple[Indices, Array]:
+    """Lanes, and the increments that each tries side by side, the largest first.
+
+    One: the size of the lane; of a lane that was just lost that and all its halves in turn, which
+    start from the same pose. A few lanes more cost less than one trial after the other.
+    """
+    halves = size[going, None] * 0.5 ** np.arange(-np.log2(SMALLEST_FRACTION) + 1)
+    tried = lost[going, None] & (2.0 * halves > SMALLEST_FRACTION)
+    tried[:, 0] = True
+    row, column = np.nonzero(tried)
+    return going[row], halves[row, column]
 
 
 def _on(laws: Laws, lanes: Indices, share: Array) -> Callable[[Indices], Bound]:

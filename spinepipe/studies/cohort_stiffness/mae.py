@@ -30,16 +30,19 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
     """Rows of the table ``mae`` from those of ``errors``."""
     loaded = errors[errors["loaded"].astype(bool)]
     once = loaded.drop_duplicates(["specimen", *PLACE, "joint"])
-    measured = dict(iter(once.groupby(PLACE, sort=False)))
+    largest = {
+        (*place, motion): largest_mean_motion(here, motion)
+        for place, here in once.groupby(PLACE, sort=False)
+        for _, motion in STEPS.values()
+    }
     rows = []
     for key, part in loaded.groupby(GROUP, sort=False):
         named = dict(zip(GROUP, map(str, key), strict=True))
-        here = measured[named["test"], named["coordinate"]]
         for steps, (error, motion) in STEPS.items():
             found = specimen_mae(part, error, motion)
-            largest = largest_mean_motion(here, motion)
+            of_all = largest[named["test"], named["coordinate"], motion]
             unit = COORDINATE_UNITS[named["coordinate"]]
-            row = {**named, "unit": unit, "steps": steps, **_spread(found, largest)}
+            row = {**named, "unit": unit, "steps": steps, **_spread(found, of_all)}
             rows.append(row | _in_deg(row))
     return rows
 

@@ -225,7 +225,7 @@ class FilmFit:
         (6 (S - 1),) and (6 (S - 1), 3 S + 6), or None where a film has no pose.
         """
         numbers, tops = unknowns[:-TOPS], unknowns[-TOPS:].reshape(2, 3)
-        laws = laws_of(numbers, self.size)
+        laws, laws_by = laws_of(numbers, self.size), by_numbers(numbers, self.size)
         spine = self.spine.with_values(self.spine.chain.values[0], laws)
         errors, slopes = [], []
         for film_number, position in enumerate((RIGHT, LEFT)):
@@ -236,7 +236,7 @@ class FilmFit:
                 return None
             self.near[position] = posed.held
             held_by = np.zeros((len(posed.held.q), len(unknowns)))
-            held_by[:, :-TOPS] = self._held_by(posed.held.q, laws, numbers)
+            held_by[:, :-TOPS] = self._held_by(posed.held.q, laws, laws_by)
             top_by = np.zeros((3, len(unknowns)))
             at = len(numbers) + 3 * film_number
             top_by[:, at : at + 3] = np.diag(self.sd)
@@ -251,10 +251,10 @@ class FilmFit:
         laws = laws_of(numbers, self.size)
         return with_laws(self.patient.chain, self.patient.springs, laws)
 
-    def _held_by(self, q: Array, laws: Array, numbers: Array) -> Array:
+    def _held_by(self, q: Array, laws: Array, laws_by: Array) -> Array:
         """(6 S, 3 S) change of what the joints hold with each number."""
         by_law = BoundedTangent().by_parameter(q.reshape(-1, 6), laws, np.empty(0))[:, BENDING]
-        each = np.einsum("sp,spn->sn", by_law, by_numbers(numbers, self.size))
+        each = np.einsum("sp,spn->sn", by_law, laws_by)
         s = self.segments
         found = np.zeros((s, 6, 3, s))
         rows = np.arange(s)

@@ -1,6 +1,6 @@
 """Job: the population of a cohort, learned from the films of all its patients.
 
-Patients are fitted in lockstep, one stack for all; what the films of each say near its fit is a parabola, on which
+Patients are fitted in lockstep; what the films of each say near its fit is a parabola, on which
 means and spreads of the population are learned until they stand still. Then all are fitted anew
 under it, as the parabolas hold near the fits alone.
 """
@@ -60,14 +60,16 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
     population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, Fitted]()
-    for number in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
+    rounds = 0
+    for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
+        rounds += 1
         fits = dict(_fits(patients, sd, population, fits))
         before, population = population, _settled(population, [one.told for one in fits.values()])
         change = _change(before, population)
         if change < LAST_ROUND or not fits:
             break
     unfitted = tuple(name for name in patients if name not in fits)
-    return Learned(population, number, change, len(fits), unfitted)
+    return Learned(population, rounds, change, len(fits), unfitted)
 
 
 def _fits(

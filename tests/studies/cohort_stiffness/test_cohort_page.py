@@ -252,7 +252,8 @@ def test_jobs_draw_all_figures_and_write_the_page(made: Path) -> None:
         draw.run(str(made), STUDY, figure.name, tables, path, path.replace(".svg", ".png"))
     files = sorted(str(path) for path in folder.glob("*.parquet"))
     captions = [str(caption("cohort_stiffness", figure.name)) for figure in KIND.figures]
-    report.run(str(made), STUDY, files, pictures, captions, str(folder / "report.html"))
+    output = str(folder / "report.html")
+    report.run(str(made), STUDY, "report", files, pictures, captions, output)
     page = (folder / "report.html").read_text(encoding="utf-8")
     for number, figure in enumerate(KIND.figures, start=1):
         assert f"Figure {number}. {figure.title}." in page

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from sweeps import sweep
 from testable_cases import case_of, spine_of
 
 from spinepipe.cohort.specimen import cables
@@ -63,8 +63,8 @@ def tensions(plan_or_tests, test: str) -> list[float]:
     return [float(one.values[0, 0]) for one in found[1:] if one.in_scope(test)]
 
 
-@pytest.mark.parametrize(
-    ("words", "name", "beside"),
+@sweep(
+    "words, name, beside",
     [("opposite", "opposite", []), ("follower load", "preloaded", [PRELOAD_N])],
 )
 def test_added_tests_keep_the_follower_load_of_their_rig(words, name, beside):
@@ -108,8 +108,8 @@ def test_cycles_whose_loads_differ_a_little_are_one_test():
     assert one.count.tolist() == [[0, 0, 0, 3, 3, 3]] * 2
 
 
-@pytest.mark.parametrize(
-    ("moments", "back"),
+@sweep(
+    "moments, back",
     [
         ((0.0, 2.5, 5.0, 7.5), False),
         ((0.0, 2.5, 5.0, 7.5, 5.0, 2.5, 0.0), True),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.progress import Progress
@@ -90,7 +91,7 @@ def test_no_more_effects_enter_than_are_allowed_but_more_forms_of_one_do() -> No
 # When it is hopeless
 
 
-@pytest.mark.parametrize(("number", "times"), [(0, 4.0), (1, 2.5), (2, 1.5), (3, 1.5), (9, 1.5)])
+@sweep("number, times", [(0, 4.0), (1, 2.5), (2, 1.5), (3, 1.5), (9, 1.5)])
 def test_a_search_is_hopeless_where_the_generic_basis_has_that_many_times_the_evidence(
     number: int, times: float
 ) -> None:

@@ -6,6 +6,7 @@ import chain_cases as cases
 import numpy as np
 import pytest
 import search_cases
+from sweeps import sweep
 from test_formula import DRAWS, FALSE_ALARM, found, grounds
 
 from spinepipe import cohort as cohorts
@@ -31,7 +32,7 @@ def tables(at: Grounds) -> tuple[Grounds, Tabulated | None]:
     return tabulated(at, lack, found(at), FALSE_ALARM)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@sweep("seed", [1, 2, 3])
 def test_springs_need_no_table(seed: int) -> None:
     at = grounds(seed)
     after, table = tables(at)

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as of_numpy
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.effects.registry import create, registered
@@ -135,7 +136,7 @@ def test_cached_properties_are_not_written() -> None:
     assert "mean" not in vars(decoded(encoded(held)))
 
 
-@pytest.mark.parametrize("name", sorted(registered()))
+@sweep("name", sorted(registered()))
 def test_every_effect_comes_back(name: str) -> None:
     effect = create(name)
     values = np.array([[one.default for one in effect.parameters]])
@@ -173,7 +174,7 @@ class Text(str):
     """A str that is none."""
 
 
-@pytest.mark.parametrize(
+@sweep(
     "value",
     [
         object(),
@@ -217,7 +218,7 @@ def written(structure: Any, **flat: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-@pytest.mark.parametrize(
+@sweep(
     "name",
     [
         "os:system",
@@ -237,8 +238,8 @@ def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:
         decoded(written(["data", name, "true"]))
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
+@sweep(
+    "name, words",
     [
         ("spinepipe.tables.parquet:Table", "is called spinepipe.tables.schema:Table"),
         ("spinepipe.files:re.RegexFlag", "cannot be kept as data"),
@@ -256,7 +257,7 @@ def test_the_program_is_not_run_by_its_name() -> None:
         decoded(written(["data", "spinepipe.cli.__main__:main", "true"]))
 
 
-@pytest.mark.parametrize(
+@sweep(
     "structure",
     [
         ["data", "spinepipe.no_such_room:Data"],

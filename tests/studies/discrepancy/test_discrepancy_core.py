@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, ncx2, norm
 from spring_chain_cases import SD, readings
+from sweeps import sweep
 
 from spinepipe.effects import Spread, registered
 from spinepipe.model import SpineModel
@@ -70,7 +71,7 @@ def log_normal(residual: Array, covariance: Array) -> float:
 # Evidence of a group -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [1, 3])
+@sweep("count", [1, 3])
 def test_evidence_is_the_ratio_of_marginal_likelihoods(count: int) -> None:
     rng = np.random.default_rng(1)
     f, r = rng.normal(size=(25, count)), 2.0 * rng.normal(size=(25, 4))
@@ -97,8 +98,8 @@ def test_strengths_without_a_signature_change_no_evidence() -> None:
     assert twice[0] == pytest.approx(logsumexp(logs) - np.log(len(SIZES)))
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("size", [0.7, -0.7])
+@sweep("side", [1.0, -1.0])
+@sweep("size", [0.7, -0.7])
 def test_one_sided_evidence_is_the_integral_over_half_a_normal(side: float, size: float) -> None:
     rng = np.random.default_rng(3)
     f = 0.6 * rng.normal(size=(20, 1))
@@ -156,8 +157,8 @@ def left_of(columns: Array, taken: Array) -> Array:
     return columns - taken @ np.linalg.lstsq(taken, columns)[0]
 
 
-@pytest.mark.parametrize("spread", [Spread.SHARED, Spread.BY_JOINT, Spread.EACH])
-@pytest.mark.parametrize("shared", [0, 1, 2])
+@sweep("spread", [Spread.SHARED, Spread.BY_JOINT, Spread.EACH])
+@sweep("shared", [0, 1, 2])
 def test_products_are_those_of_dense_projections(spread: Spread, shared: int) -> None:
     """Two specimens with two unknowns of their own and some that they share; three joints."""
     rng = np.random.default_rng(4)
@@ -274,7 +275,7 @@ def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Arra
     return fit, float(off @ off - on @ on), base, f, y
 
 
-@pytest.mark.parametrize("size", [0.0, 0.2, 1.0])
+@sweep("size", [0.0, 0.2, 1.0])
 def test_laplace_is_the_exact_evidence_of_a_linear_problem(size: float) -> None:
     fit, gain, base, f, y = linear_problem(COUPLING, size)
     without = np.eye(60) + 9.0 * base @ base.T
@@ -283,7 +284,7 @@ def test_laplace_is_the_exact_evidence_of_a_linear_problem(size: float) -> None:
     assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
 
 
-@pytest.mark.parametrize(("size", "within"), [(0.0, 0.02), (0.15, 0.01), (0.2, 0.01), (1.0, 0.01)])
+@sweep("size, within", [(0.0, 0.02), (0.15, 0.01), (0.2, 0.01), (1.0, 0.01)])
 def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float, within: float) -> None:
     fit, gain, base, f, y = linear_problem(LAXITY, size)
     without = np.eye(60) + 9.0 * base @ base.T
@@ -405,7 +406,7 @@ def test_the_threshold_is_exceeded_by_fresh_draws_as_seldom_as_asked() -> None:
         assert 0.3 * asked <= share <= 2.5 * asked  # a Gumbel fit to 300 draws is no better
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.2, 1.0])
+@sweep("gap", [0.0, 0.2, 1.0])
 def test_the_interval_of_a_gap_covers_as_often_as_it_says(gap: float) -> None:
     dof, draws = 400.0, 200
     rng = np.random.default_rng(9)

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
+from sweeps import sweep
 
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.search.noise import Noise, estimated_noise, without_outliers
@@ -53,8 +54,8 @@ def changed(given: list[SpecimenReadings], change) -> list[SpecimenReadings]:  #
     ]
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
-@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+@sweep("zeroed", [False, True])
+@sweep("rho", [0.0, 0.5, 0.8])
 def test_sd_and_correlation_come_from_the_repeats(rho: float, zeroed: bool) -> None:
     """3 x 3 x 6 series of two differences each: 6480 values in three rotations and translations."""
     noise = estimated_noise(measured(1, rho, zeroed), None, zeroed, 0)
@@ -76,7 +77,7 @@ def test_missing_readings_do_not_bias_the_noise() -> None:
     np.testing.assert_allclose(noise.sd, SD, rtol=0.06)
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_outliers_are_left_out_and_the_rest_is_kept(zeroed: bool) -> None:
     rng = np.random.default_rng(4)
     clean = measured(5, 0.3, zeroed)
@@ -207,7 +208,7 @@ def setup(rho: float, zeroed: bool) -> tuple[tuple[Repeats, ...], Array, Array, 
     return tests, noise, nuisances, with_nuisances(plain, per_test(tests, nuisances))
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_whitened_covariance_is_the_identity(zeroed: bool) -> None:
     """W C W' = I for the dense covariance of noise and nuisances: W is an inverse root of it."""
     tests, noise, nuisances, white = setup(0.4, zeroed)
@@ -232,7 +233,7 @@ def test_whitened_draws_are_independent_with_sd_one() -> None:
     np.testing.assert_allclose(found, np.eye(24), atol=5.0 * np.sqrt(2.0 / draws))
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_left_over_is_what_remains_at_the_most_likely_nuisances(zeroed: bool) -> None:
     tests, noise, nuisances, white = setup(0.4, zeroed)
     residual = nuisances @ [1.0, -2.0, 0.5] + np.linalg.cholesky(noise) @ np.linspace(

@@ -1,8 +1,13 @@
-"""Figures, headline and page of a search for missing effects, from made-up results."""
+"""Figures, headline and page of a search for missing effects, from made-up results.
+
+Catches a figure or page that fails for one of the verdicts, hides what matters, or says what the
+verdict does not.
+"""
 
 import json
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from itertools import product
 from pathlib import Path
@@ -22,6 +27,7 @@ from discrepancy_cases import (
     tables,
 )
 from matplotlib.figure import Figure
+from sweeps import sweep
 
 from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
@@ -43,9 +49,14 @@ NOWHERE = pd.DataFrame()
 FIGURES = [figure.name for figure in KIND.figures]
 
 
-def study_of(root: Path, text: str = "base: {stiffness: per_specimen}\n") -> Any:
-    if not (root / "config").exists():
-        project(root, text)
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project with a study; verdicts are written beside it, over one another."""
+    return project(tmp_path_factory.mktemp("page"))
+
+
+@cache
+def study_of(root: Path) -> Any:
     return check(root, STUDY)
 
 
@@ -68,7 +79,6 @@ def drawn_of(
     figure_of = getattr(import_module(f"spinepipe.studies.discrepancy.{module}"), function)
     with style():
         figure: Figure = figure_of(study, cohort, tables(verdict, made, root))
-        assert picture(figure, "svg")
     return figure
 
 
@@ -83,25 +93,29 @@ def said(figure: Figure) -> str:
     return " ".join(" ".join(text.get_text() for text in texts).split())
 
 
-@pytest.mark.parametrize(("answer", "name"), list(product(VERDICTS, FIGURES)))
-def test_every_figure_is_drawn_whatever_the_verdict(answer: str, name: str, tmp_path: Path) -> None:
-    assert len(said(drawn(name, tmp_path, answer))) > 40
+@sweep("answer, name", list(product(VERDICTS, FIGURES)))
+def test_every_figure_is_drawn_whatever_the_verdict(answer: str, name: str, root: Path) -> None:
+    figure = drawn(name, root, answer)
+    assert len(said(figure)) > 40
+    if answer == "NAMED":  # the others have no mark that this one has not
+        with style():
+            assert picture(figure, "svg")
 
 
-def test_the_map_shows_each_test_before_and_after(tmp_path: Path) -> None:
-    figure = drawn("gap_map", tmp_path, "NAMED")
+def test_the_map_shows_each_test_before_and_after(root: Path) -> None:
+    figure = drawn("gap_map", root, "NAMED")
     titles = [axis.get_title("left").strip() for axis in figure.axes]
     assert titles.count("base") == titles.count("with effects") == 3
     assert "9.3" in said(figure)
-    alone = [axis.get_title("left").strip() for axis in drawn("gap_map", tmp_path, "NULL").axes]
+    alone = [axis.get_title("left").strip() for axis in drawn("gap_map", root, "NULL").axes]
     assert (alone.count("base"), alone.count("with effects")) == (3, 0)
 
 
-def test_the_map_takes_six_joints_six_coordinates_and_many_tests(tmp_path: Path) -> None:
+def test_the_map_takes_six_joints_six_coordinates_and_many_tests(root: Path) -> None:
     one = frames("NAMED")["where"]
     one = one[one["by"] == "joint x coordinate x test"]
     every = [one.assign(coordinate=name) for name in ("anterior", "superior", "right")]
-    figure = drawn("gap_map", tmp_path, "NAMED", where=pd.concat([one, *every]))
+    figure = drawn("gap_map", root, "NAMED", where=pd.concat([one, *every]))
     assert "ant." in said(figure)
 
 
@@ -118,22 +132,22 @@ def test_places_of_the_largest_gap_come_first_and_once() -> None:
     assert len({tuple(place[1:]) for place in found}) == 6
 
 
-def test_a_model_without_poses_is_said_to_have_none(tmp_path: Path) -> None:
+def test_a_model_without_poses_is_said_to_have_none(root: Path) -> None:
     made = frames("NAMED")
     gap = made["gap"].assign(base=np.nan, with_effects=np.nan)
-    assert "no pose" in said(drawn("gap_by_step", tmp_path, "NAMED", gap=gap))
+    assert "no pose" in said(drawn("gap_by_step", root, "NAMED", gap=gap))
     where = made["where"].assign(gap=np.nan)
-    assert "no model has a pose" in said(drawn("gap_map", tmp_path, "NAMED", where=where))
+    assert "no model has a pose" in said(drawn("gap_map", root, "NAMED", where=where))
     nothing = made["held_out"].iloc[:0]
     assert "nothing was left out" in said(
-        drawn("held_out_by_test", tmp_path, "NAMED", held_out=nothing)
+        drawn("held_out_by_test", root, "NAMED", held_out=nothing)
     )
     empty = {name: made[name].iloc[:0] for name in ("candidates", "confusions")}
-    assert "no effect was tried" in said(drawn("evidence_by_round", tmp_path, "NULL", **empty))
+    assert "no effect was tried" in said(drawn("evidence_by_round", root, "NULL", **empty))
 
 
-def test_what_cannot_be_tested_stands_beside_what_can(tmp_path: Path) -> None:
-    words = said(drawn("effect_confusions", tmp_path, "NULL"))
+def test_what_cannot_be_tested_stands_beside_what_can(root: Path) -> None:
+    words = said(drawn("effect_confusions", root, "NULL"))
     assert words.count("not testable here") == len(HIDDEN) + 1  # and in the key
     assert all(general(name) in words for name in [*EFFECTS, *HIDDEN])
 
@@ -152,7 +166,7 @@ HEADLINES = {
 }
 
 
-@pytest.mark.parametrize(("answer", "words"), HEADLINES.items())
+@sweep("answer, words", HEADLINES.items())
 def test_the_verdict_is_one_sentence(answer: str, words: str) -> None:
     assert headline(verdict_of(VERDICTS[answer]), frames(answer)["where"]) == words
 
@@ -256,12 +270,12 @@ def test_files_of_before_regions_say_nothing_of_them() -> None:
     assert {one.identifiable for one in effect.parameters} == {None}
 
 
-@pytest.mark.parametrize("answer", VERDICTS)
-def test_the_page_opens_with_the_verdict(answer: str, tmp_path: Path) -> None:
-    study, cohort = study_of(tmp_path)
+@sweep("answer", VERDICTS)
+def test_the_page_opens_with_the_verdict(answer: str, root: Path) -> None:
+    study, cohort = study_of(root)
     svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
     pictures = {one.name: Picture.of(one.name, one.title, svg, "Words.") for one in KIND.figures}
-    found = Results(tables(VERDICTS[answer], frames(answer), tmp_path), {}, pictures)
+    found = Results(tables(VERDICTS[answer], frames(answer), root), {}, pictures)
     page = document(study, cohort, found).html(study, cohort)
     assert page == document(study, cohort, found).html(study, cohort)
     assert f'<p class="headline">{HEADLINES[answer]}</p>' in page
@@ -307,7 +321,7 @@ def test_what_is_unknown_shows_most_where_the_gap_is_largest() -> None:
     assert "most" not in headline(verdict_of(VERDICTS["UNKNOWN"]), within)
 
 
-def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
+def test_a_base_without_a_fit_is_all_that_is_told(root: Path) -> None:
     why = "the base model cannot be fitted: no start has a pose"
     data = {
         "cohort": "c",
@@ -321,7 +335,7 @@ def test_a_base_without_a_fit_is_all_that_is_told(tmp_path: Path) -> None:
     empty = {name: rows.iloc[:0] for name, rows in frames("NULL").items()}
     assert findings(verdict, rows_of(empty)) == []
     for name in FIGURES:
-        assert re.search("No|not", said(drawn_of(name, tmp_path, data, empty)))
+        assert re.search("No|not", said(drawn_of(name, root, data, empty)))
 
 
 def test_no_name_is_not_always_an_unknown_effect() -> None:
@@ -347,7 +361,7 @@ def test_no_name_is_not_always_an_unknown_effect() -> None:
         assert "Why no name: much stays. Its shape: load over bending." in how_sure(stays)
 
 
-@pytest.mark.parametrize("answer", VERDICTS)
+@sweep("answer", VERDICTS)
 def test_what_is_written_is_read(answer: str) -> None:
     verdict = verdict_of(VERDICTS[answer])
     assert verdict_of(json.loads(json.dumps(plain_data(verdict)))) == verdict
@@ -358,7 +372,7 @@ def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:
         "base: {stiffness: per_joint}\nheld_out: {tests: false}\n"
         "nuisance: {load_gain: 0, rotation_order: 0}\n"
     )
-    study, _ = study_of(tmp_path, text)
+    study, _ = check(project(tmp_path, text), STUDY)
     assert isinstance(study, Discrepancy)
     assert list(left_out(study)) == [
         "prediction of left-out tests (held_out: tests: false)",
@@ -379,6 +393,7 @@ def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
     report.run(
         root,
         STUDY,
+        "report",
         [str(folder / f"{table.name}.parquet") for table in TABLES],
         [made["svg"]],
         [str(ROOT / files.caption(figure.name))],
@@ -389,10 +404,10 @@ def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
     assert json.loads((folder / "verdict.json").read_text())["verdict"] == "NAMED"
 
 
-def test_every_figure_has_a_caption_and_a_title(tmp_path: Path) -> None:
-    files = DiscrepancyFiles.of(*study_of(tmp_path))
+def test_every_figure_has_a_caption_and_a_title(root: Path) -> None:
+    files = DiscrepancyFiles.of(*study_of(root))
     assert list(files.figures()) == FIGURES
-    assert all((ROOT / path).read_text().strip() for path in files.captions())
+    assert all((ROOT / files.caption(name)).read_text().strip() for name in FIGURES)
     assert all(figure.title for figure in KIND.figures)
 
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from chain_cases import DEGREES, STUDY, Chains
+from sweeps import sweep
 
 from spinepipe.effects import Spread, Trial, registry
 from spinepipe.jobs.digest import settings_of
@@ -125,7 +126,7 @@ CASES = [
 # fmt: on
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.about.replace(" ", "-"))
+@sweep("case", CASES)
 def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path) -> None:
     written(tmp_path, case.study + "\n")
     problems = complaints(tmp_path)
@@ -180,13 +181,12 @@ def test_noise_must_be_known_from_somewhere(tmp_path: Path) -> None:
     assert "set measurement_sd:" in problem.remedy
 
 
-@pytest.mark.parametrize(
-    ("study", "choices"),
+@sweep(
+    "study, choices",
     [
         (BASE, {"sd": False, "cycles": 2}),
         (BASE + "measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1}\n", {"sd": False}),
     ],
-    ids=["repeats", "in the study"],
 )
 def test_repeats_or_declared_sds_will_do(study: str, choices: dict, tmp_path: Path) -> None:
     written(tmp_path, study, **choices)
@@ -220,8 +220,8 @@ def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
     assert mark_of_search(tmp_path) != before, "the search hangs on this very file"
 
 
-@pytest.mark.parametrize(
-    ("entry", "place", "found"),
+@sweep(
+    "entry, place, found",
     [
         (
             EffectEntry(effect="linear_bushing", scope=Scope(joints=("L1L2",))),
@@ -249,7 +249,6 @@ def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
             "test 'twist'",
         ),
     ],
-    ids=["joint", "value of a joint", "specimen", "value of a specimen", "test"],
 )
 def test_a_model_of_another_spine_is_refused(
     entry: EffectEntry, place: str, found: str, tmp_path: Path

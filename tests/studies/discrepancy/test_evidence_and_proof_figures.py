@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
 from discrepancy_cases import frames
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from sweeps import sweep
 from test_discrepancy_page import drawn, said
 
 from spinepipe.studies.discrepancy.figures.evidence_by_round import (
@@ -121,7 +121,7 @@ def test_nothing_tried_is_no_round() -> None:
     assert rounds(search_of()) == []
 
 
-@pytest.mark.parametrize("many", [3, 20])
+@sweep("many", [3, 20])
 def test_the_matrix_has_every_effect_with_evidence(many: int, tmp_path: Path) -> None:
     candidates = frames("NAMED")["candidates"]
     again = [

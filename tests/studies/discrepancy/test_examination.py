@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search.examination import examined
@@ -89,7 +90,7 @@ def examine(says: Says, *names: str, settled: bool = False) -> Any:
     return examined(cast(Grounds, Place(names)), cast(Inquiry, says), settled=settled)
 
 
-@pytest.mark.parametrize(("lead", "gives_way"), [(0.5, False), (2.9, False), (3.1, True)])
+@sweep("lead, gives_way", [(0.5, False), (2.9, False), (3.1, True)])
 def test_another_takes_the_place_by_a_clear_margin_only(lead: float, gives_way: bool) -> None:
     says = Says({(): {"neutral_zone": 100.0, "nonlinear_stiffening": 100.0 + lead}})
     result = examine(says, "neutral_zone")
@@ -163,7 +164,7 @@ def a_refit(name: str, log_evidence: float, unknowns: int) -> Refit:
     return cast(Refit, SimpleNamespace(name=name, log_evidence=log_evidence, unknowns=unknowns))
 
 
-@pytest.mark.parametrize(("behind", "first"), [(1.0, 1), (2.9, 1), (3.0, 3), (3.1, 3)])
+@sweep("behind, first", [(1.0, 1), (2.9, 1), (3.0, 3), (3.1, 3)])
 def test_a_plain_form_hardly_behind_stands_first(behind: float, first: int) -> None:
     """Equal values predict a specimen that nobody measured; values of its own do not."""
     found = [

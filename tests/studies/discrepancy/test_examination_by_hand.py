@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search import examination
@@ -37,7 +38,7 @@ def refitted(
 OWN = form("a")
 
 
-@pytest.mark.parametrize(("lead", "gives_way"), [(2.99, False), (3.01, True)])
+@sweep("lead, gives_way", [(2.99, False), (3.01, True)])
 def test_a_form_gives_way_to_a_clearly_better_one_of_its_effect(
     lead: float, gives_way: bool
 ) -> None:
@@ -48,7 +49,7 @@ def test_a_form_gives_way_to_a_clearly_better_one_of_its_effect(
         assert found is (other if gives_way else None)
 
 
-@pytest.mark.parametrize(("lead", "gives_way"), [(5.99, False), (6.01, True)])
+@sweep("lead, gives_way", [(5.99, False), (6.01, True)])
 def test_another_effect_must_be_ahead_of_the_best_form(lead: float, gives_way: bool) -> None:
     """The plainest form stands, three behind the best of its effect; the margin comes on top."""
     own, best = refitted("a", 40.0), refitted("a", 43.0, 3, Spread.EACH)
@@ -130,7 +131,7 @@ def test_two_plain_effects_stand_for_one_of_many_unknowns() -> None:
     assert found.lead == pytest.approx(5.0)
 
 
-@pytest.mark.parametrize(("evidence", "tried"), [(12.1, True), (11.9, False)])
+@sweep("evidence, tried", [(12.1, True), (11.9, False)])
 def test_the_first_has_three_tenths_of_the_evidence(evidence: float, tried: bool) -> None:
     inquiry = Asked(refitted("c", 39.0))
     found = two(inquiry, MANY, refitted("b", evidence))
@@ -146,13 +147,13 @@ def test_the_first_has_fewer_unknowns_and_both_no_more_than_the_one() -> None:
         assert (two(inquiry, MANY, refitted("b", 30.0, 4)) is not None) is found
 
 
-@pytest.mark.parametrize(("second", "found"), [(NEEDED + 0.1, True), (NEEDED, False)])
+@sweep("second, found", [(NEEDED + 0.1, True), (NEEDED, False)])
 def test_the_second_is_evident_beside_the_first(second: float, found: bool) -> None:
     assert (two(Asked(refitted("c", second)), MANY, refitted("b", 39.0)) is not None) is found
     assert two(Asked(), MANY, refitted("b", 39.0)) is None
 
 
-@pytest.mark.parametrize(("second", "found"), [(7.01, True), (6.99, False)])
+@sweep("second, found", [(7.01, True), (6.99, False)])
 def test_together_they_are_no_more_than_the_margin_behind(second: float, found: bool) -> None:
     assert (two(Asked(refitted("c", second)), MANY, refitted("b", 30.0)) is not None) is found
 
@@ -176,7 +177,7 @@ def over(
     return examination._over_stiffness(grounds(), own, inquiry), asked
 
 
-@pytest.mark.parametrize("spread", [Spread.BY_JOINT, Spread.EACH])
+@sweep("spread", [Spread.BY_JOINT, Spread.EACH])
 def test_many_strengths_are_held_against_a_stiffness_of_each_joint(spread: Spread) -> None:
     """That starts a hundredth above off."""
     ahead, (one,) = over(spread)

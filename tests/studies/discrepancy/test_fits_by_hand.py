@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.calibrate.descent import OFF_THE_PATH
 from spinepipe.effects.contract import Array
@@ -133,7 +134,7 @@ def test_a_point_is_looked_at_once_and_says_why_where_it_falls() -> None:
     assert points.trouble == "falls"
 
 
-@pytest.mark.parametrize("at", range(3))
+@sweep("at", range(3))
 def test_a_fit_at_a_bound_says_so(at: int) -> None:
     limit = 0.5 * float(solution()[at])
     given = hypothesis()

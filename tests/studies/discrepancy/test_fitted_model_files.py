@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import spring_chain_cases as chains
 from search_cases import JOINTS, Array
+from sweeps import sweep
 
 from spinepipe.cohort.specimen import cables
 from spinepipe.effects import Spread
@@ -80,7 +81,7 @@ SUPPOSED = {
 }
 
 
-@pytest.mark.parametrize("name", SUPPOSED)
+@sweep("name", SUPPOSED)
 def test_files_read_back_move_as_the_fit_does(name: str, tmp_path: Path) -> None:
     fit = fitted(*SUPPOSED[name])
     write_model(model_file(fit, "m", "chains"), tmp_path / "model.yaml")
@@ -210,7 +211,7 @@ VALUES = {
 """Effect, column, start, move, SD of the move; value, ends 1.96 SD away, by hand; their unit."""
 
 
-@pytest.mark.parametrize("name", VALUES)
+@sweep("name", VALUES)
 def test_values_and_ends_in_units_of_tables(name: str) -> None:
     variant, column, start, move, se, expected, unit = VALUES[name]
     fit = fit_of(variant, column, start, move, at_bound=False)

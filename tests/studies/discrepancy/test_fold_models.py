@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from held_out_cases import SD, grounds, noise, read
+from sweeps import sweep
 from test_held_out_linear import TESTS, Dense, linear_model
 
 from spinepipe.effects.contract import Array
@@ -52,7 +53,7 @@ def most_likely_at(size: float) -> float:
     return float(np.sqrt(1.0 + (size * MOVES) ** 2))
 
 
-@pytest.mark.parametrize("size", [0.03, 0.1, 0.2, 0.35, 0.6, 1.0])
+@sweep("size", [0.03, 0.1, 0.2, 0.35, 0.6, 1.0])
 def test_nuisances_are_as_large_as_what_is_left_says(size: float) -> None:
     errors = most_likely_at(size) * np.array([1.0, -1.0, 1.0])
     assert nuisance_size(left({"a": errors})) == size

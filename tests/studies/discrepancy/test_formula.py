@@ -8,6 +8,7 @@ import pytest
 import search_cases as cases
 from sklearn.linear_model import orthogonal_mp
 from spring_chain_cases import Yield
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
@@ -54,12 +55,12 @@ def found(at: Grounds) -> Formula | None:
     return formula(at, ROTATIONS, DRAWS, 0, FALSE_ALARM)
 
 
-@pytest.mark.parametrize("seed", range(1, 7))
+@sweep("seed", range(1, 7))
 def test_springs_have_no_formula(seed: int) -> None:
     assert found(grounds(seed)) is None
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@sweep("seed", [1, 2])
 def test_a_square_is_found_with_its_coefficient(seed: int) -> None:
     ended = found(grounds(seed, "bending", 2, 20.0))
     assert ended is not None
@@ -75,7 +76,7 @@ def test_a_square_is_found_with_its_coefficient(seed: int) -> None:
     assert ended.held_out_closed > 0.9
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@sweep("seed", [1, 3])
 def test_a_cube_at_one_joint_is_found_there(seed: int) -> None:
     ended = found(grounds(seed, "flexion", 3, 4000.0, 1))
     assert ended is not None
@@ -99,8 +100,8 @@ def test_the_terms_of_a_place_stand_together() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "powers", "unit", "border"),
+@sweep(
+    "coordinate, powers, unit, border",
     [
         ("extension", (0, 2, 0, 0), "N m/rad^2", 1.0),
         ("anterior", (2, 0, 0, 0), "N/mm^2", 1e-6),
@@ -132,8 +133,8 @@ def columns_at(seed: int) -> tuple[Grounds, str, Callable[[str, str, int], Array
     return at, name, column
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "words"),
+@sweep(
+    "coordinate, words",
     [
         ("extension", "extension"),
         ("right_bending", "right bending |right bending|"),
@@ -227,7 +228,7 @@ def test_drops_of_chi2_are_those_of_least_squares() -> None:
     np.testing.assert_allclose(sds, np.sqrt(np.diagonal(inverse))[-2:], rtol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@sweep("seed", range(4))
 def test_it_takes_the_terms_that_sklearn_takes(seed: int) -> None:
     problem = made_up(seed, {ALL: 1.0, ONE: 2.0})
     every = problem.candidates()

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import law_terms
@@ -97,8 +97,8 @@ def said(words: str, name: str, at: law_terms._State) -> Array:
     return product
 
 
-@pytest.mark.parametrize("read", [("extension",), ROTATIONS, COORDINATES])
-@pytest.mark.parametrize("joints", [1, 3])
+@sweep("read", [("extension",), ROTATIONS, COORDINATES])
+@sweep("joints", [1, 3])
 def test_terms_have_the_values_and_units_of_their_words(read: Sequence[str], joints: int) -> None:
     at = state(joints, timed=True)
     for name in read:

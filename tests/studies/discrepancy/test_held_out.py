@@ -17,6 +17,7 @@ from held_out_cases import (
     serial,
 )
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
@@ -56,7 +57,7 @@ def only_driven(one: SpecimenReadings) -> SpecimenReadings:
     return replace(one, tests=tuple(tests))
 
 
-@pytest.mark.parametrize("refit", [False, True])
+@sweep("refit", [False, True])
 def test_unseen_flexion_follows_the_stiffness_in_extension(refit: bool) -> None:
     readings = read({"a": 40.0}, ("flexion", "extension", "bending"), zone=False)
     result = held_out(found(grounds(readings), False), Asked(refit=refit), at_once)
@@ -124,7 +125,7 @@ def test_a_left_out_specimen_has_the_others_zone_and_its_own_stiffness() -> None
     assert other.with_effects.rms < 1.15
 
 
-@pytest.mark.parametrize("spread", [Spread.BY_SPECIMEN, Spread.EACH])
+@sweep("spread", [Spread.BY_SPECIMEN, Spread.EACH])
 def test_strengths_of_a_left_out_specimen_start_where_the_full_fit_has_them(spread: Spread) -> None:
     # not where the other specimens leave them: switched off, at a bound, and there to stay
     readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=True)
@@ -150,7 +151,7 @@ def test_with_nothing_named_the_base_stands_in_for_the_model_with_effects() -> N
     assert (result.motion["b"].fold[0][..., 3:] == 0).all()  # the test's fold, not the specimen's
 
 
-@pytest.mark.parametrize(("shown", "size"), [(0.08, 1.0), (0.0, 0.03)])
+@sweep("shown, size", [(0.08, 1.0), (0.0, 0.03)])
 def test_a_load_gain_found_in_one_test_says_nothing_of_another(shown: float, size: float) -> None:
     """Gains of 8 % are as large as a prior SD of 5 % and more; of none, the least size is left."""
     readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
@@ -168,7 +169,7 @@ def test_a_load_gain_found_in_one_test_says_nothing_of_another(shown: float, siz
     assert row.expected - row.readings == pytest.approx(left_open, rel=0.05)
 
 
-@pytest.mark.parametrize("refit", [False, True])
+@sweep("refit", [False, True])
 def test_a_tilt_that_the_training_shows_is_foreseen_in_the_unseen_test(refit: bool) -> None:
     """Read about axes turned by 3 degrees, extension shows bending, and so will flexion."""
     readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 import spring_chain_cases as chains
+from sweeps import sweep
 
 from spinepipe.effects import Parameter, Spread, registered
 from spinepipe.model import SpineModel
@@ -163,8 +164,8 @@ def test_base_stiffness_is_open_within_a_factor() -> None:
         assert one.step == 1.0
 
 
-@pytest.mark.parametrize(
-    ("form", "expected"),
+@sweep(
+    "form, expected",
     [
         (Form(ZONE, Spread.SHARED), [()]),
         (Form(ZONE, Spread.BY_JOINT), [("L5S1",), ("L4L5",), ("L3L4",)]),
@@ -211,7 +212,7 @@ def test_what_differs_by_test_acts_once_in_each() -> None:
         assert len(member.numbers) == len(member.free) == 1 + 2 * 3
 
 
-@pytest.mark.parametrize("variant", [ZONE, LAXITY, OFFSET, LEVELS])
+@sweep("variant", [ZONE, LAXITY, OFFSET, LEVELS])
 def test_moves_are_bounded_as_declared_and_have_the_declared_prior(variant: Variant) -> None:
     """Of strengths five times as wide, about off; of shapes about the default."""
     start = {p.name: float(np.clip(0.7, p.low, p.high)) for p in variant.create().parameters}

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.studies.discrepancy.search import imperfections
 from spinepipe.studies.discrepancy.search.gaps import Gap
@@ -102,7 +103,7 @@ def test_a_mean_needs_a_twentieth_of_each_of_those_in_it() -> None:
         assert (_mean(CENTRE, np.ones(count), covariance) is not None) is known
 
 
-@pytest.mark.parametrize("shift", [0.0, 0.4, 2.0])
+@sweep("shift", [0.0, 0.4, 2.0])
 def test_the_chance_is_of_two_sides_and_the_better_of_two_ways(shift: float) -> None:
     """Three sizes told wholly: the normal of their mean, Student's t of their scatter."""
     size = shift + np.array([-0.1, 0.0, 0.1])
@@ -143,7 +144,7 @@ def test_what_is_off_in_one_specimen_is_said_of_that() -> None:
     assert ("b", "*") not in certain
 
 
-@pytest.mark.parametrize(("times", "certain"), [(1.02, True), (0.98, False)])
+@sweep("times, certain", [(1.02, True), (0.98, False)])
 def test_a_mean_is_certain_below_a_hundredth_of_all_that_are_looked_at(
     times: float, certain: bool
 ) -> None:

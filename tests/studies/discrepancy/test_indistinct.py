@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Wrench
 from spinepipe.effects.registry import registered
@@ -31,7 +31,7 @@ def excluded(name: str, *cases: LoadCase) -> tuple[str, ...]:
     return cannot_be_excluded(name, {"a": cases, "b": cases[:1]})
 
 
-@pytest.mark.parametrize("name", ["hysteresis", "neutral_pose_drift"])
+@sweep("name", ["hysteresis", "neutral_pose_drift"])
 def test_without_time_a_loop_may_be_creep(name: str) -> None:
     assert excluded(name, case()) == ()
     assert excluded(name, case(NONE)) == ("creep",)
@@ -49,7 +49,7 @@ def test_a_test_of_one_step_neither_takes_time_nor_needs_any() -> None:
     assert excluded("hysteresis", single) == ("creep",)
 
 
-@pytest.mark.parametrize(("lighter", "alike"), [(95.0, True), (94.9, False)])
+@sweep("lighter, alike", [(95.0, True), (94.9, False)])
 def test_forces_are_alike_within_a_twentieth_of_the_largest(lighter: float, alike: bool) -> None:
     two = case(forces=(100.0,) * 5), case(forces=(lighter,) * 5)
     assert excluded("level_dependence", *two) == (("preload_stiffening",) if alike else ())

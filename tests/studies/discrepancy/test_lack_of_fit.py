@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import spring_chain_cases as chains
+from sweeps import sweep
 from test_discrepancy_core import made_up_fit, problem_of
 
 from spinepipe.effects import Spread, create
@@ -81,7 +82,7 @@ def test_no_joint_is_above_the_last_or_below_the_first() -> None:
     assert below.tolist() == [0.0, 1.0, 1.0]
 
 
-@pytest.mark.parametrize("read", [("extension",), ROTATIONS[:2], ROTATIONS, COORDINATES])
+@sweep("read", [("extension",), ROTATIONS[:2], ROTATIONS, COORDINATES])
 def test_each_family_counts_its_terms(read: tuple[str, ...]) -> None:
     counts = basis._counts(len(read), 0)
     found = basis._loads(np.ones((1, JOINTS, 6)), EXTENSION, read).shape[-1]
@@ -116,7 +117,7 @@ def test_motion_of_other_tests_may_be_the_unit() -> None:
     np.testing.assert_allclose(own, -0.1 * largest * (turned() / largest) ** 2, rtol=1e-6)
 
 
-@pytest.mark.parametrize("zeroed", [False, True])
+@sweep("zeroed", [False, True])
 def test_readings_drift_to_a_tenth_of_the_largest_motion(zeroed: bool) -> None:
     found = generic_columns(chain(), [FLEXION, BENDING], zeroed, COORDINATES)
     largest = {"extension": 0.1, "right_bending": 6.0 / 70.0, "left_rotation": np.deg2rad(0.2)}
@@ -158,7 +159,7 @@ def test_joints_without_bushings_count_as_of_one() -> None:
 # Evidence
 
 
-@pytest.mark.parametrize("spread", basis.SPREADS)
+@sweep("spread", basis.SPREADS)
 def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: Spread) -> None:
     """Two numbers at three joints each, and another family that is none of its business."""
     rng = np.random.default_rng(20001)

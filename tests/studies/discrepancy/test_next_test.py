@@ -17,6 +17,7 @@ from next_test_cases import (
 )
 from search_cases import MARGIN
 from spring_chain_cases import THERE_AND_BACK, cases
+from sweeps import sweep
 
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
 from spinepipe.studies.discrepancy.design.advice import ADVISED, TELLS_NOTHING, advice
@@ -61,8 +62,8 @@ def margin_after(seed: int, rival: str, case, noise_seed: int) -> float:
     )
 
 
-@pytest.mark.parametrize(
-    ("rival", "words", "case"),
+@sweep(
+    "rival, words, case",
     [
         (
             "facet_contact",

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from chain_cases import JOINTS, STUDY
 from discrepancy_cases import files_of_a_search, project
+from sweeps import sweep
 
 from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
@@ -71,7 +72,7 @@ def test_tables_hold_their_schemas_and_no_rows(folder: Path) -> None:
         assert table.column_names == [column.name for column in schema.columns]
 
 
-@pytest.mark.parametrize("of", ["base", "with_effects"])
+@sweep("of", ["base", "with_effects"])
 def test_models_are_where_the_fit_started_and_say_so(folder: Path, of: str) -> None:
     model = read_model(folder / f"model_{of}.yaml")
     assert model.model == f"{STUDY}_{of}_not_fitted"
@@ -102,9 +103,9 @@ def test_figures_and_report_cope(folder: Path) -> None:
         assert "can be shown" in Path(svg).read_text()
     files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
     paths = [str(folder / f"{table.name}.parquet") for table in TABLES]
-    captions = [str(ROOT / path) for path in files.captions()]
+    captions = [str(ROOT / path) for path in map(files.caption, files.figures())]
     output = folder / "report.html"
-    report.run(root, STUDY, paths, drawn, captions, str(output), verdict=verdict)
+    report.run(root, STUDY, "report", paths, drawn, captions, str(output), verdict=verdict)
     page = output.read_text()
     assert "he base model cannot be fitted: a, test flexion" in page
     assert "Look at the data first: all specimens" in page

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep
@@ -45,7 +46,7 @@ SPREAD = (-TYPICAL, 0.0, 0.0, TYPICAL)
 """Of four cycles; their robust SD is one, their median nought."""
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@sweep("sign", [1.0, -1.0])
 def test_a_reading_four_sds_from_the_median_is_an_outlier(sign: float) -> None:
     for away, out in ((3.99, []), (4.01, [[3, 7, 0]])):
         cycles = steps(20, SPREAD)
@@ -53,7 +54,7 @@ def test_a_reading_four_sds_from_the_median_is_an_outlier(sign: float) -> None:
         assert dropped(sign * cycles + 5.0) == out
 
 
-@pytest.mark.parametrize(("extra", "known"), [(0, False), (1, True)])
+@sweep("extra, known", [(0, False), (1, True)])
 def test_thirty_deviations_tell_what_is_far(extra: int, known: bool) -> None:
     """Two of each of 14 steps that are not the median itself, one of the next, and one more."""
     cycles = steps(15 + extra, SPREAD)
@@ -62,7 +63,7 @@ def test_thirty_deviations_tell_what_is_far(extra: int, known: bool) -> None:
     assert bool(dropped(cycles)) is known
 
 
-@pytest.mark.parametrize(("away", "out"), [(4.99, False), (5.01, True)])
+@sweep("away, out", [(4.99, False), (5.01, True)])
 def test_a_cycle_five_sds_from_the_others_is_one_as_a_whole(away: float, out: bool) -> None:
     """Its readings by themselves are not: they go 10 up and down."""
     joints, swing = 15, 10.0 * np.array([1.0, -1.0, 1.0, -1.0])
@@ -95,7 +96,7 @@ def test_of_two_cycles_none_is_nearer_the_truth() -> None:
 # When repeats tell
 
 
-@pytest.mark.parametrize(("count", "source"), [(29, DECLARED), (30, REPEATS)])
+@sweep("count, source", [(29, DECLARED), (30, REPEATS)])
 def test_thirty_differences_between_cycles_tell_the_noise(count: int, source: str) -> None:
     rng = np.random.default_rng(20031)
     cycles = rng.normal(size=(2, count, 1))

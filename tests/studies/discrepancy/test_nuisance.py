@@ -3,8 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-import pytest
 import spring_chain_cases as chains
+from sweeps import sweep
 
 from spinepipe.effects import Wrench
 from spinepipe.model import LoadCase, LoadStep
@@ -69,7 +69,7 @@ def test_a_force_off_its_way_by_a_degree() -> None:
     np.testing.assert_allclose(right, [-FORCE * tilt / STIFFNESS[0, 2]], rtol=1e-9)
 
 
-@pytest.mark.parametrize(("force", "count"), [(0.0, 2), (FORCE, 5)])
+@sweep("force, count", [(0.0, 2), (FORCE, 5)])
 def test_forces_turn_by_themselves_where_there_are_any(force: float, count: int) -> None:
     priors = NuisancePriors(**NONE | {"load_axis": 0.02})
     labels = nuisance_labels(priors, STIFFNESS, [shear(force, 2.0)], ROTATIONS)

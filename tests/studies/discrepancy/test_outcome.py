@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
@@ -117,7 +117,7 @@ def assert_unknown(result: Outcome, *words: str) -> None:
 ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
 
 
-@pytest.mark.parametrize("found", [ended(stands()), ended(), ended(lack=50.0)])
+@sweep("found", [ended(stands()), ended(), ended(lack=50.0)])
 def test_data_that_look_wrong_come_before_everything(found: Found) -> None:
     result = outcome(found, MARGIN, proof(50.0), [ERROR])
     assert_unknown(result, "sign flipped (specimen b, L3L4)", "the data look wrong")
@@ -133,8 +133,8 @@ def test_of_many_errors_three_are_told() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("lack", "threshold", "verdict"),
+@sweep(
+    "lack, threshold, verdict",
     [
         (-2.0, 2.0, "NULL"),
         (4.9, 2.0, "NULL"),
@@ -157,7 +157,7 @@ def test_what_is_left_to_the_generic_basis_is_unknown() -> None:
     assert_unknown(outcome(ended(stands(), lack=10.0), MARGIN), "creep", "17 %")
 
 
-@pytest.mark.parametrize(("lack", "threshold"), [(5.4, 2.0), (10.0, 11.0)])
+@sweep("lack, threshold", [(5.4, 2.0), (10.0, 11.0)])
 def test_little_left_or_no_more_than_the_null_shows_is_no_matter(
     lack: float, threshold: float
 ) -> None:
@@ -187,8 +187,8 @@ def test_one_effect_has_nothing_to_mend() -> None:
     assert says(ended(stands(alone=1.0)))[0] == "NAMED"
 
 
-@pytest.mark.parametrize(
-    ("excess", "dof", "verdict"),
+@sweep(
+    "excess, dof, verdict",
     [
         (120.0, 400.0, "UNKNOWN"),
         (90.0, 400.0, "NAMED"),
@@ -206,8 +206,8 @@ def test_most_of_a_gap_must_close_if_more_than_a_small_one_stays(
     assert ("most of the discrepancy stays" in why) == (verdict == "UNKNOWN")
 
 
-@pytest.mark.parametrize(
-    ("given", "verdict"),
+@sweep(
+    "given, verdict",
     [
         (None, "NAMED"),
         (proof(None), "NAMED"),
@@ -225,8 +225,8 @@ def test_names_must_predict_what_was_held_out(given: HeldOut | None, verdict: st
         assert "held-out" in why
 
 
-@pytest.mark.parametrize(
-    ("base", "with_effects", "verdict"),
+@sweep(
+    "base, with_effects, verdict",
     [
         (100.0, 129.0, "PART"),
         (100.0, 131.0, "UNKNOWN"),
@@ -255,8 +255,8 @@ def test_nothing_named_needs_no_proof() -> None:
     assert says(ended(), proof=proof(0.0))[0] == "NULL"
 
 
-@pytest.mark.parametrize(
-    ("over", "verdict"),
+@sweep(
+    "over, verdict",
     [(2.9, "PART"), (-4.0, "PART"), (3.0, "NAMED"), (None, "NAMED")],
 )
 def test_many_strengths_must_do_more_than_a_stiffness_of_each_joint(
@@ -367,8 +367,8 @@ def test_without_evidence_for_anything_nothing_is_missing() -> None:
     assert "no effect" in result.why
 
 
-@pytest.mark.parametrize(
-    ("found", "more", "reason"),
+@sweep(
+    "found, more, reason",
     [
         (ended(), {"errors": [ERROR]}, Reason.DATA_ERRORS),
         (ended(lack=50.0), {}, Reason.NO_KNOWN_EFFECT),
@@ -389,8 +389,8 @@ def test_why_there_is_no_name_is_told_to_programs_too(
     assert (result.verdict is Answer.UNKNOWN) == (reason is not None)
 
 
-@pytest.mark.parametrize(
-    ("neighbours", "verdict"),
+@sweep(
+    "neighbours, verdict",
     [(-2.0, "NAMED"), (42.0, "NAMED"), (44.0, "UNKNOWN"), (400.0, "UNKNOWN")],
 )
 def test_a_shape_that_no_known_effect_has_and_that_fits_better_leaves_no_name(
@@ -410,8 +410,8 @@ def test_a_shape_on_another_coordinate_takes_no_name() -> None:
     assert says(ended(stands(coordinate="right_bending"), neighbours=400.0))[0] != "UNKNOWN"
 
 
-@pytest.mark.parametrize(
-    ("margins", "tied"),
+@sweep(
+    "margins, tied",
     [
         ((3.6,), ()),
         ((3.5, 3.8), ("creep", "a", "b")),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from held_out_cases import JOINTS, MOMENTS_NM, cases, chain
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics import FreeParameter
@@ -46,10 +47,8 @@ def off(predicted: Predicted, by: float, step: int = 5) -> Predicted:
     return replace(predicted, poses=(moved,))
 
 
-@pytest.mark.parametrize("name", ["a", "b"])
-@pytest.mark.parametrize(
-    ("by", "same"), [(9e-8, True), (-9e-8, True), (1.2e-7, False), (-1.2e-7, False)]
-)
+@sweep("name", ["a", "b"])
+@sweep("by, same", [(9e-8, True), (-9e-8, True), (1.2e-7, False), (-1.2e-7, False)])
 def test_loads_lead_to_poses_that_are_a_ten_millionth_away(
     name: str, by: float, same: bool, together: Together
 ) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from test_held_out import row
 from test_held_out_linear import linear_model
 
@@ -35,8 +36,8 @@ def worse_by(drop: float, moved: float, expected: float) -> bool:
     return replace(one, moved=moved, expected=expected).worse
 
 
-@pytest.mark.parametrize(
-    ("moved", "expected", "sd"),
+@sweep(
+    "moved, expected, sd",
     [
         (9.0, 10.0, 6.0),  # of 2 n d with noise n of SD one: 2 |d|
         (9.0, 40.0, 12.0),  # nuisances that are left open are noise too
@@ -66,7 +67,7 @@ def test_a_model_beats_another_by_any_margin_and_equals_do_not() -> None:
     assert not together([], {}).beats_base
 
 
-@pytest.mark.parametrize(("differs", "tells"), [(2e-6, True), (-2e-6, True), (5e-7, False)])
+@sweep("differs, tells", [(2e-6, True), (-2e-6, True), (5e-7, False)])
 def test_folds_tell_where_predictions_differ_by_a_millionth(differs: float, tells: bool) -> None:
     found = together([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
     assert found.tells is tells
@@ -233,7 +234,7 @@ def test_terms_move_readings_by_their_prior_sd_where_they_are() -> None:
     assert (found.mean[:known] == plain.mean).all()
 
 
-@pytest.mark.parametrize("units", [1.0, 1e6])
+@sweep("units", [1.0, 1e6])
 def test_a_minimum_inside_bounds_is_that_of_the_other_unknown_alone(units: float) -> None:
     """x'Ax / 2 - d'x with A = [[2, 1], [1, 2]], d = (3, 3): (1, 1); at x0 = 0.5, x1 is 1.25."""
     scale = np.diag([1.0, units])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sweeps import sweep
 from test_formula import ALL, ONE, made_up
 
 from spinepipe.studies.discrepancy.search import pursuit
@@ -24,7 +25,7 @@ def test_without_linear_terms_there_are_no_coefficients() -> None:
     assert (values.shape, sds.shape) == ((0,), (0,))
 
 
-@pytest.mark.parametrize(("left", "is_term"), [(1.1e-4, True), (0.9e-4, False)])
+@sweep("left, is_term", [(1.1e-4, True), (0.9e-4, False)])
 def test_a_term_that_keeps_a_ten_thousandth_beside_the_rest_is_one(
     left: float, is_term: bool
 ) -> None:

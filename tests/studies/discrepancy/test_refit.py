@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search import refit as refits_of
@@ -67,7 +68,7 @@ def test_the_first_two_effects_have_three_variants_refitted_the_next_two_one() -
     ]
 
 
-@pytest.mark.parametrize(("best", "least"), [(100.0, 19.0), (40.0, 4.0), (24.0, 0.0), (8.0, 0.0)])
+@sweep("best, least", [(100.0, 19.0), (40.0, 4.0), (24.0, 0.0), (8.0, 0.0)])
 def test_an_effect_may_trail_by_three_quarters_and_six(best: float, least: float) -> None:
     """The screen is linear, a refit is not; without evidence none is worth it."""
     assert refitted(of("a", best), of("b", least + 0.1)) == [("a", best), ("b", least + 0.1)]
@@ -104,8 +105,8 @@ def test_strengths_of_several_columns_start_each_at_its_own() -> None:
     assert found.start == pytest.approx(np.array([1.5, -3.0, 0.6]) * scales)
 
 
-@pytest.mark.parametrize(
-    ("of_variant", "sds", "value"),
+@sweep(
+    "of_variant, sds, value",
     [
         (LAXITY, 0.5, 0.15),
         (LAXITY, -0.5, 0.15),  # a fraction is lost, never gained

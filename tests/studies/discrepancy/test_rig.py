@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
@@ -104,7 +105,7 @@ def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
         assert test.case.fixed == [0, 3, 4, 5]
 
 
-@pytest.mark.parametrize(("noise_n", "within"), [(0.0, 1e-3), (FORCE_SD, 4.0)])
+@sweep("noise_n, within", [(0.0, 1e-3), (FORCE_SD, 4.0)])
 def test_the_base_has_the_stiffness_that_made_the_forces(
     noise_n: float, within: float, tmp_path: Path
 ) -> None:

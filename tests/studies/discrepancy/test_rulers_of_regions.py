@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import chi2 as chi2_of
+from sweeps import sweep
 
 from spinepipe.calibrate.descent import Point
 from spinepipe.calibrate.profile import Best, profile_in_turn
@@ -28,7 +29,7 @@ def test_most_values_are_moved_as_they_are() -> None:
     assert ruler.limits(3.0, -7.0, 9.0) == (-7.0, 9.0)
 
 
-@pytest.mark.parametrize("move", [-499.0, 0.0, 1200.0])
+@sweep("move", [-499.0, 0.0, 1200.0])
 def test_a_stiffness_is_moved_by_its_logarithm(move: float) -> None:
     """The unknown is what was added to 500 N m/rad."""
     ruler, size = _Ruler(-STIFFNESS), 1e-4
@@ -123,7 +124,7 @@ def likeliest(fit: Any, point: Point, ruler: _Ruler | None = None) -> Best:
     return found
 
 
-@pytest.mark.parametrize(("sd", "x"), [(0.0499, 1.0), (0.0501, 1.2)])
+@sweep("sd, x", [(0.0499, 1.0), (0.0501, 1.2)])
 def test_a_value_that_its_prior_drew_away_by_a_twentieth_of_its_sd_is_fitted_anew(
     sd: float, x: float
 ) -> None:
@@ -173,7 +174,7 @@ def test_one_look_a_side_is_enough_where_all_is_straight() -> None:
     assert [found.low[0], found.high[0]] == pytest.approx([1.0 - way, 1.0 + way], abs=0.02 * way)
 
 
-@pytest.mark.parametrize("chi2", [900.0, 1.0, 0.01])
+@sweep("chi2", [900.0, 1.0, 0.01])
 def test_the_others_are_fitted_to_a_fiftieth_of_the_rise_that_ends_a_region(chi2: float) -> None:
     """Beside the noise, of which there may be less than one."""
     enough = regions._enough(np.array([np.sqrt(chi2)]))

@@ -1,12 +1,17 @@
-"""Rates, goals and tables of the scored search, from rows made by hand."""
+"""Rates, goals and tables of the scored search, from rows made by hand.
+
+Catches a rate that counts other rows than it says, and seeds that are scored twice.
+"""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import beta
+from sweeps import sweep
 
 from tests.generators.hidden import CATALOGUE, KNOWN, Recipe, draw_hidden
 from tests.validation.discrepancy import report, run, seeds, store, tables, tune
@@ -19,6 +24,11 @@ from tests.validation.discrepancy.row import scored
 from tests.validation.discrepancy.targets import COUNTS, DRAWN, NUMBER, Target, of_seeds, targets
 
 FIRST = 30000
+
+
+@cache
+def every_target() -> list[Target]:
+    return list(targets(FIRST))
 
 
 def row(
@@ -86,11 +96,17 @@ ROWS = [
     row(23, kind="mistake") | {"status": "refused"},
 ]
 
+
+@cache
+def goals_of_rows() -> dict[str, dict[str, Any]]:
+    return {one["what"]: one for one in goals([judged(one) for one in ROWS])}
+
+
 LARGE = "one effect, gap >= 0.5, above its limit"
 
 
-@pytest.mark.parametrize(
-    ("what", "count", "n"),
+@sweep(
+    "what, count, n",
     [
         ("null and dirty null: NAMED, PART or SET", 1, 3),
         ("null and dirty null: not NULL", 2, 3),
@@ -114,7 +130,7 @@ LARGE = "one effect, gap >= 0.5, above its limit"
     ],
 )
 def test_goals_count_what_they_say(what: str, count: int, n: int) -> None:
-    found = {one["what"]: one for one in goals([judged(one) for one in ROWS])}[what]
+    found = goals_of_rows()[what]
     assert (found["count"], found["n"]) == (count, n)
 
 
@@ -138,9 +154,7 @@ def test_intervals_are_those_of_clopper_and_pearson() -> None:
     assert (found["met"], found["reached"]) == ("yes", "undecided")
 
 
-@pytest.mark.parametrize(
-    ("right", "of", "reached"), [(200, 200, "yes"), (20, 200, "no"), (190, 200, "undecided")]
-)
+@sweep("right, of, reached", [(200, 200, "yes"), (20, 200, "no"), (190, 200, "undecided")])
 def test_a_goal_is_reached_by_the_whole_interval(right: int, of: int, reached: str) -> None:
     flags = [True] * right + [False] * (of - right)
     assert share("", flags, Goal(low=0.95))["reached"] == reached
@@ -200,7 +214,7 @@ def test_tables_are_written_with_what_made_them(tmp_path: Path, capsys: Any) -> 
 
 
 def test_any_first_part_is_a_fair_sample() -> None:
-    every = targets(FIRST)
+    every = every_target()
     assert [target.seed for target in every] == list(range(FIRST, FIRST + NUMBER))
     part = every[: len(every) // 4]
     for kind, number in COUNTS.items():
@@ -210,7 +224,7 @@ def test_any_first_part_is_a_fair_sample() -> None:
 
 def test_half_of_the_cohorts_hide_a_formula_that_the_library_lacks() -> None:
     rows = [
-        {"target": {"kind": one.kind}, "recipe": one.recipe.as_dict()} for one in targets(FIRST)
+        {"target": {"kind": one.kind}, "recipe": one.recipe.as_dict()} for one in every_target()
     ]
     told = [formula_of(one) for one in rows if any(h["name"] in KNOWN for h in hidden(one))]
     assert np.mean([formula != "same" for formula in told]) >= 0.5
@@ -244,7 +258,7 @@ def test_seeds_and_kinds_choose_some() -> None:
     found = list(of_seeds(targets(FIRST, ("null",)), FIRST, FIRST + 99))
     assert found
     assert {target.kind for target in found} == {"null"}
-    assert found == [one for one in targets(FIRST)[:100] if one.kind == "null"]
+    assert found == [one for one in every_target()[:100] if one.kind == "null"]
 
 
 def test_seeds_are_scored_once(tmp_path: Path) -> None:
@@ -280,7 +294,7 @@ def test_words_about_code_do_not_change_its_digest(tmp_path: Path) -> None:
     assert store.digest([one]) != store.digest([other])
 
 
-@pytest.mark.parametrize("kind", DRAWN)
+@sweep("kind", DRAWN)
 def test_targets_of_a_seed_are_the_same(kind: str) -> None:
     assert DRAWN[kind](3, 20003) == DRAWN[kind](3, 20003)
 
@@ -303,6 +317,7 @@ def _broken(*_: object) -> None:
     raise ZeroDivisionError("by nothing")
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_one_cohort_from_recipe_to_row(tmp_path: Path) -> None:
     """A strong asymmetry is named; the row is kept and not made again."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from scipy.stats import gumbel_r
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
@@ -51,8 +52,8 @@ def test_what_is_shared_has_one_strength_of_all_tests() -> None:
     assert found == [{("a", None, "*", axis), ("b", None, "*", axis)} for axis in range(3)]
 
 
-@pytest.mark.parametrize(
-    ("form", "expected"),
+@sweep(
+    "form, expected",
     [
         (Form(LAXITY, Spread.SHARED), [["a0", "a1", "b0", "b1"]]),
         (Form(LAXITY, Spread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
@@ -86,7 +87,7 @@ def test_bounds_tell_the_side_of_a_strength() -> None:
     assert found == [[1.0], [-1.0], [0.0]]
 
 
-@pytest.mark.parametrize(("curvature", "moment"), [(1.0, 0.0), (4.0, 6.0)])
+@sweep("curvature, moment", [(1.0, 0.0), (4.0, 6.0)])
 def test_strengths_are_from_a_tenth_to_three_prior_sds(curvature: float, moment: float) -> None:
     """Marginal over N(0, t^2): exp(b^2 t^2 / 2 (1 + t^2 l)) / sqrt(1 + t^2 l), a mean of four."""
     group = Group.of(np.array([[curvature]]), np.zeros(1))
@@ -108,7 +109,7 @@ def test_few_draws_have_the_tail_of_a_gumbel_distribution() -> None:
     assert exceeded(values, 0.01) == pytest.approx(expected.isf(0.01))
 
 
-@pytest.mark.parametrize(("count", "share"), [(500, 0.01), (100, 0.05)])
+@sweep("count, share", [(500, 0.01), (100, 0.05)])
 def test_five_draws_beyond_are_counted(count: int, share: float) -> None:
     values = np.arange(float(count))[::-1]
     assert exceeded(values, share) == pytest.approx((1.0 - share) * (count - 1))

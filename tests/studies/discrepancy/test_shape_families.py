@@ -10,6 +10,7 @@ import pytest
 import spring_chain_cases as chains
 from scipy.optimize import brentq
 from search_cases import Array, searched
+from sweeps import sweep
 from test_fitted_model_files import fitted, one
 
 from spinepipe.effects import Spread, create, registered
@@ -25,8 +26,8 @@ def variants(name: str, read: tuple[str, ...]) -> list[dict[str, object]]:
     return [dict(v.options) for v in trials([name], read, ["a"], 2)[0].variants]
 
 
-@pytest.mark.parametrize(
-    ("name", "options", "points"),
+@sweep(
+    "name, options, points",
     [
         ("neutral_zone", {}, 3),
         ("neutral_zone", {"zone": "off_centre"}, 2),
@@ -76,8 +77,8 @@ def test_an_end_of_a_family_is_a_form_of_its_own() -> None:
         assert _degenerate(replace(fit, at_bound=np.array(ends)), 0) is refused
 
 
-@pytest.mark.parametrize(
-    ("name", "given", "value"),
+@sweep(
+    "name, given, value",
     [
         ("neutral_zone", {"stiffness_ratio": 0.4, "width": 0.02}, 30.0),
         ("facet_contact", {"stiffness": 80.0, "gap": 0.03}, 1.0),
@@ -149,8 +150,8 @@ def sliders(joint: int, moments: Array, k: float) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("law", "levels", "name"),
+@sweep(
+    "law, levels, name",
     [(smooth_zone, SLOW, "neutral_zone"), (sliders, ROUND, "hysteresis")],
 )
 def test_another_formula_of_the_same_physics_has_its_name(law, levels, name: str) -> None:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
+from sweeps import sweep
 
 from spinepipe.cohort.answers import joint_loads
 from spinepipe.effects import Wrench
@@ -79,9 +79,7 @@ def test_a_flipped_translation_moves_against_its_load() -> None:
     assert "move against the load" in error.evidence
 
 
-@pytest.mark.parametrize(
-    ("force", "words"), [(1e-3, "kN taken for N"), (1e3, "motion in m taken for mm")]
-)
+@sweep("force, words", [(1e-3, "kN taken for N"), (1e3, "motion in m taken for mm")])
 def test_a_wrong_unit_of_forces_is_told(force: float, words: str) -> None:
     (error,) = suspected(sheared(force=force))
     assert error.where == "all specimens"

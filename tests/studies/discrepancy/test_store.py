@@ -1,4 +1,8 @@
-"""The store of a search's pieces: each is computed once, whatever ends the process in between."""
+"""The store of a search's pieces: each is computed once, whatever ends the process in between.
+
+Catches a store that computes twice, believes what is damaged, stale or planted, runs what it reads,
+waits for a dead process, or leaves something behind.
+"""
 
 import io
 import os
@@ -7,11 +11,13 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.model import LoadCase
@@ -142,17 +148,16 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_piece_counts_as_not_there(
-    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    expected = search_of(Store(tmp_path, MODULE), 3)
+    expected = search_of(Store(tmp_path, MODULE), 2)
     whole = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    for path, content in whole.items():
+    for damage, (path, content) in product(DAMAGES, whole.items()):
         CALLS.clear()
         caplog.clear()
         path.write_bytes(DAMAGES[damage](content))
-        assert search_of(Store(tmp_path, MODULE), 3) == expected
+        assert search_of(Store(tmp_path, MODULE), 2) == expected
         assert len(CALLS) == 1
         assert [line.split(":")[0] for line in caplog.messages] == [str(path)]
         assert {one: one.read_bytes() for one in tmp_path.iterdir()} == whole
@@ -358,12 +363,13 @@ PLANTED: dict[str, Callable[[Trap], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("what", PLANTED)
-@pytest.mark.parametrize("sealed", [True, False])
+@sweep("what", PLANTED)
+@sweep("sealed", [True, False])
 def test_what_somebody_planted_is_not_run_and_computed_again(
     tmp_path: Path, what: str, sealed: bool
 ) -> None:
     """Bare, and in an envelope that verifies, as anybody can make it who knows the format."""
+    CALLS.clear()
     folder, sprung = tmp_path / "store", tmp_path / "sprung"
     Store(folder, MODULE)(scaled, of(1.0))
     (piece,) = folder.iterdir()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.studies.discrepancy.search import beyond as tables
@@ -57,8 +58,8 @@ def test_a_table_is_tried_where_the_generic_basis_is_evident_over_the_own_motion
     assert forms(lack(90.0, quiet, "neighbour")) == []
 
 
-@pytest.mark.parametrize(
-    ("spread", "joints", "specimens", "expected"),
+@sweep(
+    "spread, joints, specimens, expected",
     [
         (Spread.SHARED, 2, "a", [Spread.SHARED]),
         (Spread.SHARED, 2, "ab", [Spread.SHARED, Spread.BY_SPECIMEN]),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import spring_chain_cases as chains
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep
@@ -105,8 +106,8 @@ def test_zeroed_columns_begin_with_nought() -> None:
     np.testing.assert_allclose(zeroed, plain - plain[:1], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "unit", "border"),
+@sweep(
+    "coordinate, unit, border",
     [("anterior", "mm per test", 1e3), ("extension", "deg per test", 180.0 / np.pi)],
 )
 def test_a_drift_is_told_over_a_whole_test(coordinate: str, unit: str, border: float) -> None:
@@ -115,8 +116,8 @@ def test_a_drift_is_told_over_a_whole_test(coordinate: str, unit: str, border: f
     assert term.variant is None
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "powers", "unit", "border"),
+@sweep(
+    "coordinate, powers, unit, border",
     [
         ("extension", (0, 0, 0, 0), "N m", 1.0),
         ("anterior", (0, 0, 0, 0), "N", 1.0),

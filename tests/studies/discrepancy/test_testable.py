@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import norm
+from sweeps import sweep
 from testable_cases import (
     NEEDED,
     NO_NUISANCE,
@@ -38,7 +39,7 @@ def one_joint(moments, sd: float = 1e-6) -> Grounds:
     return grounds_of(1, moments, ("flexion",), zeroed=False, sd=sd, priors=NO_NUISANCE)
 
 
-@pytest.mark.parametrize("moments", [(0.0, 2.0, 4.0, -2.0), (0.0, 1.0, 3.0, -3.0, -1.0)])
+@sweep("moments", [(0.0, 2.0, 4.0, -2.0), (0.0, 1.0, 3.0, -3.0, -1.0)])
 def test_base_takes_up_what_a_straight_line_explains_of_an_absolute_value(moments):
     """One joint: motion M/k, base moves it by -M/k, asymmetry by -|M|/k."""
     m = np.array(moments)

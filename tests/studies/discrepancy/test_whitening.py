@@ -3,8 +3,8 @@
 from functools import cache
 
 import numpy as np
-import pytest
 from held_out_cases import CORRELATION, SD, cases, noise
+from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.readings import Repeats
@@ -115,7 +115,7 @@ def test_what_is_left_over_is_beside_the_most_likely_nuisances() -> None:
     np.testing.assert_allclose(white.freedom, expected, atol=CLOSE)
 
 
-@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0, 1.0), (2.0, 0.0, 0.3, 0.0)])
+@sweep("factors", [(1.0, 1.0, 1.0, 1.0), (2.0, 0.0, 0.3, 0.0)])
 def test_other_prior_sds_are_other_nuisances(factors: tuple[float, ...]) -> None:
     white, root, _ = by_hand()
     other = with_nuisances(whitening(recorded(), noise()), [one * factors for one in moved()])

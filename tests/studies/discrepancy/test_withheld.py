@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from imperfect_cases import JOINTS, SPECIMENS, alike, grounds_of, off_centre
+from sweeps import sweep
 
 from spinepipe.studies.discrepancy.design.advice import ADVISED, advice
 from spinepipe.studies.discrepancy.design.extra_tests import bench
@@ -40,7 +41,7 @@ def test_an_effect_that_an_imperfection_hides_is_found_with_that_imperfection(hi
     assert 0.02 < hidden.needed < 0.5
 
 
-@pytest.mark.parametrize(("share", "evident"), [(0.6, True), (1.5, False)])
+@sweep("share, evident", [(0.6, True), (1.5, False)])
 def test_known_as_well_as_told_the_effect_is_evident(hidden, share, evident):
     """The base is fitted again with other priors, and the whole screen looked at."""
     priors = NuisancePriors(joint_centre=share * hidden.needed * hidden.prior)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.studies.discrepancy.quantities import estimate, quantity
@@ -29,8 +30,8 @@ def missing(name: str, *coordinates: str, **variant: Any) -> Missing:
 ASYMMETRY, COUPLING = "flexion_extension_asymmetry", "bending_rotation_coupling"
 
 
-@pytest.mark.parametrize(
-    ("effect", "words"),
+@sweep(
+    "effect, words",
     [
         (missing(ASYMMETRY, "extension"), "a flexion–extension asymmetry at C6C7"),
         (missing(ASYMMETRY, "anterior"), "an anterior–posterior asymmetry at C6C7"),
@@ -67,7 +68,7 @@ def test_an_effect_is_named_as_the_field_does_there(effect: Missing, words: str)
     ).removeprefix("a ")
 
 
-@pytest.mark.parametrize("coordinate", COORDINATES)
+@sweep("coordinate", COORDINATES)
 def test_no_name_says_another_coordinate(coordinate: str) -> None:
     name = name_at(ASYMMETRY, (coordinate,))
     assert ("flexion" in name) == (coordinate == "extension")
@@ -109,8 +110,8 @@ def told(effect: str, name: str, value: float, unit: str, **variant: Any) -> Any
     return quantity(effect, variant, Estimate(name, value, unit, (low, high)))
 
 
-@pytest.mark.parametrize(
-    ("effect", "name", "unit", "value", "words"),
+@sweep(
+    "effect, name, unit, value, words",
     [
         ("facet_contact", "stiffness", "N/m", 120000.0, "stiffness 120 N/mm"),
         ("facet_contact", "stiffness", "N m/rad", 57.29578, "stiffness 1.00 N m/°"),
@@ -134,8 +135,8 @@ def test_units_are_the_fields(effect: str, name: str, unit: str, value: float, w
     assert told(effect, name, value, unit).words.startswith(words)
 
 
-@pytest.mark.parametrize(
-    ("shape", "unit", "rise", "coordinate"),
+@sweep(
+    "shape, unit, rise, coordinate",
     [
         ("tangent", "1/rad^2", 17.7, "extension"),
         ("cubic", "1/rad^2", 7.5, "left_rotation"),

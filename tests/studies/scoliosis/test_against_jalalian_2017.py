@@ -3,6 +3,9 @@
 Expected values are worked by hand from small invented tables and from the numbers of the paper,
 entered here a second time; where the lists of its numbers lie beside this repository, every row of
 them is looked for.
+
+Would catch a number of the paper without its row, a verdict that the numbers do not bear, and
+rows that change where nothing they hang on does.
 """
 
 import csv
@@ -15,6 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from sweeps import sweep
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.claim import Claim, Run, judge, judged
@@ -217,8 +221,8 @@ def row_of(name: str, **changed: pd.DataFrame) -> dict[str, Any]:
 # --- claims on the invented tables ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "ours", "verdict"),
+@sweep(
+    "name, ours, verdict",
     [
         ("results.n_patients", 18.0, "circular"),
         ("results.n_patients.male", 6.0, "circular"),
@@ -319,8 +323,8 @@ def test_observers_are_correlated_by_tilts_and_rotations() -> None:
 # --- the paper's own numbers ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "ours"),
+@sweep(
+    "name, ours",
     [
         (
             "J1.cobb_mean",
@@ -348,8 +352,8 @@ def test_what_follows_from_the_paper_is_recomputed(name: str, ours: float) -> No
     assert row["verdict"] == "recomputed"
 
 
-@pytest.mark.parametrize(
-    ("name", "ours"),
+@sweep(
+    "name, ours",
     [
         (
             "improvement.rotation_r.four_positions",
@@ -375,8 +379,8 @@ def test_what_is_recomputed_could_fail() -> None:
         assert not claim.range.holds(wrong)
 
 
-@pytest.mark.parametrize(
-    ("name", "ends"),
+@sweep(
+    "name, ends",
     [
         ("J4.bending.location_LOC", (0.825 / 0.455, 0.835 / 0.445)),
         ("J4.neutral_traction.orientation_theta", (1.245 / 0.615, 1.255 / 0.605)),
@@ -524,18 +528,26 @@ def test_every_claim_has_a_name_of_its_own_and_a_reason() -> None:
 # --- missing parts, and the job ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(tables()))
-def test_a_missing_or_empty_table_is_told(name: str) -> None:
+@sweep("name", sorted(tables()))
+def test_a_missing_table_is_told(name: str) -> None:
     """Nothing but what hangs on the table changes, and its rows say what is missing."""
-    whole = tables()
-    rest = {key: table for key, table in whole.items() if key != name}
-    for run in (Run(rest, ASKED), Run(rest | {name: whole[name].iloc[:0]}, ASKED)):
-        after = judged(CLAIMS, run)
-        changed = [new for old, new in zip(complete(), after, strict=True) if old != new]
-        assert changed
-        assert {row["verdict"] for row in changed} == {"not_computed"}
-        assert all(f"table {name}" in row["reason"] for row in changed)
-        from_rows(AGAINST_JALALIAN_2017, after)
+    rest = {key: table for key, table in tables().items() if key != name}
+    after = judged(CLAIMS, Run(rest, ASKED))
+    changed = [new for old, new in zip(complete(), after, strict=True) if old != new]
+    assert changed
+    assert {row["verdict"] for row in changed} == {"not_computed"}
+    assert all(f"table {name}" in row["reason"] for row in changed)
+    from_rows(AGAINST_JALALIAN_2017, after)
+
+
+def test_empty_tables_are_as_missing() -> None:
+    empty = {name: table.iloc[:0] for name, table in tables().items()}
+    after, missing = (judged(CLAIMS, Run(one, ASKED)) for one in (empty, {}))
+    assert [row["ours"] for row in after] == [row["ours"] for row in missing]
+    changed = [new for old, new in zip(complete(), after, strict=True) if old != new]
+    assert {row["verdict"] for row in changed} == {"not_computed"}
+    assert all("table " in row["reason"] for row in changed)
+    from_rows(AGAINST_JALALIAN_2017, after)
 
 
 def test_a_study_that_takes_its_size_elsewhere_has_no_such_moment() -> None:
@@ -544,8 +556,8 @@ def test_a_study_that_takes_its_size_elsewhere_has_no_such_moment() -> None:
     assert (row["ours"], row["verdict"]) == (None, "not_computed")
 
 
-@pytest.mark.parametrize(
-    ("table", "column", "name"),
+@sweep(
+    "table, column, name",
     [
         ("accuracy", "rmse", "errors.bending.rotation_r.tangent"),
         (
@@ -594,7 +606,7 @@ def test_the_shipped_phantom_has_the_patients_of_the_paper() -> None:
     assert {judge(claim, run)["verdict"] for claim in built} == {"circular"}
 
 
-@pytest.mark.parametrize("n", [5, 12, 200])
+@sweep("n", [5, 12, 200])
 def test_the_interval_of_a_correlation_is_scipys(n: int) -> None:
     one, other = np.random.default_rng(n).normal(size=(2, n))
     peer = stats.pearsonr(one + other, one)

@@ -1,14 +1,17 @@
-"""Curves are named by where their apex is, as Lenke 2001 names them."""
+"""Curves are named by where their apex is, as Lenke 2001 names them.
+
+Would catch an apex at the border of two regions that is counted to the other.
+"""
 
 import numpy as np
-import pytest
+from sweeps import sweep
 
 from spinepipe.studies.scoliosis.curve_angles import curves, region
 from spinepipe.studies.scoliosis.films import Film
 
 
-@pytest.mark.parametrize(
-    ("apex", "named"),
+@sweep(
+    "apex, named",
     [
         *(("C7", "PT"), ("T1", "PT"), ("T3", "PT"), ("T5", "PT")),
         *(("T6", "MT"), ("T9", "MT"), ("T10", "MT"), ("T11", "MT")),

@@ -1,10 +1,16 @@
-"""Everything that may be wrong with films is told, with film, vertebra and remedy."""
+"""Everything that may be wrong with films is told, with film, vertebra and remedy.
+
+Would catch a fault of films that passes, sound films that are blamed, and words that do not name
+the film, the vertebra or what to do.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from scoliosis_cases import write_shipped
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import Document
@@ -12,17 +18,16 @@ from spinepipe.problems import InputError
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import CENTRE, FILMS, PATIENTS
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from tests.generators import ais_films
 
 STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
-LEVELS = ais_films.LEVELS
+LEVELS = (*(f"L{n}" for n in range(4, 0, -1)), *(f"T{n}" for n in range(12, 1, -1)))
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cohort of one patient without a fault."""
     folder = tmp_path_factory.mktemp("films") / "ais"
-    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(folder, 1)
     return folder
 
 
@@ -120,8 +125,8 @@ def unbent(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
+@sweep(
+    "change, words",
     [
         (radians, ["film erect", "radians? multiply by 57.3"]),
         (mirrored("right_bending"), ["film right_bending", "mirrored"]),

@@ -1,10 +1,14 @@
-"""Films as they are read: axes, signs, corners, scales, scatter; and the angles of curves."""
+"""Films as they are read: axes, signs, corners, scales, scatter; and the angles of curves.
+
+Would catch a sign, a unit or a corner taken for another, and readings averaged or scaled wrongly.
+"""
 
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.studies.scoliosis.curve_angles import curves, lumbar_apex, main_curve
@@ -156,8 +160,8 @@ def test_curves_lie_between_the_vertebrae_tilted_farthest() -> None:
     assert 1 <= lumbar.apex <= 4
 
 
-@pytest.mark.parametrize(
-    ("bulges", "apex"),
+@sweep(
+    "bulges, apex",
     [
         (("L3", "T12", "T7"), "L3"),  # the lowest of two low ones
         (("L3", "T7"), "L3"),

@@ -1,10 +1,13 @@
-"""Sentences at the numbers where they turn: exactly at a limit, and just beside it."""
+"""Sentences at the numbers where they turn: exactly at a limit, and just beside it.
+
+Would catch a comparison that includes its limit where it should not, or the other way round.
+"""
 
 from typing import Any
 
 import pandas as pd
-import pytest
 from scoliosis_cases import Size, paired_test, study_of, tables_of
+from sweeps import sweep
 
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.studies.scoliosis.findings import both_ways, findings
@@ -35,7 +38,7 @@ def of_pair(p: float, measure: str = "rotation") -> pd.DataFrame:
     return pd.DataFrame([paired_test("held_out", measure, PAIR, p)])
 
 
-@pytest.mark.parametrize(("p", "significant"), [(0.0499, True), (0.05, False), (0.0501, False)])
+@sweep("p, significant", [(0.0499, True), (0.05, False), (0.0501, False)])
 def test_five_per_cent_is_not_significant(p: float, significant: bool) -> None:
     found = answer(statistics=of_pair(p))
     assert ("reproduces rotations of segments best" in found.words) is significant
@@ -63,8 +66,8 @@ def standing(errors: dict[str, float], noise: float | None) -> Standing:
     return Standing.of(pd.DataFrame(rows), "held_out", "rotation")
 
 
-@pytest.mark.parametrize(
-    ("errors", "words"),
+@sweep(
+    "errors, words",
     [
         ((1.01, 2.0), "the error is above that"),
         ((1.0, 2.0), "1 model is not above that"),
@@ -104,9 +107,7 @@ def test_the_reference_is_named_once_where_it_is_the_next() -> None:
     assert "50 % less than the model that is linear by region (0.600°)." in later
 
 
-@pytest.mark.parametrize(
-    ("other", "words"), [(0.3, "as much as the next"), (0.4, "25 % less than")]
-)
+@sweep("other, words", [(0.3, "as much as the next"), (0.4, "25 % less than")])
 def test_models_with_one_error_are_as_good(other: float, words: str) -> None:
     assert words in compared(tangent=0.3, linear_regions=other)
 
@@ -137,7 +138,7 @@ def lost(*places: int) -> pd.DataFrame:
     return rows
 
 
-@pytest.mark.parametrize(("count", "more"), [(6, ""), (7, "; and 1 more"), (9, "; and 3 more")])
+@sweep("count, more", [(6, ""), (7, "; and 1 more"), (9, "; and 3 more")])
 def test_six_places_are_named_and_more_are_counted(count: int, more: str) -> None:
     first = told(positions=lost(*range(count))).splitlines()[0]
     assert first.startswith(f"{count} of 60 poses ended unstable: p01, right")
@@ -145,8 +146,8 @@ def test_six_places_are_named_and_more_are_counted(count: int, more: str) -> Non
     assert first.endswith(f"(x){more}.")
 
 
-@pytest.mark.parametrize(
-    ("status", "words"),
+@sweep(
+    "status, words",
     [("unstable", 1), ("not_converged", 1), ("unreachable", 0), ("converged", 0)],
 )
 def test_poses_that_were_not_found_are_warned_of(status: str, words: int) -> None:
@@ -175,7 +176,7 @@ def identifiable(patients: int) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-@pytest.mark.parametrize(("patients", "few"), [(1, True), (2, False), (3, False)])
+@sweep("patients, few", [(1, True), (2, False), (3, False)])
 def test_half_of_the_patients_are_not_fewer_than_half(patients: int, few: bool) -> None:
     words = told(laws=identifiable(patients))
     assert ("At b films tell both ends in fewer than half" in words) is few
@@ -184,7 +185,7 @@ def test_half_of_the_patients_are_not_fewer_than_half(patients: int, few: bool) 
     assert f"one end of {3 - patients} and neither of 1" in words
 
 
-@pytest.mark.parametrize(("decided", "told_of"), [(40.8, True), (40.9, False), (43.0, False)])
+@sweep("decided, told_of", [(40.8, True), (40.9, False), (43.0, False)])
 def test_parameters_that_films_decide_are_told_where_they_are_fewer(
     decided: float, told_of: bool
 ) -> None:
@@ -194,22 +195,20 @@ def test_parameters_that_films_decide_are_told_where_they_are_fewer(
     assert ("of which the films decide" in told(positions=rows)) is told_of
 
 
-@pytest.mark.parametrize(("share", "count"), [(1.0, 0), (1.0001, 84)])
+@sweep("share, count", [(1.0, 0), (1.0001, 84)])
 def test_a_rotation_at_its_end_is_not_beyond(share: float, count: int) -> None:
     rows = tables_of(SIZE)["displacements"].assign(share_of_range=share)
     assert f"{count} of 84 held-out rotations" in told(displacements=rows)
 
 
-@pytest.mark.parametrize(("scale", "films"), [(1.0 + 2e-9, 3), (1.0 - 2e-9, 3), (1.0 + 5e-10, 0)])
+@sweep("scale, films", [(1.0 + 2e-9, 3), (1.0 - 2e-9, 3), (1.0 + 5e-10, 0)])
 def test_a_film_is_brought_to_size_by_more_than_rounding(scale: float, films: int) -> None:
     rows = tables_of(SIZE)["positions"]
     rows.loc[rows["position"] == "traction", "film_scale"] = scale
     assert (f"{films} of 12 films were brought" in told(positions=rows)) is bool(films)
 
 
-@pytest.mark.parametrize(
-    ("error", "words"), [(0.6, "as much on fitted films"), (0.59, "less on"), (0.61, "more on")]
-)
+@sweep("error, words", [(0.6, "as much on fitted films"), (0.59, "less on"), (0.61, "more on")])
 def test_the_tangent_beside_linear_regions_as_good_better_and_worse(
     error: float, words: str
 ) -> None:

@@ -1,11 +1,14 @@
-"""Where films stop being believed: each limit from both sides, on films of a few vertebrae."""
+"""Where films stop being believed: each limit from both sides, on films of a few vertebrae.
+
+Would catch a limit that has moved, or is kept on one side only.
+"""
 
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pytest
+from sweeps import sweep
 
 from spinepipe.studies.scoliosis import checks, doubts
 from spinepipe.studies.scoliosis.films import CORNERS, Film
@@ -32,7 +35,7 @@ def test_the_line_of_centres_goes_from_the_neighbour_below_to_the_one_above() ->
     np.testing.assert_allclose(found, [45, np.rad2deg(np.arctan2(1, 2)), -26.565051, -45])
 
 
-@pytest.mark.parametrize(("off", "told"), [(24.9, []), (25.1, [13]), (-25.1, [13]), (-24.9, [])])
+@sweep("off, told", [(24.9, []), (25.1, [13]), (-25.1, [13]), (-24.9, [])])
 def test_a_tilt_is_told_from_25_degrees_off_the_line(off: float, told: list[int]) -> None:
     film = leaning(10, 10, 10 + off, 10, line=10)
     found = list(checks._tilts(PLACE, rows(), LEVELS, film))
@@ -40,9 +43,7 @@ def test_a_tilt_is_told_from_25_degrees_off_the_line(off: float, told: list[int]
     assert all("L2 tilted 25 deg" in problem.found for problem in found)
 
 
-@pytest.mark.parametrize(
-    ("line", "given", "told"), [(6.0, 0.59, True), (6.0, 0.61, False), (4.9, 0.1, False)]
-)
+@sweep("line, given, told", [(6.0, 0.59, True), (6.0, 0.61, False), (4.9, 0.1, False)])
 def test_tilts_below_a_tenth_of_the_line_are_radians(line: float, given: float, told: bool) -> None:
     film = leaning(*[given] * 4, line=line)
     found = [problem.remedy for problem in checks._tilts(PLACE, rows(), LEVELS, film)]
@@ -61,8 +62,8 @@ def bent(deg: float) -> Film:
     return leaning(0, deg, deg, deg, line=deg)
 
 
-@pytest.mark.parametrize(
-    ("right", "left", "words"),
+@sweep(
+    "right, left, words",
     [
         (2.1, -2.1, []),
         (1.9, -2.1, ["right_bending: the top tilts by 1.9 deg only"]),
@@ -81,14 +82,14 @@ def test_a_bend_tilts_the_top_by_more_than_two_degrees(
     assert all(word in told for word, told in zip(words, found, strict=True))
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.971, 0), (0.969, 1), (1.2, 0)])
+@sweep("share, told", [(0.971, 0), (0.969, 1), (1.2, 0)])
 def test_traction_does_not_shorten_by_more_than_three_per_cent(share: float, told: int) -> None:
     found = bends(erect=ERECT, traction=ERECT.scaled(share))
     assert len(found) == told
     assert all("87 mm tall, 90 mm erect" in problem for problem in found)
 
 
-@pytest.mark.parametrize(("apart_mm", "told"), [(0.049, True), (0.051, False)])
+@sweep("apart_mm, told", [(0.049, True), (0.051, False)])
 def test_films_are_one_where_all_centres_agree_to_a_twentieth_mm(
     apart_mm: float, told: bool
 ) -> None:
@@ -106,7 +107,7 @@ def test_films_are_one_where_all_centres_agree_to_a_twentieth_mm(
     )
 
 
-@pytest.mark.parametrize(("stated", "told"), [(44.9, 0), (45.1, 1), (-5.1, 1), (-4.9, 0)])
+@sweep("stated, told", [(44.9, 0), (45.1, 1), (-5.1, 1), (-4.9, 0)])
 def test_a_cobb_angle_is_told_from_25_degrees_off_the_film(stated: float, told: int) -> None:
     """The film's main curve has 20 deg."""
     film = leaning(0, 10, 20, 10)
@@ -116,7 +117,7 @@ def test_a_cobb_angle_is_told_from_25_degrees_off_the_film(stated: float, told: 
     assert [problem.row for problem in found] == [3] * told
 
 
-@pytest.mark.parametrize(("read", "told"), [(1e-7, 0), (-1e-7, 0), (2e-6, 1), (-2e-6, 1)])
+@sweep("read, told", [(1e-7, 0), (-1e-7, 0), (2e-6, 1), (-2e-6, 1)])
 def test_the_lowest_vertebra_is_at_nought(read: float, told: int) -> None:
     reading = pd.DataFrame(
         {"vertebra": LEVELS[::-1], "y_mm": [0.0, 0, 0, read], "z_mm": 0.0, "orientation_deg": 0.0}
@@ -135,8 +136,8 @@ def seen(up: float, across: float) -> Film:
     return Film(np.array([0.1, 0.1 + across]), np.array([0.3, 0.3 + up]), np.zeros(2))
 
 
-@pytest.mark.parametrize(
-    ("up", "across", "column"),
+@sweep(
+    "up, across, column",
     [
         *((0.30, 0.29, None), (0.29, 0.30, "y"), (0.29, -0.30, "y"), (-0.29, 0.30, "y")),
         *((-0.30, 0.29, "z"), (-0.30, 0.0, "z"), (0.30, -0.29, None)),
@@ -154,8 +155,8 @@ def test_most_films_decide_which_way_a_spine_stands() -> None:
     assert fault(doubts._direction([seen(-0.3, 0.0), *films[1:]], False)) == ("z_mm", True)
 
 
-@pytest.mark.parametrize(
-    ("size", "told"),
+@sweep(
+    "size, told",
     [
         *((1.0, None), (1.79, None), (1 / 1.79, None), (1.81, False), (1 / 1.81, False)),
         *((0.1, True), (1e-3, True), (1 / 25.4, True), (10.0, True), (0.0, False)),
@@ -192,8 +193,8 @@ def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:
     return [Film(right, np.arange(6.0), np.deg2rad(factor * line + mixed * other))]
 
 
-@pytest.mark.parametrize(
-    ("films", "told"),
+@sweep(
+    "films, told",
     [
         (curved(10.0, 1.0), None),
         (curved(4.1, -1.0), "against"),
@@ -236,8 +237,8 @@ def boxes(turn: float, mirror: float = 1.0) -> pd.DataFrame:
     return pd.DataFrame(made)[list(CORNERS)]
 
 
-@pytest.mark.parametrize(
-    ("turn", "mirror", "column"),
+@sweep(
+    "turn, mirror, column",
     [
         *((0, 1, None), (59, 1, None), (61, 1, "upper_left_y_mm"), (-61, 1, "upper_left_y_mm")),
         *((90, 1, "upper_left_y_mm"), (119, 1, "upper_left_y_mm"), (121, 1, "upper_left_z_mm")),
@@ -257,9 +258,7 @@ def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
     assert "lie on their sides" in str(told[1])
 
 
-@pytest.mark.parametrize(
-    ("largest", "told"), [(3.1, True), (3.2, False), (0.01, True), (0.0, False), (50.0, False)]
-)
+@sweep("largest, told", [(3.1, True), (3.2, False), (0.01, True), (0.0, False), (50.0, False)])
 def test_cobb_angles_below_a_half_turn_in_radians_are_radians(largest: float, told: bool) -> None:
     patients = pd.DataFrame({"cobb_deg": [0.0, largest, np.nan]}, index=[5, 6, 7])
     cohort: Any = SimpleNamespace(name="ais", further={"patients": patients})

@@ -1,6 +1,8 @@
 """The numbers of Jalalian 2017, entered a second time, and what they are allowed to be off by.
 
 Ranges follow from how a number is printed: what rounds to it, its SD, half to twice of it.
+
+Would catch a number of the paper that was entered wrongly, or a range wider than its print allows.
 """
 
 from typing import Any
@@ -9,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import binomtest
+from sweeps import sweep
 
 from spinepipe.comparison.claim import Claim, Run, judge
 from spinepipe.studies.scoliosis.jalalian_2017.against import CLAIMS
@@ -103,22 +106,22 @@ def unprinted(name: str) -> tuple[Any, ...]:
     return tuple(allowed)
 
 
-@pytest.mark.parametrize(("name", "value"), list(COUNTED.items()))
+@sweep("name, value", list(COUNTED.items()))
 def test_what_is_counted_or_stated(name: str, value: float) -> None:
     assert ends(name) == (value, value, value)
 
 
-@pytest.mark.parametrize(("name", "value"), list(ROUNDED.items()))
+@sweep("name, value", list(ROUNDED.items()))
 def test_what_is_printed_in_whole_numbers(name: str, value: float) -> None:
     assert ends(name) == (value, value - 0.5, value + 0.5)
 
 
-@pytest.mark.parametrize(("name", "value", "to"), [(n, *two) for n, two in JUST.items()])
+@sweep("name, value, to", [(n, *two) for n, two in JUST.items()])
 def test_what_arithmetic_gives(name: str, value: float, to: float) -> None:
     assert ends(name) == pytest.approx((value, value - to, value + to), rel=1e-15, abs=1e-15)
 
 
-@pytest.mark.parametrize(("name", "value"), list(REDUCTIONS.items()))
+@sweep("name, value", list(REDUCTIONS.items()))
 def test_what_one_model_is_better_by(name: str, value: float) -> None:
     assert ends(name) == (value, value / 2, min(2 * value, 100))
 
@@ -135,7 +138,7 @@ ERRORS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "mean", "sd"), ERRORS)
+@sweep("name, mean, sd", ERRORS)
 def test_errors_are_held_against_their_spread_or_half_to_twice(
     name: str, mean: float, sd: float | None
 ) -> None:
@@ -145,8 +148,8 @@ def test_errors_are_held_against_their_spread_or_half_to_twice(
         assert ends(f"errors.{name}.sd") == (sd, sd / 2, sd * 2)
 
 
-@pytest.mark.parametrize(("model", "mean", "sd"), [("tangent", 1.31, 0.91), ("linear", 2.65, 1.72)])
-@pytest.mark.parametrize("films", ["fitted", "held_out"])
+@sweep("model, mean, sd", [("tangent", 1.31, 0.91), ("linear", 2.65, 1.72)])
+@sweep("films", ["fitted", "held_out"])
 def test_errors_against_the_bend(model: str, mean: float, sd: float, films: str) -> None:
     """Of which the paper's SD is over vertebrae: the window is half to twice."""
     name = f"errors.opposite_rotating_vertebrae.rotation_r.{model}.{films}"
@@ -154,8 +157,8 @@ def test_errors_against_the_bend(model: str, mean: float, sd: float, films: str)
     assert ends(f"{name}.sd") == (sd, sd / 2, sd * 2)
 
 
-@pytest.mark.parametrize(
-    ("name", "tangent", "less"),
+@sweep(
+    "name, tangent, less",
     [
         ("bending.location_LOC", 0.83, 55),
         ("bending.orientation_theta", 1.38, 39),
@@ -220,16 +223,14 @@ def ours_of(claim: Claim, **tables: pd.DataFrame) -> dict[str, Any]:
     return judge(claim, Run(tables, {}))
 
 
-@pytest.mark.parametrize(
-    ("name", "ours"), [("B", np.pi / 2), ("C", -np.pi / 2), ("D", 0.0), ("J10.segments", 14)]
-)
+@sweep("name, ours", [("B", np.pi / 2), ("C", -np.pi / 2), ("D", 0.0), ("J10.segments", 14)])
 def test_formulas_give_what_is_printed(name: str, ours: float) -> None:
     row = ours_of(BY_ID[f"closed_form.{name}"])
     assert row["ours"] == pytest.approx(ours, abs=1e-12)
     assert row["verdict"] == "recomputed"
 
 
-@pytest.mark.parametrize(("key", "ours"), [("age_mean", 274 / 18), ("cobb_median", 53)])
+@sweep("key, ours", [("age_mean", 274 / 18), ("cobb_median", 53)])
 def test_ages_and_angles_of_table_1(key: str, ours: float) -> None:
     assert ours_of(BY_ID[f"closed_form.J1.{key}"])["ours"] == pytest.approx(ours)
 

@@ -1,10 +1,14 @@
-"""Arms, sizes, forces and rows of patients, worked by hand on two or three segments."""
+"""Arms, sizes, forces and rows of patients, worked by hand on two or three segments.
+
+Would catch wrong arms, sizes, chains and units of rows, where no whole patient is solved.
+"""
 
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import sweep
 
 from spinepipe.calibrate.profile import Reach
 from spinepipe.status import Ended
@@ -119,8 +123,8 @@ def test_no_end_is_nearer_than_the_step_of_reading() -> None:
     assert pairs.opposite.tolist() == [False, False, True]
 
 
-@pytest.mark.parametrize(
-    ("right", "left", "opposite"),
+@sweep(
+    "right, left, opposite",
     [(2e-9, -2e-9, False), (0.9e-9, -1.0, True), (1.0, -0.9e-9, True), (-1.0, -1.0, True)],
 )
 def test_what_turns_by_less_than_rounding_stands_still(
@@ -130,9 +134,7 @@ def test_what_turns_by_less_than_rounding_stands_still(
     assert one.opposite.tolist() == [opposite]
 
 
-@pytest.mark.parametrize(
-    ("times", "held"), [(0.04, 0.05), (0.06, 0.06), (19.0, 19.0), (21.0, 20.0)]
-)
+@sweep("times, held", [(0.04, 0.05), (0.06, 0.06), (19.0, 19.0), (21.0, 20.0)])
 def test_stiffness_stays_between_a_twentieth_and_twenty_times_the_median(
     times: float, held: float
 ) -> None:
@@ -145,7 +147,7 @@ def test_stiffness_stays_between_a_twentieth_and_twenty_times_the_median(
     assert found.constrained.tolist() == [False, False, held != times, False, False]
 
 
-@pytest.mark.parametrize(("ratio", "found"), [(29.0, 29.0), (1 / 29.0, 1 / 29.0), (40.0, 30.0)])
+@sweep("ratio, found", [(29.0, 29.0), (1 / 29.0, 1 / 29.0), (40.0, 30.0)])
 def test_forces_differ_by_thirty_times_at_most(ratio: float, found: float) -> None:
     arm, stiffness = np.array([0.3, 0.2, 0.1]), np.array([90.0, 60.0, 75.0])
     pairs = Pairs(10.0 * arm / stiffness, -ratio * 10.0 * arm / stiffness, arm, arm, 1)
@@ -196,8 +198,8 @@ class Fit:
         return Personal(nothing, np.ones(2), None, np.zeros(2, dtype=bool), 0, 0.0)
 
 
-@pytest.mark.parametrize("regions", [True, False])
-@pytest.mark.parametrize("arrived", [True, False])
+@sweep("regions", [True, False])
+@sweep("arrived", [True, False])
 def test_films_are_asked_of_ratios_where_the_study_wants_it(
     regions: bool, arrived: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,7 +258,7 @@ def test_rows_of_laws_tell_ratios_ends_and_what_films_leave_open() -> None:
     assert below["identifiable"] is False
 
 
-@pytest.mark.parametrize("status", [Ended.CONVERGED, Ended.UNSTABLE])
+@sweep("status", [Ended.CONVERGED, Ended.UNSTABLE])
 def test_rows_of_a_pose_are_in_mm_and_degrees(status: Ended) -> None:
     """Missed by 3 and 4 mm and -2 deg; the film's spine is twice as long as erect."""
     erect = Film(np.zeros(3), np.array([0.0, 0.04, 0.08]), np.zeros(3))

@@ -1,10 +1,16 @@
-"""Patients as models: mirrors, what films do not tell, poses held where the films have the top."""
+"""Patients as models: mirrors, what films do not tell, poses held where the films have the top.
+
+Would catch a model that is not mirrored by mirrored films, a top that is not where the film has
+it, and size of stiffness that seeps into poses.
+"""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scoliosis_cases import write_shipped
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
@@ -19,7 +25,6 @@ from spinepipe.studies.scoliosis.personal import (
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Pairs
-from tests.generators import ais_films
 
 STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
 
@@ -27,7 +32,7 @@ STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "
 @pytest.fixture(scope="module")
 def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
     folder = tmp_path_factory.mktemp("films") / "ais"
-    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(folder, 1)
     return cohorts.read(folder, (FILMS, PATIENTS))
 
 
@@ -53,7 +58,7 @@ def mirrored(patient: Patient) -> Patient:
     )
 
 
-@pytest.mark.parametrize("model", list(WAYS))
+@sweep("model", list(WAYS))
 def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> None:
     other = mirrored(patient)
     for position, opposite in ((RIGHT, LEFT), ("neutral", "neutral")):
@@ -67,7 +72,7 @@ def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> 
         np.testing.assert_allclose(two.film.up, one.film.up, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("model", list(WAYS))
+@sweep("model", list(WAYS))
 def test_the_uppermost_vertebra_is_where_the_film_has_it(patient: Patient, model: str) -> None:
     spine = patient.held(WAYS[model](patient, STUDY).model)
     for film in patient.read.films.values():

@@ -1,4 +1,8 @@
-"""Populations: their spreads, what is learned from patients, and their table."""
+"""Populations: their spreads, what is learned from patients, and their table.
+
+Would catch a precision that is not the inverse of its covariance, and patients that do not give
+their population back.
+"""
 
 import numpy as np
 

@@ -1,4 +1,7 @@
-"""What is taken for granted of a population, what rounds do with it, and what films add to it."""
+"""What is taken for granted of a population, what rounds do with it, and what films add to it.
+
+Would catch rounds that end too early or never, and spreads with the wrong prior.
+"""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from sweeps import sweep
 
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis import learn as learning
@@ -67,7 +71,7 @@ def moved(by: float) -> Any:
     return again
 
 
-@pytest.mark.parametrize(("by", "rounds"), [(0.029, 1), (-0.029, 1), (0.031, 5), (-0.031, 5)])
+@sweep("by, rounds", [(0.029, 1), (-0.029, 1), (0.031, 5), (-0.031, 5)])
 def test_rounds_end_when_the_population_stands_still_or_after_five(
     by: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -82,7 +86,7 @@ def test_rounds_end_when_the_population_stands_still_or_after_five(
     assert found.change == pytest.approx(abs(by))
 
 
-@pytest.mark.parametrize(("by", "steps"), [(0.99e-4, 1), (1.01e-4, 500)])
+@sweep("by, steps", [(0.99e-4, 1), (1.01e-4, 500)])
 def test_steps_on_parabolas_end_when_nothing_moves_or_after_five_hundred(
     by: float, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

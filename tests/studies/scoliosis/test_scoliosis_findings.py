@@ -1,10 +1,13 @@
-"""Sentences of the report: each turns out otherwise when the numbers do."""
+"""Sentences of the report: each turns out otherwise when the numbers do.
+
+Would catch a sentence that stays when its table says otherwise, or counts wrongly.
+"""
 
 from typing import Any
 
 import pandas as pd
-import pytest
 from scoliosis_cases import ERRORS, Size, paired_test, study_of, tables_of
+from sweeps import sweep
 
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
@@ -90,7 +93,7 @@ def test_best_is_said_only_where_the_difference_is_significant() -> None:
     assert "from the model that is linear by region it is significant (p 0.040)." in both
 
 
-@pytest.mark.parametrize(
+@sweep(
     "row",
     [
         paired_test("fitted", "rotation", PAIR, 0.001),
@@ -98,7 +101,6 @@ def test_best_is_said_only_where_the_difference_is_significant() -> None:
         paired_test("held_out", "rotation", ("tangent", "linear_regions"), 0.001),
         paired_test("held_out", "rotation", PAIR, None),
     ],
-    ids=["other films", "other measure", "other pair", "no p"],
 )
 def test_a_test_of_something_else_says_nothing_of_the_answer(row: dict[str, Any]) -> None:
     assert "is not known" in answer(Size(), statistics=statistics(row)).how_sure
@@ -160,7 +162,7 @@ def test_models_are_told_in_the_order_of_their_errors() -> None:
     assert "least error first: uniform (0.221°)" in turned
 
 
-@pytest.mark.parametrize(("error", "words"), [(0.3, "50 % less"), (0.9, "50 % more")])
+@sweep("error, words", [(0.3, "50 % less"), (0.9, "50 % more")])
 def test_the_tangent_is_told_beside_linear_regions(error: float, words: str) -> None:
     found = told(Size(errors={"tangent": error, "linear_regions": 0.6}))
     assert f"{words} on fitted films, {words} on held-out films" in found

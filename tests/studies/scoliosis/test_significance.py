@@ -1,10 +1,14 @@
-"""Tests between models over patients: numbers worked by hand."""
+"""Tests between models over patients: numbers worked by hand.
+
+Would catch pairs of patients exchanged, a correction over other tests, and a p of too few.
+"""
 
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.studies.scoliosis.errors import by_patient, squares
@@ -66,7 +70,7 @@ def test_every_pair_of_models_is_tested_in_every_measure_and_group() -> None:
     assert (found["stratum"] == found["family"].str.split("/").str[0]).all()
 
 
-@pytest.mark.parametrize("measure", list(MEASURES))
+@sweep("measure", list(MEASURES))
 def test_the_model_with_smaller_errors_is_named_with_by_how_much(measure: str) -> None:
     found = statistics(sizes(uniform=0.5), sizes(tangent=0.25))
     unit = MEASURES[measure][0]

@@ -1,10 +1,14 @@
-"""Variants of the published model, and what stiffness in all does in space."""
+"""Variants of the published model, and what stiffness in all does in space.
+
+Would catch a variant that varies something else, and wrong derivatives of regions.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scoliosis_cases import write_shipped
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
@@ -16,7 +20,6 @@ from spinepipe.studies.scoliosis.tables_of_errors import VARIANTS, VARIATION
 from spinepipe.studies.scoliosis.variants import variant_rows
 from spinepipe.studies.scoliosis.variation import variation_rows
 from spinepipe.tables import from_rows
-from tests.generators import ais_films
 
 STUDY = Scoliosis.model_validate(
     {
@@ -31,7 +34,7 @@ STUDY = Scoliosis.model_validate(
 @pytest.fixture(scope="module")
 def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
     folder = tmp_path_factory.mktemp("films") / "ais"
-    ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=1)
+    write_shipped(folder, 1)
     return cohorts.read(folder, (FILMS, PATIENTS))
 
 

@@ -1,19 +1,23 @@
-"""Figures of tracked motions: drawn for any persons and motions, and true to the tables."""
+"""Figures of tracked motions: drawn for any persons and motions, and true to the tables.
+
+Seen here: a figure that breaks or runs off the page where persons, trials, truth or calibrations
+are missing, a mean, course or mark that is not the table's, an approach that changes its colour.
+"""
 
 from collections.abc import Callable
-from itertools import pairwise
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import caption, drawings
+from drawn import caption, drawings, faults_of_layout
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tracking_table_cases import BEND_DEG, ERROR, Size, cohort_of, study_of, tables_of
 
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.report.style import WIDTH_MM, style
+from spinepipe.report.style import style
 from spinepipe.studies.tracking.figures.kinematics import courses_of, ends_of
 from spinepipe.studies.tracking.figures.looks import chosen, looks_of_approaches
 from spinepipe.studies.tracking.figures.stiffness_by_level import told_by
@@ -25,21 +29,28 @@ NAMES = (
     *("stiffness_by_level", "trade_off"),
 )
 SIZES = {
-    "three persons": Size(),
-    "one person": Size(1),
-    "no truth": Size(2, truth=False),
-    "stance alone": Size(2, ("stance",)),
-    "one approach": Size(2, approaches=("optk_generic",)),
-    "nothing found": Size(1, failing=tuple(ERROR)),
-    "turned too little": Size(2, moves=False),
-    "profiles lost": Size(1, verdict="lost"),
-    "profiles told": Size(1, verdict="told"),
+    "three persons": (Size(), NAMES),
+    "nothing found": (Size(1, failing=tuple(ERROR)), NAMES),
+    "one person": (Size(1), ("kinematics", "motion_sharing", "error_by_level", "trade_off")),
+    "no truth": (Size(2, truth=False), ("kinematics", "error_by_level")),
+    "one person, no truth": (Size(1, truth=False), ("trade_off",)),
+    "stance alone": (Size(2, ("stance",)), ("kinematics", "motion_sharing", "error_by_level")),
+    "one approach": (Size(2, approaches=("optk_generic",)), NAMES[:3]),
+    "turned too little": (Size(2, moves=False), ("kinematics", "motion_sharing")),
+    "profiles lost": (Size(1, verdict="lost"), ("stiffness_profiles", "stiffness_by_level")),
+    "profiles told": (Size(1, verdict="told"), ("stiffness_profiles", "stiffness_by_level")),
 }
+"""Studies, and the figures that look otherwise in them than in those before."""
 REAL = drawings("tracking")
 
 
 def draw(name: str, size: Size, **changed: pd.DataFrame) -> Figure:
-    """A figure of made-up tables, laid out."""
+    """A figure of made-up tables, laid out; drawn once unless tables are changed."""
+    return _drawn(name, size) if not changed else _drawn.__wrapped__(name, size, **changed)
+
+
+@cache
+def _drawn(name: str, size: Size, **changed: pd.DataFrame) -> Figure:
     function: Callable[..., Figure] = REAL[name]
     with style():
         figure = function(study_of(size), cohort_of(size), tables_of(size, **changed))
@@ -62,43 +73,28 @@ def test_all_figures_are_declared() -> None:
     assert set(REAL) == set(NAMES)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_figure_has_a_caption(name: str) -> None:
-    assert len(caption("tracking", name).read_text(encoding="utf-8")) > 200
+def test_every_figure_has_a_caption() -> None:
+    short = [n for n in NAMES if len(caption("tracking", n).read_text(encoding="utf-8")) <= 200]
+    assert not short
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_no_words_leave_the_page_or_stand_on_each_other(name: str, size: Size) -> None:
-    figure = draw(name, size)
-    assert figure.get_figwidth() * 25.4 == pytest.approx(WIDTH_MM)
-    page = figure.bbox
-    for axis in (one for one in figure.axes if one.get_visible() and one.axison):
-        for line in (axis.xaxis, axis.yaxis):
-            low, high = sorted(line.get_view_interval())
-            ticks = [t for t in line.get_major_ticks() if low <= t.get_loc() <= high]
-            shown = [t.label1 for t in ticks if t.label1.get_visible() and t.label1.get_text()]
-            boxes = [label.get_window_extent() for label in shown]
-            for one, other in pairwise(boxes):
-                assert not one.shrunk(0.98, 0.9).overlaps(other.shrunk(0.98, 0.9)), name
-            for box in [*boxes, line.label.get_window_extent(), axis.title.get_window_extent()]:
-                assert box.x0 > page.x0 - 1.0, name
-                assert box.x1 < page.x1 + 1.0, name
-    for legend in figure.legends:
-        inside = legend.get_window_extent()
-        assert page.x0 - 1.0 < inside.x0 < inside.x1 < page.x1 + 1.0, "the key is on the page"
+@pytest.mark.parametrize("which", SIZES)
+def test_no_words_leave_the_page_or_stand_on_each_other(which: str) -> None:
+    size, names = SIZES[which]
+    faults = [f"{name}: {fault}" for name in names for fault in faults_of_layout(draw(name, size))]
+    assert not faults
 
 
 def test_what_is_not_there_is_said() -> None:
-    nothing = SIZES["nothing found"]
+    nothing = Size(1, failing=tuple(ERROR))
     assert "no approach found a motion" in words(draw("kinematics", nothing))
     assert "no approach found a motion" in words(draw("kinematics", Size(1, ("stance",))))
     assert "is not known of any motion" in words(draw("error_by_level", Size(1, truth=False)))
     assert "no trial turns" in words(draw("motion_sharing", Size(1, ("stance",))))
-    assert "turns too little" in words(draw("motion_sharing", SIZES["turned too little"]))
+    assert "turns too little" in words(draw("motion_sharing", Size(2, moves=False)))
     assert "no calibration loaded" in words(draw("stiffness_by_level", nothing))
-    assert "not known: no fit settled" in words(draw("stiffness_profiles", SIZES["profiles lost"]))
+    assert "not known: no fit settled" in words(draw("stiffness_profiles", Size(1, verdict="lost")))
     untold = words(draw("trade_off", Size(1, truth=False)))
     assert untold.count("no truth is known") == 2
     empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}

@@ -1,20 +1,24 @@
-"""Figures of trunk loads: drawn for any persons and tasks, and true to the tables."""
+"""Figures of trunk loads: drawn for any persons and tasks, and true to the tables.
+
+Seen here: a figure that breaks or runs off the page where tasks, persons, samples or the volunteer
+are missing, a mark that is not where the table has it, what is not sound drawn as if it were.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import caption
+from drawn import caption, faults_of_layout
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from trunk_table_cases import BEYOND, ERRORS, MEASURED, Size, cohort_of, study_of, tables_of
 
-from spinepipe.report.style import WIDTH_MM, style
+from spinepipe.report.style import style
 from spinepipe.studies.trunk_loads.chosen import bends, of_person, relaxed, shown_person, some_tasks
 from spinepipe.studies.trunk_loads.figures.cost_of_simplifications import costs
 from spinepipe.studies.trunk_loads.figures.load_over_flexion import courses_of, extensor_forces
@@ -35,15 +39,17 @@ NEEDS = {
     "upright": ("upright",),
 }
 ALL_LOST = tuple((task, "out_of_reach", "no") for task in ("standing", "load_away", "flexion_50"))
+_OF_TASKS = ("muscle_force_bars", "load_by_level", "load_over_flexion")
 SIZES = {
-    "five persons": Size(),
-    "one person": Size(1),
-    "one task": Size(2, ("standing",)),
-    "nothing settled": Size(1, tuple(t for t, *_ in ALL_LOST), ALL_LOST),
-    "beyond strength": Size(1, ("standing", "exertion_extension"), (BEYOND,)),
-    "no samples": Size(1, samples=False),
-    "no drawn task": Size(3, drawn=()),
+    "five persons": (Size(), NAMES),
+    "one person": (Size(1), ("load_by_level", "load_over_flexion", "upright")),
+    "one task": (Size(2, ("standing",)), NAMES),
+    "nothing settled": (Size(1, tuple(t for t, *_ in ALL_LOST), ALL_LOST), NAMES),
+    "beyond strength": (Size(1, ("standing", "exertion_extension"), (BEYOND,)), _OF_TASKS),
+    "no samples": (Size(1, samples=False), ("pressure_against_measured",)),
+    "no drawn task": (Size(3, drawn=()), _OF_TASKS),
 }
+"""Studies, and the figures that look otherwise in them than in those before."""
 
 
 def function(name: str) -> Callable[..., Figure]:
@@ -54,7 +60,12 @@ def function(name: str) -> Callable[..., Figure]:
 
 
 def draw(name: str, size: Size, **changed: pd.DataFrame) -> Figure:
-    """A figure of made-up tables, laid out."""
+    """A figure of made-up tables, laid out; drawn once unless tables are changed."""
+    return _drawn(name, size) if not changed else _drawn.__wrapped__(name, size, **changed)
+
+
+@cache
+def _drawn(name: str, size: Size, **changed: pd.DataFrame) -> Figure:
     with style():
         figure = function(name)(study_of(size), cohort_of(size), tables_of(size, **changed))
         figure.draw_without_rendering()
@@ -87,43 +98,27 @@ def points(axis: Axes, marker: str) -> set[tuple[float, float]]:
     }
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_figure_has_a_caption(name: str) -> None:
-    assert len(caption("trunk_loads", name).read_text(encoding="utf-8")) > 200
+def test_every_figure_has_a_caption() -> None:
+    short = [n for n in NAMES if len(caption("trunk_loads", n).read_text(encoding="utf-8")) <= 200]
+    assert not short
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_no_words_leave_the_page_or_stand_on_each_other(name: str, size: Size) -> None:
-    if not set(NEEDS[name]) <= set(tables_of(size)):
-        pytest.skip("the study has no such table, so no such figure")
-    figure = draw(name, size)
-    assert figure.get_figwidth() * 25.4 == pytest.approx(WIDTH_MM)
-    page = figure.bbox
-    for axis in (one for one in figure.axes if one.get_visible()):
-        for line in (axis.xaxis, axis.yaxis):
-            low, high = sorted(line.get_view_interval())
-            ticks = [t for t in line.get_major_ticks() if low <= t.get_loc() <= high]
-            shown = [t.label1 for t in ticks if t.label1.get_visible() and t.label1.get_text()]
-            boxes = [label.get_window_extent() for label in shown]
-            for one, other in pairwise(boxes):
-                assert not one.shrunk(0.98, 0.9).overlaps(other.shrunk(0.98, 0.9)), name
-            for box in [*boxes, line.label.get_window_extent(), axis.title.get_window_extent()]:
-                assert box.x0 > page.x0 - 1.0, name
-                assert box.x1 < page.x1 + 1.0, name
-    for legend in figure.legends:
-        inside = legend.get_window_extent()
-        assert page.x0 - 1.0 < inside.x0 < inside.x1 < page.x1 + 1.0, "the key is on the page"
-        assert inside.y0 > page.y0 - 1.0
+@pytest.mark.parametrize("which", SIZES)
+def test_no_words_leave_the_page_or_stand_on_each_other(which: str) -> None:
+    size, names = SIZES[which]
+    there = [name for name in names if set(NEEDS[name]) <= set(tables_of(size))]
+    assert there
+    faults = [f"{name}: {fault}" for name in there for fault in faults_of_layout(draw(name, size))]
+    assert not faults
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_tables_without_rows_are_told_not_drawn(name: str) -> None:
+def test_tables_without_rows_are_told_not_drawn() -> None:
     empty = {table: rows.iloc[:0] for table, rows in tables_of(Size()).items()}
-    with style():
-        figure = function(name)(study_of(Size()), cohort_of(Size()), empty)
-    assert not figure.axes
-    assert len(words(figure)) > 30
+    for name in NAMES:
+        with style():
+            figure = function(name)(study_of(Size()), cohort_of(Size()), empty)
+        assert not figure.axes, name
+        assert len(words(figure)) > 30, name
 
 
 @pytest.mark.parametrize(("tier", "marker"), [("untuned", "o"), ("tuned", "s"), ("left_out", "^")])
