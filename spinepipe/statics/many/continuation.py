@@ -64,22 +64,18 @@ def continued(
     """Poses (N, J, 6) under the whole load, and which lanes got there by stable equilibria."""
     q, count = start.copy(), len(start)
     reached, size = np.zeros(count), np.full(count, FIRST_INCREMENT)
-    slope = np.zeros_like(q)  # of the pose by the share, from the last two that were reached
     going, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while going.any():
-        size = np.minimum(size, 1.0 - reached)
         lanes, sizes = _tried(np.flatnonzero(going), size, lost)
-        target = reached[lanes] + sizes
+        target = np.minimum(1.0, reached[lanes] + sizes)
         share = increment.share(lanes, target)
         own, loads = increment.on(chains, lanes, target)
-        ahead = q[lanes] + slope[lanes] * sizes[:, None, None]
-        found, good = settled(own, loads, _on(laws, lanes, share), ahead)
+        found, good = settled(own, loads, _on(laws, lanes, share), q[lanes])
         there, first = np.unique(lanes[good], return_index=True)
         best = np.flatnonzero(good)[first]
         missed = np.setdiff1d(lanes, there)
         going[missed] = ~lost[missed] & (size[missed] > SMALLEST_FRACTION)
         lost[missed], lost[there] = True, False
-        slope[there] = (found[best] - q[there]) / sizes[best, None, None]
         q[there], reached[there], size[there] = found[best], target[best], 2.0 * sizes[best]
         size[missed] *= 0.5
         going &= reached < 1.0
