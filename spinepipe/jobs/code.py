@@ -236,11 +236,11 @@ def _known() -> dict[str, list[Any]]:
 
 @cache
 def _keep_at_exit() -> None:
-    atexit.register(_keep)
+    atexit.register(keep)
 
 
-def _keep() -> None:
-    """Write down what is known, where there is a place for it."""
+def keep() -> None:
+    """Write down what is known, where there is a place for it: workers read no file again then."""
     if _KEPT.parent.is_dir():
         with suppress(OSError), appearing(_KEPT) as temporary:
             temporary.write_text(json.dumps({"python": sys.version, "files": _known()}), "utf-8")

@@ -34,7 +34,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_what_was_kept_gives_the_same_digest(kept: Path) -> None:
     fresh = code.code_digest(MODULE)
-    code._keep()
+    code.keep()
     forget()
     assert code._known()
     assert code.code_digest(MODULE) == fresh
@@ -42,7 +42,7 @@ def test_what_was_kept_gives_the_same_digest(kept: Path) -> None:
 
 def test_a_file_that_has_changed_since_is_read_again(kept: Path) -> None:
     fresh = code.code_digest(MODULE)
-    code._keep()
+    code.keep()
     data = json.loads(kept.read_text("utf-8"))
     for state in data["files"].values():
         state[0][1] += 1

@@ -9,6 +9,7 @@ from pathlib import Path
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
+from spinepipe.jobs import code
 from spinepipe.jobs.pool import JobFailed, submit_and_wait, warm_up
 from spinepipe.jobs.time_left import TimeLeft, costs
 from spinepipe.studies.doubts import doubts, refusals
@@ -30,6 +31,7 @@ def check_engine():
 
 def warm_up_the_pool():
     """Have the workers' server import what the jobs at work need; a look or nothing to do starts none."""
+    code.keep()
     kinds = {load(name)[0].kind for name in studies_at_work()}
     warm_up(modules_of_many(kinds))
 

@@ -152,7 +152,7 @@ def _balance(inputs: MeasuredSpecimen, models: Sequence[SpineModel]) -> list[_En
     runs = [(number, case) for number in range(len(models)) for case in inputs.cases]
     stack = Stack.of(models, runs)
     found = stack.solve()
-    messages = stack.warnings(found.q) | found.messages
+    messages = {**stack.warnings(found.q), **found.messages}
     each = zip(found.q.reshape(len(found.q), -1), found.status.tolist(), strict=True)
     ended = [
         _Ended(None if np.isnan(q[0]) else q, Status(status), messages.get(lane, ""))
