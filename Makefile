@@ -64,6 +64,7 @@ $(VENV)/bin/python:
 $(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m spinepipe.cli.engine >/dev/null  # compiles the kernels, else the first study waits for it
 	touch $@
 
 $(VENV)/dev.done: $(VENV)/runtime.done requirements-dev.lock
