@@ -213,7 +213,7 @@ class Selection(BaseModel):
     model_config = FORM
 
     studies: _Names = Field(min_length=1, description="studies that a plain run builds")
-    full: _Names = Field(default=(), description="long studies, built by `make full` only")
+    full: _Names = Field(default=(), description="further studies, built by `make full` only")
 
 
 def read_selection(root: Path) -> Selection:
