@@ -31,8 +31,8 @@ from typing import Any
 _JOBS = Path(__file__).resolve().parent
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
-_MOST_MEMORY_KB = 500_000
-"""A worker that once held more than this serves no further job: its memory would stay taken."""
+_MOST_GROWN_KB = 400_000
+"""A worker that a job made larger by this serves no further one: its memory would stay taken."""
 
 _REMEDIES = {
     errno.ENOSPC: "no space is left on the disk of {folder}; free some space",
@@ -103,10 +103,10 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
     try:
         worker.connection.send((function, arguments))
         wait([worker.connection, worker.process.sentinel])
-        failure, memory_kb = worker.connection.recv()
+        failure, grown_kb = worker.connection.recv()
     except (EOFError, OSError):
         _fail(job, log, _fate(worker))
-    if memory_kb < _MOST_MEMORY_KB:
+    if grown_kb < _MOST_GROWN_KB:
         _idle.put(worker)
     else:
         worker.connection.close()  # at which it ends: what a large job left behind goes with it
@@ -186,6 +186,7 @@ def _serve(connection: Connection) -> None:
     """Life of a worker: answer one job after the other until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.freeze()  # what was imported stays: no need to look through it at each collection
+    begun_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
@@ -193,7 +194,8 @@ def _serve(connection: Connection) -> None:
         except EOFError:
             return
         failure = _answer(function, arguments)
-        connection.send((failure, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
+        largest_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        connection.send((failure, largest_kb - begun_kb))
 
 
 def _end_with_parent() -> None:

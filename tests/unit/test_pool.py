@@ -37,3 +37,17 @@ def test_a_worker_that_dies_in_mid_job_is_told_and_the_next_job_has_another(tmp_
     assert "SIGKILL" in log.read_text()
     submit_and_wait("fourth", "os:mkdir", str(log), path=str(tmp_path / "made"))
     assert (tmp_path / "made").is_dir()
+
+
+def test_a_worker_that_a_job_made_large_serves_no_further_one(tmp_path: Path) -> None:
+    log, place = str(tmp_path / "log"), tmp_path / "worker"
+
+    def worker() -> int:
+        submit_and_wait("who", "subprocess:call", log, args=f"echo $PPID > {place}", shell=True)
+        return int(place.read_text())
+
+    before = worker()
+    submit_and_wait("small", "numpy:ones", log, shape=10)
+    assert worker() == before
+    submit_and_wait("large", "numpy:ones", log, shape=60_000_000)
+    assert worker() != before
