@@ -49,8 +49,8 @@ def made(root: Path) -> Expected:
     draw.sample_frames(str(root), STUDY, "a", frames)
     draw.draw_stiffness(str(root), STUDY, sets)
     for path in told.files.job_files("range_of_motion", "a", "000"):
-        pose = Path(path).stem.partition("=")[2]
-        simulate.run(str(root), STUDY, frames, sets, "a", pose, path)
+        pose, stiffness = (part.split("=")[1].split(".")[0] for part in path.split("/")[-2:])
+        simulate.run(str(root), STUDY, frames, sets, "a", pose, stiffness, path)
     return told
 
 

@@ -60,11 +60,11 @@ def starts(project: Project) -> int:
 def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(
     eight: Project, tmp_path: Path
 ) -> None:
-    """Four moves are one submitted job, the block that joins them another."""
+    """Sixteen moves are one submitted job, the block that joins them another."""
     cluster = with_queue(eight.copy(tmp_path / "project"))
     shutil.rmtree(cluster.path("results/range_of_motion/jobs/specimen=b"))
     cluster.path(f"results/{BLOCK}").unlink()
-    said = run_on_cluster(cluster, f"results/{BLOCK}", moves=4)
+    said = run_on_cluster(cluster, f"results/{BLOCK}", moves=16)
     assert cluster.contents() == eight.contents()
     assert len(re.findall("Submitted group job", said)) == 1
     assert len(re.findall("Submitted (?:group )?job", said)) == 2
@@ -75,7 +75,7 @@ def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(
 def test_a_whole_study_comes_out_the_same(eight: Project, tmp_path: Path) -> None:
     cluster = with_queue(eight.copy(tmp_path / "project"))
     shutil.rmtree(cluster.path("results/range_of_motion"))
-    said = run_on_cluster(cluster, "results/range_of_motion/report.html", moves=4)
+    said = run_on_cluster(cluster, "results/range_of_motion/report.html", moves=16)
     assert all(eight.contents()[name] == found for name, found in cluster.contents().items())
     # Moves of each specimen; and one of summaries, figures and report.
     assert len(re.findall("Submitted group job", said)) == 2 + 1

@@ -28,7 +28,7 @@ RANKED = f"{POSES}/best.json"
 BLOCK = f"{POSES}/blocks/simulations/specimen=s01/block=001.parquet"
 
 FIT = "cohort_stiffness/fits/specimen=b/representation=per_joint/fitted_to=flexion"
-MOVED = "range_of_motion/jobs/specimen=b/pose=0001.parquet"
+MOVED = "range_of_motion/jobs/specimen=b/pose=0001/stiffness=00.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
 LOST = (f"{FIT}/stiffness.parquet", MOVED, MOTION)
 OF_FIT = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "nuisances")}

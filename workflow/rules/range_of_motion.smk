@@ -31,9 +31,9 @@ rule move:
         frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
-        output=f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}.parquet",
+        output=f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}/stiffness={{stiffness,[0-9]+}}.parquet",
     log:
-        f"{LOGS}/move/specimen={{specimen}}/pose={{pose}}.log",
+        f"{LOGS}/move/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
     resources:
         tmpdir=TMPDIR,
     params:

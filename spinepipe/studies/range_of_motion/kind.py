@@ -15,7 +15,7 @@ from spinepipe.studies.range_of_motion.tables import (
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
 _JOBS = ("range_of_motion",)
-"""Tables joined from job files, one for each specimen and pose."""
+"""Tables joined from job files, one for each specimen, pose and stiffness set."""
 
 BY_SPECIMEN = ("frames",)
 """Tables joined from one file per specimen."""
@@ -71,12 +71,22 @@ class RangeOfMotionFiles(StudyFiles):
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """All (specimen, block) of the table, blocks numbered `000`, `001`, ..."""
-        return numbered_blocks(self.specimens, self.study.n_poses)
+        return numbered_blocks(self.specimens, self._per_specimen)
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        poses = files_of_block(block, self.study.n_poses)
-        return [f"{self.folder}/jobs/specimen={specimen}/pose={n:04d}.parquet" for n in poses]
+        numbers = files_of_block(block, self._per_specimen)
+        return [self._job_file(specimen, number) for number in numbers]
+
+    @property
+    def _per_specimen(self) -> int:
+        """Number of job files of a specimen."""
+        return self.study.n_poses * self.study.stiffness_sets
+
+    def _job_file(self, specimen: str, number: int) -> str:
+        pose, stiffness = divmod(number, self.study.stiffness_sets)
+        place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
+        return f"{self.folder}/jobs/{place}.parquet"
 
 
 _MOVING = ("virtual_tests", "tests", "rows", "damping")

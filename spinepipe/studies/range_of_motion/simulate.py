@@ -1,8 +1,9 @@
-"""Job: motion of one specimen with one set of joint frames, all tests and stiffness sets."""
+"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 
-TABLE = RANGE_OF_MOTION.without("specimen")
-"""A job file: the specimen is in its folder's name."""
+TABLE = RANGE_OF_MOTION.without("specimen", "pose")
+"""A job file: specimen and pose are in its folders' names."""
 
 Ends = list[tuple[Array, Status, str]]
 """End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
@@ -41,78 +42,72 @@ def run(
     stiffness_sets: str,
     specimen: str,
     pose: str,
+    stiffness: str,
     output: str,
 ) -> None:
-    """Write the rows of one specimen and pose, of all stiffness sets."""
+    """Write the rows of one specimen, pose and stiffness set."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     tests = asked_tests(root, study, specimen, cohort.digest)
     placed = drawn_frames(frames).of(specimen, int(pose))
+    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
     damping = np.array(settings.damping.in_order())
-    tension_n = virtual_tensions(settings)
-    sets = drawn_stiffness(stiffness_sets)
-    models: dict[int, SpineModel] = {}
-    refusals: dict[int, str] = {}
-    for number, values in enumerate(sets):
-        try:
-            models[number] = on_bushings(
-                cohort, specimen, placed, values, damping, tension_n=tension_n
-            )
-        except RefusedModel as error:
-            refusals[number] = str(error)
-    solved = iter(_ends(tuple(models.values()), tests))
-    names = ("stiffness", *_NAMES, *_MOTION)
-    columns: dict[str, list[Any]] = {name: [] for name in names}
-    for number in range(len(sets)):
-        nowhere = (np.full(sets[number].shape, np.nan), Status.REFUSED, refusals.get(number, ""))
-        for test in tests:
-            steps = test.case.steps[test.stored]
-            ends = [nowhere] * len(steps) if number in refusals else next(solved)
-            _enter(columns, cohort.joint_names, (number, test), ends)
-    columns["pose"] = [int(pose)] * len(columns["stiffness"])
+    try:
+        tension_n = virtual_tensions(settings)
+        model = on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n)
+        ends = _ends(model, tests)
+    except RefusedModel as error:
+        nowhere = np.full(values.shape, np.nan)
+        ends = [
+            [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
+            for test in tests
+        ]
+    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
+    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
     made_by = provenance("simulate", settings, cohort, [specimen])
     write(to_arrow(TABLE, columns), output, made_by)
 
 
-def _ends(models: Sequence[SpineModel], tests: Sequence[AskedTest]) -> Iterator[Ends]:
-    """Ends of the steps that are stored, model by model and test by test; all solved together.
+def _ends(model: SpineModel, tests: Sequence[AskedTest]) -> list[Ends]:
+    """Ends of the steps that are stored, test by test; all are solved in one stack.
 
     Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
     """
-    if not models:
-        return
-    runs = [(number, test) for number in range(len(models)) for test in tests]
-    stack = Stack.of(models, [(number, test.case) for number, test in runs])
+    stack = Stack.of([model], [(0, test.case) for test in tests])
     found = stack.solve()
-    for (_, test), first, end in zip(runs, stack.first[:-1], stack.first[1:], strict=True):
+    ends = []
+    for test, (first, end) in zip(tests, pairwise(stack.first), strict=True):
         start = found.q[first] if test.from_first else 0.0
-        yield [
-            (
-                from_si(found.q[lane] - start),
-                Status(found.status[lane]),
-                found.messages.get(lane, ""),
-            )
-            for lane in range(first, end)[test.stored]
-        ]
+        lanes = range(first, end)[test.stored]
+        ends.append(
+            [
+                (from_si(found.q[n] - start), Status(found.status[n]), found.messages.get(n, ""))
+                for n in lanes
+            ]
+        )
+    return ends
 
 
-_NAMES = ("test", "step", "largest_load", "joint", "status", "message")
-_MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
-
-
-def _enter(
-    columns: dict[str, list[Any]],
-    joints: tuple[str, ...],
-    asked: tuple[int, AskedTest],
-    ends: Ends,
-) -> None:
-    """Add the rows of a stiffness set under a test, step by step and joint by joint."""
-    number, test = asked
-    for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
-        load = (test.case.test, step.step, step.step == test.largest)
-        for at, joint in enumerate(joints):
-            row = (number, *load, joint, status.value, message, *motion[at])
-            for values, value in zip(columns.values(), row, strict=True):
-                values.append(value)
+def _columns(
+    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
+) -> dict[str, list[Any]]:
+    """Columns of a job file; rows step by step, joint by joint."""
+    names = ("test", "step", "largest_load", "joint", "status", "message")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    motions = []
+    for test, ends in tests:
+        for step, (motion, status, message) in zip(test.case.steps[test.stored], ends, strict=True):
+            same = (test.case.test, step.step, step.step == test.largest)
+            for name, value in zip(names[:3], same, strict=True):
+                columns[name] += [value] * len(joints)
+            columns["joint"] += joints
+            columns["status"] += [status.value] * len(joints)
+            columns["message"] += [message] * len(joints)
+            motions.append(motion)
+    predicted = np.concatenate(motions).T
+    return {
+        **columns,
+        **dict(zip([f"predicted_{c}" for c in COORDINATE_COLUMNS], predicted, strict=True)),
+    }
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,14 +126,14 @@ def test_levels_and_factors_make_the_stiffness_sets(tmp_path: Path) -> None:
 
 
 def moved(root: Path, pose: int = 0, stiffness: int = 0, specimen: str = "a") -> pd.DataFrame:
-    """Rows of one pose and stiffness set."""
+    """Rows of one job."""
     frames, sets, output = (str(root / f"{name}.parquet") for name in ("frames", "sets", "out"))
     load_steps.asked_tests.cache_clear()  # a test changes its study in no time
     sample_frames.sample_frames(str(root), STUDY, specimen, frames)
     draw_stiffness.draw_stiffness(str(root), STUDY, sets)
-    simulate.run(str(root), STUDY, frames, sets, specimen, f"{pose:04d}", output)
-    rows = read_frame(output)
-    return rows[rows["stiffness"] == stiffness].reset_index(drop=True)
+    place = (specimen, f"{pose:04d}", f"{stiffness:02d}")
+    simulate.run(str(root), STUDY, frames, sets, *place, output)
+    return read_frame(output)
 
 
 def test_joints_of_a_straight_chain_turn_by_moment_over_stiffness(tmp_path: Path) -> None:
