@@ -49,7 +49,6 @@ def test_counts_are_those_of_the_study_that_comes_along() -> None:
         assert numbers(r"(\d+) plausible", page) == poses
     assert numbers(r"stiffness over (\d+) joint poses", README) == poses
     assert numbers(r"All (\d+) fits end", README) == poses
-    assert numbers(r"calibrate \d+/(\d+)", TUTORIAL) == poses
     paper = published("gould_2024a")["counts"]
     kept = paper["pose_samples_successful"]
     assert numbers(r"the paper kept (\d+) of \d+", README) == {float(kept)}
@@ -94,9 +93,6 @@ def test_mutants_are_counted() -> None:
 
 
 def test_times_are_those_that_were_measured() -> None:
-    (cold,) = [row for row in bench("whole_study")["study"] if "cold" in row["what"]]
-    for page in (README, TUTORIAL):
-        assert numbers(r"took (\d+) s on two cores", page) == {round(cold["wall_s"])}
     assert numbers(r"(\d+) unknowns, ", README) == {18.0}
     fitted = bench("cohort")["specimen"]
     assert "fit of 18 stiffnesses" in fitted["what"]

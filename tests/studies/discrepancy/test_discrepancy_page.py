@@ -49,12 +49,6 @@ NOWHERE = pd.DataFrame()
 FIGURES = [figure.name for figure in KIND.figures]
 
 
-@pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A project with a study; verdicts are written beside it, over one another."""
-    return project(tmp_path_factory.mktemp("page"))
-
-
 @cache
 def study_of(root: Path) -> Any:
     return check(root, STUDY)

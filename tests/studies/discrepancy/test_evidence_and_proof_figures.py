@@ -54,7 +54,7 @@ def test_the_best_form_of_an_effect_stands_for_it() -> None:
     assert first.shown["marker_bias"] == 0.4  # of the screen alone
 
 
-def test_an_effect_whose_refits_all_failed_is_marked(tmp_path: Path) -> None:
+def test_an_effect_whose_refits_all_failed_is_marked(root: Path) -> None:
     failed = looked("refit 1", "", marker_bias=np.nan)
     first, *_ = rounds(search_of(SEARCH.iloc[1:], failed))
     assert bool(first.evidence.loc["marker_bias", "no_fit"])
@@ -65,7 +65,7 @@ def test_an_effect_whose_refits_all_failed_is_marked(tmp_path: Path) -> None:
     ]
     tried = screened.assign(stage="refit 1", log_evidence=np.nan, status="not_converged")
     words = said(
-        drawn("evidence_by_round", tmp_path, "NAMED", candidates=pd.concat([candidates, tried]))
+        drawn("evidence_by_round", root, "NAMED", candidates=pd.concat([candidates, tried]))
     )
     assert "(3.7)" in words
     assert "no refit of it has a result" in words
@@ -122,7 +122,7 @@ def test_nothing_tried_is_no_round() -> None:
 
 
 @sweep("many", [3, 20])
-def test_the_matrix_has_every_effect_with_evidence(many: int, tmp_path: Path) -> None:
+def test_the_matrix_has_every_effect_with_evidence(many: int, root: Path) -> None:
     candidates = frames("NAMED")["candidates"]
     again = [
         candidates.assign(
@@ -135,7 +135,7 @@ def test_the_matrix_has_every_effect_with_evidence(many: int, tmp_path: Path) ->
     words = said(
         drawn(
             "evidence_by_round",
-            tmp_path,
+            root,
             "NAMED",
             candidates=pd.concat([candidates, quiet, *again]),
         )
@@ -164,37 +164,37 @@ def marked_worse(figure: Figure) -> list[Text]:
     return [text for axis in figure.axes for text in axis.texts if text.get_text() == "worse"]
 
 
-def test_a_fold_that_became_worse_is_marked(tmp_path: Path) -> None:
+def test_a_fold_that_became_worse_is_marked(root: Path) -> None:
     held = frames("NAMED")["held_out"]
-    assert not marked_worse(drawn("held_out_by_test", tmp_path, "NAMED"))
+    assert not marked_worse(drawn("held_out_by_test", root, "NAMED"))
     held.loc[0, "worse"] = True
-    figure = drawn("held_out_by_test", tmp_path, "NAMED", held_out=held)
+    figure = drawn("held_out_by_test", root, "NAMED", held_out=held)
     (marked,) = marked_worse(figure)
     assert marked.get_fontweight() == "bold"
     assert "97 % closed" in said(figure)
 
 
-def test_a_fold_that_noise_explains_is_no_proof(tmp_path: Path) -> None:
+def test_a_fold_that_noise_explains_is_no_proof(root: Path) -> None:
     held = frames("NAMED")["held_out"]
     held["gap_base_low"] = 0.0
-    words = said(drawn("held_out_by_test", tmp_path, "NAMED", held_out=held))
+    words = said(drawn("held_out_by_test", root, "NAMED", held_out=held))
     assert "noise may be all" in words
     assert "closed" not in words
 
 
-def test_intervals_are_drawn_where_they_are(tmp_path: Path) -> None:
+def test_intervals_are_drawn_where_they_are(root: Path) -> None:
     held = frames("NAMED")["held_out"]
-    figure = drawn("held_out_by_test", tmp_path, "NAMED", held_out=held)
+    figure = drawn("held_out_by_test", root, "NAMED", held_out=held)
     lines = [line.get_xdata() for axis in figure.axes for line in axis.lines]
     ends = held[["gap_base_low", "gap_base_high"]].iloc[0].to_list()
     assert any(np.allclose(x, ends) for x in lines if len(x) == 2)
 
 
-def test_a_fold_without_a_result_tells_why(tmp_path: Path) -> None:
+def test_a_fold_without_a_result_tells_why(root: Path) -> None:
     held = frames("NAMED")["held_out"]
     gaps = [name for name in held.columns if name.startswith("gap_")]
     held.loc[0, [*gaps, "closed"]] = np.nan
     held.loc[0, ["status", "message"]] = ["unstable", "it tips over"]
     assert "no result: it tips over" in said(
-        drawn("held_out_by_test", tmp_path, "NAMED", held_out=held)
+        drawn("held_out_by_test", root, "NAMED", held_out=held)
     )

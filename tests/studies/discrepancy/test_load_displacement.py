@@ -116,35 +116,35 @@ def test_a_jump_to_the_other_side_starts_anew_at_zero() -> None:
     assert alone.tolist() == [0]
 
 
-def test_axes_have_the_fields_words_and_units(tmp_path: Path) -> None:
-    words = said(drawn("load_displacement", tmp_path, "NAMED"))
+def test_axes_have_the_fields_words_and_units(root: Path) -> None:
+    words = said(drawn("load_displacement", root, "NAMED"))
     assert "base off by" in words
     assert "model with the effects" in words
     assert "unloading" not in words
     gap = frames("NAMED")["gap"]
-    figure = drawn("load_displacement", tmp_path, "NAMED", gap=gap)
+    figure = drawn("load_displacement", root, "NAMED", gap=gap)
     labels = {axis.get_ylabel() for axis in figure.axes if axis.get_visible()}
     assert "flexion–extension moment (N m)" in labels
     sheared = gap.assign(unit="mm", coordinate=gap["coordinate"].replace({"extension": "anterior"}))
-    figure = drawn("load_displacement", tmp_path, "NULL", gap=sheared)
+    figure = drawn("load_displacement", root, "NULL", gap=sheared)
     axis = next(one for one in figure.axes if "translation" in one.get_xlabel())
     assert axis.get_xlabel() == "anterior–posterior translation (mm)"
     assert axis.get_ylabel() == "anterior–posterior force (N)"
 
 
-def test_a_loop_is_drawn_with_both_branches(tmp_path: Path) -> None:
+def test_a_loop_is_drawn_with_both_branches(root: Path) -> None:
     gap = frames("NAMED")["gap"]
     load = -np.array([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 0.5])[gap["step"]]
     looped = gap.assign(load=np.where(gap["load"] != 0.0, load, 0.0), with_effects=gap["base"])
-    words = said(drawn("load_displacement", tmp_path, "NULL", gap=looped))
+    words = said(drawn("load_displacement", root, "NULL", gap=looped))
     assert "measured, loading" in words
     assert "measured, unloading" in words
     assert "model with the effects" not in words
 
 
-def test_nothing_to_draw_is_said(tmp_path: Path) -> None:
+def test_nothing_to_draw_is_said(root: Path) -> None:
     gap = frames("NAMED")["gap"].assign(base=np.nan, with_effects=np.nan)
-    assert "no pose" in said(drawn("load_displacement", tmp_path, "NAMED", gap=gap))
+    assert "no pose" in said(drawn("load_displacement", root, "NAMED", gap=gap))
 
 
 def test_a_line_that_comes_back_on_itself_is_drawn_once() -> None:
@@ -156,11 +156,11 @@ def test_a_line_that_comes_back_on_itself_is_drawn_once() -> None:
     assert drawn_once(load, loop, way).tolist() == way.tolist()
 
 
-def test_a_gap_aside_of_the_load_is_pointed_to(tmp_path: Path) -> None:
+def test_a_gap_aside_of_the_load_is_pointed_to(root: Path) -> None:
     gap = frames("NULL")["gap"]
-    assert "aside of the load" not in said(drawn("load_displacement", tmp_path, "NULL", gap=gap))
+    assert "aside of the load" not in said(drawn("load_displacement", root, "NULL", gap=gap))
     bent = (gap["test"] == "flexion") & (gap["coordinate"] == "right_bending")
     coupled = gap.assign(measured=gap["measured"].where(~bent, gap["measured"] + 1.0))
-    words = said(drawn("load_displacement", tmp_path, "NULL", gap=coupled))
+    words = said(drawn("load_displacement", root, "NULL", gap=coupled))
     assert "aside of the load" in words
     assert "lateral bending, in flexion" in words

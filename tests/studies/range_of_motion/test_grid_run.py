@@ -26,7 +26,7 @@ def table(project: Project, name: str) -> pd.DataFrame:
 
 
 def test_every_pose_is_tested_with_every_stiffness(eight: Project) -> None:
-    assert len(jobs(set(eight.files()))) == 2 * 4
+    assert len(jobs(set(eight.files()))) == 2 * 4 * 4
     rows = table(eight, "range_of_motion")
     assert len(rows) == 32 * 2 * 3
     assert set(rows["stiffness"]) == {0, 1, 2, 3}

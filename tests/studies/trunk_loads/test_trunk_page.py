@@ -189,7 +189,7 @@ def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
         pictures.append(places[0])
     page = tmp_path / "report.html"
     captions = [str(caption("trunk_loads", figure.name)) for figure in KIND.figures]
-    report.run(str(tmp_path), "s", list(files.values()), pictures, captions, str(page))
+    report.run(str(tmp_path), "s", "full", list(files.values()), pictures, captions, str(page))
     text = page.read_text(encoding="utf-8")
     for figure in KIND.figures:
         assert f"{figure.title}." in text
