@@ -90,7 +90,7 @@ def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
     assert "cohort_stiffness/findings.parquet" in of["cohort_stiffness"]
     assert not {name for name in of["cohort_stiffness"] if "=" in name}
     of_b = {name for name in before if name.startswith("range_of_motion/jobs/specimen=b/")}
-    assert len(of_b) == 4
+    assert len(of_b) == 16
     assert of_jobs(of["range_of_motion"]) == of_b | {"range_of_motion/frames/specimen=b.parquet"}
     batches = {name for name in of_jobs(of["global_sensitivity"]) if "/jobs/" in name}
     assert batches == {BATCH}
