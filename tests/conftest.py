@@ -15,20 +15,6 @@ settings.load_profile("same everywhere")
 """Drawn examples are the same on each machine, and a slow one fails none of them."""
 
 
-FULL_FOR_NOW = frozenset(
-    [
-        "test_investigation_edges",
-        "test_tracking_figures",
-        "test_tracking_findings",
-        "test_tracking_checks",
-        "test_tracking_page",
-        "test_trunk_figures",
-        "test_discrepancy_page",
-    ]
-)
-"""Files of 50 s and more: `full` until each is made light. The list must become empty."""
-
-
 SPREAD = frozenset({"test_stack", "test_supports", "test_plausibility"})
 """Long files whose tests share nothing: each test may go to another worker."""
 
@@ -51,8 +37,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     items.sort(key=short)
     for item in items:
-        if item.path.stem in FULL_FOR_NOW:
-            item.add_marker(pytest.mark.full)
         looks_at = {"eight", "toy"}.intersection(getattr(item, "fixturenames", ()))
         if item.path.stem not in SPREAD:
             item.add_marker(pytest.mark.xdist_group(min(looks_at, default=item.path.stem)))

@@ -22,6 +22,8 @@ from spinepipe.marks import read_mark
 PROJECT = ("Snakefile", "requirements.lock", "config", "profiles", "spinepipe", "workflow")
 """Files and folders of a project on which all results may hang."""
 
+RESULTS = "results"
+
 Stamps = dict[str, list[int]]
 """Size in bytes and time of change in ns, by path."""
 
@@ -45,14 +47,15 @@ def stamps(places: Iterable[str]) -> Stamps:
 
 
 def inputs() -> Stamps:
-    """What results may hang on: the project, and data that study files name by a path."""
+    """What results may hang on: the project, and data elsewhere that study files name by a path."""
     named = []
     for path in sorted(Path("config/studies").glob("*.yaml")):
         with suppress(OSError, ValueError, yaml.YAMLError):  # told by who reads it in earnest
             study = yaml.safe_load(path.read_text(encoding="utf-8"))
             base = study.get("base") or {}
             named += [study.get("cohort"), base.get("model")]
-    return stamps([*PROJECT, *(str(name) for name in named if name and os.sep in str(name))])
+    paths = (str(name) for name in named if name and os.sep in str(name))
+    return stamps([*PROJECT, *(path for path in paths if not path.startswith(RESULTS + os.sep))])
 
 
 def is_up_to_date(record: Path) -> bool:
@@ -75,7 +78,7 @@ def main() -> None:
     begun = inputs()
     status = subprocess.run(command, check=False).returncode
     if status == 0:
-        results = {path: of for path, of in stamps(["results"]).items() if read_mark(path)}
+        results = {path: of for path, of in stamps([RESULTS]).items() if read_mark(path)}
         with suppress(OSError), appearing(record) as temporary:
             temporary.write_text(json.dumps({"inputs": begun, "results": results}), "utf-8")
     raise SystemExit(status)

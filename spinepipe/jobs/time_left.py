@@ -22,6 +22,8 @@ LAST_RUN = Path(".snakemake") / "job_seconds.csv"
 
 MACHINE = "(machine)"
 _UNKNOWN_S = 0.5
+_TRIED_S = 2.0
+"""What is expected of a rule counts as so many seconds of jobs: the first ones load modules."""
 _SECONDS_BETWEEN_LINES = 2.0
 
 
@@ -117,12 +119,13 @@ class TimeLeft:
 
     def seconds_left(self, totals: Mapping[str, int]) -> float:
         """Wall time until the jobs of `totals` that are not finished are, s."""
-        foreseen = sum(self._done[rule] * self._cost(rule) for rule in self._done)
-        slower = sum(self._took.values()) / foreseen if foreseen else self._slower
+        foreseen = _TRIED_S + sum(self._done[rule] * self._cost(rule) for rule in self._done)
+        slower = (_TRIED_S * self._slower + sum(self._took.values())) / foreseen
         left = 0.0
         for rule, total in totals.items():
             done = self._done[rule]
-            each = self._took[rule] / done if done else self._cost(rule) * slower
+            cost = self._cost(rule)
+            each = (_TRIED_S * slower + self._took[rule]) / (_TRIED_S / cost + done)
             left += max(0, total - done) * each
         return left / self._cores
 

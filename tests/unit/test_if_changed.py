@@ -26,11 +26,14 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[
     (tmp_path / "spinepipe/code.py").write_text("x = 1\n")
     (tmp_path / "config/studies/study.yaml").write_text(f"cohort: {tmp_path}/lab\n")
     write_marked("<p>", tmp_path / RESULT, "0" * 64)
+    base = "base: {model: results/study/model.yaml}\n"
+    (tmp_path / "config/studies/on_it.yaml").write_text(f"cohort: here\n{base}")
 
     def run(ends_with: int = 0) -> tuple[int, bool]:
         ran = tmp_path / "ran"
         ran.unlink(missing_ok=True)
-        command = [sys.executable, "-c", f"open('ran', 'w'); raise SystemExit({ends_with})"]
+        made = "open('ran', 'w'); open('results/study/model.yaml', 'w')"  # a base for another study
+        command = [sys.executable, "-c", f"{made}; raise SystemExit({ends_with})"]
         monkeypatch.setattr(sys, "argv", ["if_changed", "all", *command])
         try:
             if_changed.main()

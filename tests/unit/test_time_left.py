@@ -2,6 +2,7 @@
 that are counted twice, and a clock that stands at what another machine needed."""
 
 import io
+import itertools
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ EXPECTED = {"fit": 2.0, "draw": 1.0}
 
 
 def left(cores: int = 2, stream: io.StringIO | None = None) -> TimeLeft:
-    ticks = iter(range(0, 1000, 10))
+    ticks = itertools.count(0, 10)
     return TimeLeft(lambda: TOTALS, EXPECTED, cores, stream or io.StringIO(), lambda: next(ticks))
 
 
@@ -22,12 +23,19 @@ def test_before_the_first_job_costs_of_all_rules_count() -> None:
     assert left(cores=1).ahead() == "14 jobs, about 24 s"
 
 
-def test_what_jobs_took_here_stands_for_the_rest_of_their_rule_and_scales_the_others() -> None:
+def test_what_jobs_took_here_soon_stands_for_the_rest_of_their_rule_and_scales_the_others() -> None:
     run = left()
-    run.finish("fit", 6.0)
-    run.finish("fit", 2.0)
-    # Fits take 4 s, twice as long as expected, and so will the figures.
-    assert run.seconds_left(TOTALS) == pytest.approx((8 * 4.0 + 4 * 2.0) / 2)
+    many = {"fit": 2000, "draw": 4}
+    for _ in range(1000):
+        run.finish("fit", 4.0)
+    # Fits take twice as long as expected, and so will the figures.
+    assert run.seconds_left(many) == pytest.approx((1000 * 4.0 + 4 * 2.0) / 2, rel=0.01)
+
+
+def test_one_slow_first_job_does_not_make_hours_of_many_short_ones() -> None:
+    run = TimeLeft(lambda: {}, {"simulate": 0.01}, 1, io.StringIO())
+    run.finish("simulate", 2.0)
+    assert 50.0 < run.seconds_left({"simulate": 5001}) < 200.0
 
 
 def test_a_line_tells_the_whole_run() -> None:

@@ -118,7 +118,9 @@ def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
         pictures.append(places[0])
     page = root / "report.html"
     captions = [str(caption("scoliosis", figure.name)) for figure in KIND.figures]
-    report.run(str(root), "s", [str(f) for f in files.values()], pictures, captions, str(page))
+    report.run(
+        str(root), "s", "full", [str(f) for f in files.values()], pictures, captions, str(page)
+    )
     text = page.read_text(encoding="utf-8")
     for figure in KIND.figures:
         assert f"{figure.title}." in text

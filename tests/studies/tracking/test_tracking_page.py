@@ -233,10 +233,10 @@ def test_a_remark_is_text_and_nothing_else() -> None:
 def test_figures_of_calibrations_are_there_where_there_are_any() -> None:
     size = Size(1)
     files = KIND.files.of(study_of(size), cohort_of(size))
-    assert set(files.figures) == {figure.name for figure in KIND.figures}
+    assert set(files.figures()) == {figure.name for figure in KIND.figures}
     without = Size(1, approaches=("ik", "optk_generic"))
     files = KIND.files.of(study_of(without), cohort_of(without))
-    assert "stiffness_by_level" not in files.figures
+    assert "stiffness_by_level" not in files.figures()
 
 
 def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
@@ -258,7 +258,7 @@ def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
         pictures.append(places[0])
     page = tmp_path / "report.html"
     captions = [str(caption("tracking", figure.name)) for figure in KIND.figures]
-    report.run(str(tmp_path), "s", list(files.values()), pictures, captions, str(page))
+    report.run(str(tmp_path), "s", "full", list(files.values()), pictures, captions, str(page))
     text = page.read_text(encoding="utf-8")
     for figure in KIND.figures:
         assert f"{figure.title}." in text
