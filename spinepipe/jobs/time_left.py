@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TextIO
 
+from spinepipe.files import appearing
+
 SHIPPED = Path("workflow") / "job_seconds.csv"
 """Seconds of one job by rule, measured by `snakemake -j2 all`; rule `(machine)` is `probe`."""
 
@@ -33,8 +35,7 @@ def costs(root: Path) -> dict[str, float]:
     for path in (root / SHIPPED, root / LAST_RUN):
         if path.is_file():
             with path.open(encoding="utf-8", newline="") as file:
-                rows = [row for row in csv.reader(file) if not row[0].startswith("#")]
-            found.update({rule: float(seconds) for rule, seconds in rows[1:]})
+                found |= {row["rule"]: float(row["seconds"]) for row in csv.DictReader(file)}
     return found
 
 
@@ -136,7 +137,10 @@ class TimeLeft:
         """Write down what jobs took, for the next run here."""
         took = {rule: self._took[rule] / done for rule, done in self._done.items()}
         known = {**costs(root), **took, MACHINE: probe()}
-        with (root / LAST_RUN).open("w", encoding="utf-8", newline="") as file:
+        with (
+            appearing(root / LAST_RUN) as temporary,
+            temporary.open("w", encoding="utf-8", newline="") as file,
+        ):
             csv.writer(file, lineterminator="\n").writerows(
                 [("rule", "seconds"), *((rule, f"{known[rule]:.3g}") for rule in sorted(known))]
             )
