@@ -33,6 +33,7 @@ from spinepipe.statics.equilibrium import (
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
+from spinepipe.statics.many.dynamics import add_cross
 from spinepipe.statics.many.survey import Plain, compiled, placed
 from spinepipe.status import Ended
 
@@ -110,14 +111,6 @@ Prescription = Place | Tilt
 
 
 @compiled
-def _add_cross(a: Array, b: Array, factor: float, out: Array) -> None:
-    """Add a x b times a factor to out, (3,) each."""
-    out[0] += factor * (a[1] * b[2] - a[2] * b[1])
-    out[1] += factor * (a[2] * b[0] - a[0] * b[2])
-    out[2] += factor * (a[0] * b[1] - a[1] * b[0])
-
-
-@compiled
 def _pull(
     is_tilt: bool, vectors: Array, turned: Array, shifted: Array, wrench: Array, by_twist: Array
 ) -> float:
@@ -139,7 +132,7 @@ def _pull(
         second += now[r] * vectors[2, r]
     if not is_tilt:
         force = vectors[1]
-        _add_cross(now, force, 1.0, wrench[:3])
+        add_cross(now, force, 1.0, wrench[:3])
         for r in range(3):
             wrench[3 + r] = force[r]
             by_twist[r, r] -= first  # (w x now) x force = now (force . w) - w (force . now)
@@ -147,19 +140,19 @@ def _pull(
                 by_twist[r, c] += now[r] * force[c]
             arm[:] = 0.0
             arm[r] = 1.0
-            _add_cross(arm, force, 1.0, by_twist[:, 3 + r])
+            add_cross(arm, force, 1.0, by_twist[:, 3 + r])
         return first
     square = first * first + second * second
     gradient, moved, bent = np.empty(3), np.empty(3), np.empty(3)
     for r in range(3):  # of the angle by the line
         gradient[r] = (first * vectors[2, r] - second * vectors[1, r]) / square
-    _add_cross(now, gradient, 1.0, wrench[:3])
+    add_cross(now, gradient, 1.0, wrench[:3])
     mixed, twice = second * second - first * first, 2.0 * first * second
     for k in range(3):  # turning about axis k moves the line, and the gradient with it
         arm[:] = 0.0
         arm[k] = 1.0
         moved[:] = 0.0
-        _add_cross(arm, now, 1.0, moved)
+        add_cross(arm, now, 1.0, moved)
         along, aside = 0.0, 0.0
         for r in range(3):
             along += moved[r] * vectors[1, r]
@@ -167,8 +160,8 @@ def _pull(
         for r in range(3):
             to_up, to_aside = twice * along + mixed * aside, mixed * along - twice * aside
             bent[r] = (to_up * vectors[1, r] + to_aside * vectors[2, r]) / (square * square)
-        _add_cross(moved, gradient, 1.0, by_twist[:, k])
-        _add_cross(now, bent, 1.0, by_twist[:, k])
+        add_cross(moved, gradient, 1.0, by_twist[:, k])
+        add_cross(now, bent, 1.0, by_twist[:, k])
     return np.arctan2(second, first)
 
 
@@ -210,9 +203,9 @@ def _assemble(motion: Plain, asked: Plain, holder: Plain, held: Plain, found: Pl
                     continue
                 s = axes[free[i] // 6, free[i] % 6]
                 row[:] = 0.0
-                _add_cross(s[:3], wrench[:3], 1.0, row[:3])
-                _add_cross(s[3:], wrench[3:], 1.0, row[:3])
-                _add_cross(s[:3], wrench[3:], 1.0, row[3:])
+                add_cross(s[:3], wrench[:3], 1.0, row[:3])
+                add_cross(s[3:], wrench[3:], 1.0, row[:3])
+                add_cross(s[:3], wrench[3:], 1.0, row[3:])
                 work = 0.0
                 for c in range(6):
                     work += s[c] * wrench[c]

@@ -181,7 +181,7 @@ def _unfold(seen: Plain, found: Array) -> None:
 
 
 @compiled
-def _add_cross(a: Array, b: Array, factor: float, out: Array) -> None:
+def add_cross(a: Array, b: Array, factor: float, out: Array) -> None:
     """Add a x b times a factor to out, (3,) each."""
     out[0] += factor * (a[1] * b[2] - a[2] * b[1])
     out[1] += factor * (a[2] * b[0] - a[0] * b[2])
@@ -200,9 +200,9 @@ def _whirl(axes: Array, inertias: Array, rates: Array, found: Array) -> None:
         for j in range(joints):
             for k in range(6):
                 s, rate = axes[n, j, k], rates[n, j, k]
-                _add_cross(twist[:3], s[:3], rate, change[:3])
-                _add_cross(twist[:3], s[3:], rate, change[3:])
-                _add_cross(twist[3:], s[:3], rate, change[3:])
+                add_cross(twist[:3], s[:3], rate, change[:3])
+                add_cross(twist[:3], s[3:], rate, change[3:])
+                add_cross(twist[3:], s[:3], rate, change[3:])
                 for r in range(6):
                     twist[r] += rate * s[r]
             for r in range(6):
@@ -211,9 +211,9 @@ def _whirl(axes: Array, inertias: Array, rates: Array, found: Array) -> None:
                 for c in range(6):
                     momentum[r] += inertias[n, j, r, c] * twist[c]
                     wrenches[j, r] += inertias[n, j, r, c] * change[c]
-            _add_cross(twist[:3], momentum[:3], 1.0, wrenches[j, :3])
-            _add_cross(twist[3:], momentum[3:], 1.0, wrenches[j, :3])
-            _add_cross(twist[:3], momentum[3:], 1.0, wrenches[j, 3:])
+            add_cross(twist[:3], momentum[:3], 1.0, wrenches[j, :3])
+            add_cross(twist[3:], momentum[3:], 1.0, wrenches[j, :3])
+            add_cross(twist[:3], momentum[3:], 1.0, wrenches[j, 3:])
         beyond[:] = 0.0
         for j in range(joints - 1, -1, -1):
             for r in range(6):
