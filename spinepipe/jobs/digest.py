@@ -4,13 +4,14 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.files import Stamp, stamp
 from spinepipe.jobs.code import code_digest
-from spinepipe.marks import KEY
+from spinepipe.marks import KEY, read_mark
 from spinepipe.studies.registry import PACKAGE, kind_of, place_of
 from spinepipe.studies.study import Study
 
@@ -69,6 +70,16 @@ def digest_of(
         _data_digest(cohort, specimens),
         list(others),
     )
+
+
+def mark_of(path: str) -> str:
+    """The mark of a file that a job reads, for the mark of what it writes."""
+    return _mark(stamp(path))
+
+
+@lru_cache(maxsize=64)
+def _mark(where: Stamp) -> str:
+    return read_mark(where[0])
 
 
 def figure_digest(figure: str, study: Study, cohort: Cohort) -> str:

@@ -124,18 +124,20 @@ class TimeLeft:
         slower = (_TRIED_S * self._slower + sum(self._took.values())) / foreseen
         left = 0.0
         for rule, total in totals.items():
-            done = self._done[rule]
-            cost = self._cost(rule)
-            each = (_TRIED_S * slower + self._took[rule]) / (_TRIED_S / cost + done)
-            left += max(0, total - done) * each
+            left += max(0, total - self._done[rule]) * self._each(rule, slower)
         return left / self._cores
+
+    def _each(self, rule: str, slower: float = 1.0) -> float:
+        """Seconds of a job: what is expected, the more corrected the longer jobs have run."""
+        jobs_expected = _TRIED_S / self._cost(rule)
+        return (_TRIED_S * slower + self._took[rule]) / (jobs_expected + self._done[rule])
 
     def _cost(self, rule: str) -> float:
         return self._expected.get(rule, _UNKNOWN_S)
 
     def keep(self, root: Path) -> None:
         """Write down what jobs took, for the next run here."""
-        took = {rule: self._took[rule] / done for rule, done in self._done.items()}
+        took = {rule: self._each(rule) for rule in self._done}
         known = {**costs(root), **took, MACHINE: probe()}
         with (
             appearing(root / LAST_RUN) as temporary,

@@ -63,6 +63,12 @@ class StudyFiles(ABC):
     full: ClassVar[tuple[str, ...]] = ()
     """Tables that `full` alone makes, with the figures drawn from them and a page, full.html."""
 
+    known_by_mark: ClassVar[tuple[str, ...]] = ()
+    """Tables of so many job files that Snakemake is told only of those without the right mark.
+
+    The marks of these files hold those of what they are made from.
+    """
+
     told_in_report: ClassVar[tuple[str, ...]] = ()
     """Files other than tables and figures that the report reads."""
 

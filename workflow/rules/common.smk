@@ -178,11 +178,17 @@ def base_model(wildcards):
 
 
 def jobs_of_block(wildcards):
-    """The job files of one block of a table."""
+    """The job files of one block of a table; of some tables those that are yet to be made."""
     for wait in WAITING.get(wildcards.table, ()):
         wait(wildcards)
-    place = wildcards.table, wildcards.specimen, wildcards.block
-    return layout(wildcards.study).job_files(*place)
+    study, table = wildcards.study, wildcards.table
+    place = table, wildcards.specimen, wildcards.block
+    files = layout(study).job_files(*place)
+    forced = workflow.dag_settings.forceall or workflow.dag_settings.forcerun
+    if forced or table not in layout(study).known_by_mark:
+        return files
+    wanted = expected(study).of_part
+    return [file for file in files if mark_in(file) != wanted(table, file)]
 
 
 # What must be done before the job files of a table are known, by table: functions of wildcards.

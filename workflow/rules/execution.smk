@@ -165,12 +165,15 @@ def arguments_of(wildcards, input, output):
 
 def collect(rule, wildcards, input, output, log):
     """Join the rows of many files into one table."""
-    table = wildcards.table
-    marks = [expected(wildcards.study).of_part(table, path) for path in plain(input)]
+    table, files = wildcards.table, plain(input)
+    if "block" in wildcards.keys():
+        place = table, wildcards.specimen, wildcards.block
+        files = layout(wildcards.study).job_files(*place)
+    marks = [expected(wildcards.study).of_part(table, path) for path in files]
     arguments = {
         "kind": load(wildcards.study)[0].kind,
         "table": table,
-        "inputs": plain(input),
+        "inputs": files,
         "expected": marks,
         "output": plain(output[0]),
     }

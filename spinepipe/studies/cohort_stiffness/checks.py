@@ -9,7 +9,12 @@ from spinepipe.documents.yaml_text import Document
 from spinepipe.effects import create
 from spinepipe.model.file import read_model
 from spinepipe.problems import InputError, Problem, one_of
-from spinepipe.studies.cohort_stiffness.representations import NUISANCE, STIFFENING, named
+from spinepipe.studies.cohort_stiffness.representations import (
+    NUISANCE,
+    STIFFENING,
+    STIFFENING_EFFECT,
+    named,
+)
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
     ALL_BUT,
@@ -18,7 +23,6 @@ from spinepipe.studies.cohort_stiffness.settings import (
     SEXES,
     CohortStiffness,
 )
-from spinepipe.studies.cohort_stiffness.stiffening import EFFECT
 from spinepipe.studies.places import at, readings, unknown_levels, unknown_tests
 from spinepipe.units import ROTATIONS
 
@@ -175,14 +179,17 @@ def check_one_stiffening(
         effects = read_model(path).effects
     except InputError:
         return  # told by the check of the file itself
-    if any(one.effect == EFFECT and _coordinate(one.options) in study.free for one in effects):
-        found = f"{one_of(asked)}, and {EFFECT} in the base model too"
+    if any(
+        one.effect == STIFFENING_EFFECT and _coordinate(one.options) in study.free
+        for one in effects
+    ):
+        found = f"{one_of(asked)}, and {STIFFENING_EFFECT} in the base model too"
         allowed = "one of them: two laws that scale one bushing cannot be told apart"
         remedy = "leave these representations out, or take the effect out of the model file"
         yield Problem(*at(document, "representations"), found, allowed, remedy)
 
 
 def _coordinate(options: Mapping[str, Any] | None) -> str:
-    effect: Any = create(EFFECT, options)
+    effect: Any = create(STIFFENING_EFFECT, options)
     name: str = effect.coordinate
     return name

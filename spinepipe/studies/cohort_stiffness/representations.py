@@ -167,6 +167,9 @@ ASKED_FOR = tuple(name for name in FITTED if _NAMED[name].stiffens or name in NU
 UNLESS_ASKED = tuple(name for name in FITTED if name not in ASKED_FOR)
 """Those that are fitted where a study does not choose."""
 
+STIFFENING_EFFECT = "nonlinear_stiffening"
+"""Of these representations, beside the bushing."""
+
 STIFFENING = tuple(name for name in FITTED if _NAMED[name].stiffens)
 """Those whose resistance grows as the joint moves."""
 

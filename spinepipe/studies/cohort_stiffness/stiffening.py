@@ -19,15 +19,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import FreeParameter, free_parameters, moved
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.representations import named
+from spinepipe.studies.cohort_stiffness.representations import STIFFENING_EFFECT, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables_of_laws import GROWTH_CELLS, SPREAD_CELLS
 from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
-
-EFFECT = "nonlinear_stiffening"
 
 FIRST = 1
 """Place of the first of these effects in a model: the bushing they scale is before them."""
@@ -97,7 +95,7 @@ def _number(value: float) -> float | None:
 
 
 def _declared(coordinate: str) -> Any:
-    (parameter,) = create(EFFECT, {"coordinate": coordinate}).parameters
+    (parameter,) = create(STIFFENING_EFFECT, {"coordinate": coordinate}).parameters
     return parameter
 
 
@@ -108,7 +106,7 @@ def laws(study: CohortStiffness, growth: Array | None) -> tuple[ScopedEffect, ..
     joints = tuple(range(len(growth)))
     return tuple(
         ScopedEffect(
-            create(EFFECT, {"coordinate": name}),
+            create(STIFFENING_EFFECT, {"coordinate": name}),
             joints,
             growth[:, [COORDINATES.index(name)]].copy(),
         )

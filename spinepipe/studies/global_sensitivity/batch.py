@@ -10,7 +10,6 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import read_mark
 from spinepipe.studies.global_sensitivity.drawn import drawn_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import Start, start_of
@@ -79,8 +78,3 @@ def base_stiffness(path: str) -> Array:
     found = rows[rows["joint"] == EVERY].set_index("coordinate")["stiffness"]
     values: Array = found[list(COORDINATES)].to_numpy(float)
     return values
-
-
-def marks_of_base(base: Sequence[str]) -> list[str]:
-    """The mark of the file of fitted stiffness: what is computed hangs on it."""
-    return [read_mark(path) for path in base]

@@ -5,12 +5,12 @@ from typing import Any
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, marks_of_base
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED
@@ -40,7 +40,8 @@ def run(
     rows.sort(key=lambda row: int(row["sample"]))
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("calibrate", settings, cohort, [specimen], size + marks_of_base(base))
+    read = [mark_of(path) for path in (design, *base)]
+    made_by = provenance("calibrate", settings, cohort, [specimen], size + read)
     write(to_arrow(TABLE, columns), output, made_by)
 
 

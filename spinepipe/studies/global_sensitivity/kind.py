@@ -50,6 +50,7 @@ class SensitivityFiles(StudyFiles):
     """
 
     joined = OF_JOBS
+    known_by_mark = ("responses", "calibrated")
     drawings = (
         Figure(
             "factor_indices",
@@ -123,10 +124,11 @@ class SensitivityFiles(StudyFiles):
 
 
 def _of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:
-    """How many samples one file holds, by the number of specimens, and the mark of the fit."""
+    """How many samples one file holds, by the number of specimens; marks of design and fit."""
+    design = expected.of_job("design", {})
     size = str(expected.study.batch_size(len(expected.files.specimens)))
     base = expected.of_job("base", place) if expected.study.is_fitted else None
-    return [size] if base is None else [size, base]
+    return [size, design] if base is None else [size, design, base]
 
 
 _DRAWING = ("factors", "design", "dummy", "samples_per_target")

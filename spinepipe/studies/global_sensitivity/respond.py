@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.many import ManySolved, solve_many
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, marks_of_base
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
@@ -42,7 +42,8 @@ def run(
     solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
     columns = _columns(one, cohort.joint_names, solved)
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    made_by = provenance("respond", settings, cohort, [specimen], size + marks_of_base(base))
+    read = [mark_of(path) for path in (design, *base)]
+    made_by = provenance("respond", settings, cohort, [specimen], size + read)
     by_engine = np.concatenate([many.by_engine for many in found])
     handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
     if by_engine.any():

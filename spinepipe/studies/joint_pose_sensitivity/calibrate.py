@@ -6,7 +6,7 @@ import numpy as np
 
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
@@ -28,7 +28,7 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
     write(
         to_arrow(CALIBRATIONS, columns),
         output,
-        provenance("calibrate", settings, cohort, [specimen]),
+        provenance("calibrate", settings, cohort, [specimen], [mark_of(poses)]),
     )
 
 

@@ -105,6 +105,7 @@ class Layout(StudyFiles):
 
     joined = OF_JOBS
     full = FULL
+    known_by_mark = ("calibrations", "simulations", "bootstrap")
     drawings = (
         Figure(
             "stiffness",
@@ -286,13 +287,24 @@ class Layout(StudyFiles):
         raise ValueError(f"{table} is not made of job files")
 
 
-def _set_simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
-    """A set of the ranking, where a pose is simulated with one."""
+def _landmarks(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The mark of the landmarks that joint frames are made of."""
+    return [expected.of_job("sample_landmarks", place)]
+
+
+def _frames(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The mark of the joint frames of a specimen."""
+    return [expected.of_job("build_models", place)]
+
+
+def _simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The mark of the joint frames, then that of the calibration or a set of the ranking."""
+    frames = _frames(expected, place)
     if place["stiffness"] == "calibrated":
-        return []
+        return [*frames, expected.of_job("calibrate", place)]
     best = os.path.join(expected.root, expected.files.folder, "best.json")
     chosen = place["specimen"], place["stiffness"]
-    return [ranked_set(best, *chosen) if is_whole(best) else ""]
+    return [*frames, ranked_set(best, *chosen) if is_whole(best) else ""]
 
 
 _SOLVING = ("loading", "settle_time_s")
@@ -325,14 +337,20 @@ _SAMPLED = (
         "build_models",
         "poses:build",
         ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
+        also=_landmarks,
     ),
-    Job("calibrate", many=True, ignores=ignoring("poses", *_SOLVING, *_GROUPING, *_PARTS)),
+    Job(
+        "calibrate",
+        many=True,
+        ignores=ignoring("poses", *_SOLVING, *_GROUPING, *_PARTS),
+        also=_frames,
+    ),
     Job("rank", ignores=ignoring("block", *_NOT_JUDGED)),
     Job(
         "simulate",
         many=True,
         ignores=ignoring("poses", "calibration", "stiffness", *_GROUPING, *_PARTS),
-        also=_set_simulated,
+        also=_simulated,
     ),
 )
 _ADDED = (

@@ -10,7 +10,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.designs import sample_landmarks
 from spinepipe.frames import zxy_angles
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -61,7 +61,7 @@ def build(root: str, study: str, landmarks: str, specimen: str, output: str) -> 
     rows = [row for rows in _poses(cohort, read_frame(landmarks)) for row in rows]
     names = [column.name for column in POSES.columns]
     columns = {name: [row[name] for row in rows] for name in names}
-    made_by = provenance("build_models", settings, cohort, [specimen])
+    made_by = provenance("build_models", settings, cohort, [specimen], [mark_of(landmarks)])
     write(to_arrow(POSES, columns), output, made_by)
 
 

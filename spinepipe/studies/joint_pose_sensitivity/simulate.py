@@ -13,7 +13,7 @@ from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import Program, System, settle
 from spinepipe.statics.many import Stack
@@ -66,8 +66,8 @@ def run(
         for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
     ]
     columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-    given = [] if calibration else [ranked_set(best, specimen, stiffness)]
-    made_by = provenance("simulate", settings, cohort, [specimen], given)
+    chosen = mark_of(calibration) if calibration else ranked_set(best, specimen, stiffness)
+    made_by = provenance("simulate", settings, cohort, [specimen], [mark_of(poses), chosen])
     write(to_arrow(TABLE, columns), output, made_by)
 
 

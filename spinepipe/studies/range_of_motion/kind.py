@@ -1,6 +1,8 @@
 """The kind range_of_motion: how far spines of known geometry move in tests that nobody did."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.kind import Job, Kind, ignoring
@@ -31,6 +33,7 @@ class RangeOfMotionFiles(StudyFiles):
     """The result files of one range-of-motion study."""
 
     joined = OF_JOBS
+    known_by_mark = _JOBS
     drawings = (
         Figure(
             "range_of_motion", "Range of motion", "figures.motion:levels_figure", ("rom_summary",)
@@ -89,6 +92,11 @@ class RangeOfMotionFiles(StudyFiles):
         return f"{self.folder}/jobs/{place}.parquet"
 
 
+def _drawn(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The marks of what is drawn: joint frames and stiffness sets."""
+    return [expected.of_job(job, place) for job in ("sample_frames", "draw_stiffness")]
+
+
 _MOVING = ("virtual_tests", "tests", "rows", "damping")
 _SETS = ("stiffness", "level_stiffness", "stiffness_sets", "stiffness_spread")
 _FRAMES = ("poses", "pose_sd")
@@ -107,7 +115,7 @@ KIND = Kind(
             ignores=ignoring(*_MOVING, *_FRAMES),
             header_alone=True,
         ),
-        Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES)),
+        Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES), also=_drawn),
         Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
         Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),

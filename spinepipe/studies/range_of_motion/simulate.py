@@ -13,7 +13,7 @@ from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics.many import Stack
@@ -63,7 +63,8 @@ def run(
         ]
     columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
     columns["stiffness"] = [int(stiffness)] * len(columns["test"])
-    made_by = provenance("simulate", settings, cohort, [specimen])
+    drawn = [mark_of(frames), mark_of(stiffness_sets)]
+    made_by = provenance("simulate", settings, cohort, [specimen], drawn)
     write(to_arrow(TABLE, columns), output, made_by)
 
 
