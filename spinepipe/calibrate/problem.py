@@ -257,6 +257,20 @@ def side_by_side(points: Sequence[tuple[int, Evaluator, Array]]) -> list[Evaluat
     return [one._known[x.tobytes()] for _, one, x in points]
 
 
+def among(evaluators: Sequence[Evaluator], asked: Sequence[tuple[int, Array]]) -> list[Evaluation]:
+    """The same for searches in lockstep, by the number of each among ``evaluators``."""
+    return side_by_side([(number, evaluators[number], x) for number, x in asked])
+
+
+def lead(points: Sequence[tuple[Evaluator, Array]]) -> None:
+    """Solve at once where loads lead models at x (m,), of evaluators that share a stack.
+
+    `Evaluator.on_record` and `Evaluator.start_at` then find it.
+    """
+    if points:
+        points[0][0]._solver.lead([(one.problem.model, x) for one, x in points])
+
+
 def sharing(
     cases: Sequence[MeasuredCase], used: Sequence[NDArray[np.bool_]], correlated: bool
 ) -> NDArray[np.int64]:
