@@ -1,12 +1,16 @@
 """Job: stiffness of one specimen with one sampled joint pose."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.waiting import take, waiting
+from spinepipe.marks import KEY
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
@@ -18,39 +22,84 @@ from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS
 
+_Rows = list[dict[str, Any]]
+
+BLOCK = 25
+"""Poses that are fitted side by side: together they take as long as about ten one by one."""
+
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
-    """Write the calibration row of one specimen and pose."""
+    """Write the calibration row of one specimen and pose, and those of its neighbours to wait."""
     settings, cohort = study_and_cohort(root, study)
-    rows = _rows(root, settings, specimen, int(pose), poses)
-    names = [column.name for column in CALIBRATIONS.columns]
-    columns = {name: [row[name] for row in rows] for name in names}
-    write(
-        to_arrow(CALIBRATIONS, columns),
-        output,
-        provenance("calibrate", settings, cohort, [specimen]),
-    )
+    made_by = provenance("calibrate", settings, cohort, [specimen])
+    if take(output, made_by[KEY], poses):
+        return
+    number = int(pose)
+    for other, rows in _neighbours(root, settings, specimen, number, poses).items():
+        place = Path(output).with_name(f"pose={other:04d}.parquet")
+        if other != number and place.exists():
+            continue
+        columns = {
+            column.name: [row[column.name] for row in rows] for column in CALIBRATIONS.columns
+        }
+        path = output if other == number else waiting(place)
+        write(to_arrow(CALIBRATIONS, columns), path, made_by)
+    waiting(output).unlink(missing_ok=True)  # where another job did the same meanwhile
 
 
-def _rows(
-    root: str, settings: JointPoseSensitivity, specimen: str, pose: int, poses_file: str
-) -> list[dict[str, Any]]:
-    frames, reason = sampled_poses(poses_file).of(specimen, pose)
-    if frames is None:
-        return [_refused(specimen, pose, reason)]
+def _neighbours(
+    root: str, settings: JointPoseSensitivity, specimen: str, pose: int, poses: str
+) -> dict[int, _Rows]:
+    """Rows of a pose, and of those beside it unless one of them ends in an error."""
+    first, known = pose - pose % BLOCK, sampled_poses(poses)
+    block = [n for n in range(first, first + BLOCK) if n == pose or any(known.of(specimen, n))]
     try:
-        problem = calibration_problem(root, settings, specimen, frames)
-        seed = specimen_seed(settings.seed, f"{specimen}/{pose}")
-        options = settings.calibration
-        found = fit(problem, options.starts, seed, options.identifiable_below, profiled=True)
+        return _calibrated(root, settings, specimen, block, poses)
+    except Exception:  # of any: the one asked for alone, so that each fails in its own job
+        pass
+    try:
+        return _calibrated(root, settings, specimen, [pose], poses)
     except RefusedModel as error:
-        return [_refused(specimen, pose, str(error))]
-    return _fitted(settings, specimen, pose, problem, found)
+        return {pose: [_refused(specimen, pose, str(error))]}
+
+
+def _calibrated(
+    root: str,
+    settings: JointPoseSensitivity,
+    specimen: str,
+    poses: Sequence[int],
+    poses_file: str,
+) -> dict[int, _Rows]:
+    """Rows of poses of one specimen, fitted side by side.
+
+    Raises
+    ------
+    RefusedModel
+        As `fit_alike` does.
+    """
+    rows: dict[int, _Rows] = {}
+    problems: dict[int, Problem] = {}
+    for pose in poses:
+        frames, reason = sampled_poses(poses_file).of(specimen, pose)
+        try:
+            if frames is None:
+                raise RefusedModel(reason)
+            problems[pose] = calibration_problem(root, settings, specimen, frames)
+        except RefusedModel as error:
+            rows[pose] = [_refused(specimen, pose, str(error))]
+    seeds = [specimen_seed(settings.seed, f"{specimen}/{pose}") for pose in problems]
+    options = settings.calibration
+    fits = fit_alike(
+        list(problems.values()), options.starts, seeds, options.identifiable_below, profiled=True
+    )
+    for (pose, problem), found in zip(problems.items(), fits, strict=True):
+        rows[pose] = _fitted(settings, specimen, pose, problem, found)
+    return rows
 
 
 def _fitted(
     settings: JointPoseSensitivity, specimen: str, pose: int, problem: Problem, found: Fit
-) -> list[dict[str, Any]]:
+) -> _Rows:
     """One row, or one per joint where stiffness is per joint."""
     shared = settings.calibration.grouping == "per_specimen"
     solved = found.status.usable
