@@ -301,8 +301,7 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
     if problem.along_bounds:
         ended = descend_along(point, begin, bounds, problem.scale, settled)
     else:
-        size = len(evaluator.coordinate)
-        ended = descend(point, begin, bounds, problem.scale, size, settled)
+        ended = descend(point, begin, bounds, problem.scale, settled)
     x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)

@@ -154,12 +154,12 @@ def test_a_descent_asks_once_and_again_for_what_is_new() -> None:
 
 def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
     settled = Settled(cost=1e-12, step=1e-12, slope=1e-12, evaluations=50)
-    ended = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, settled)
+    ended = descend(Looked(2.0), np.zeros(1), FAR, ONE, settled)
     assert ended.arrived
     assert ended.x[0] == pytest.approx(1.0, abs=1e-5)
     assert ended.half_cost == pytest.approx(2.0)
     few = Settled(cost=1e-15, step=1e-15, slope=1e-15, evaluations=1)
-    given_up = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, few)
+    given_up = descend(Looked(2.0), np.zeros(1), FAR, ONE, few)
     assert not given_up.arrived
     assert given_up.evaluations == 1
     assert few.given_up == "no optimum within 1 evaluations"
@@ -168,7 +168,7 @@ def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
 def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
     """And takes the slope of the point before for one that is lost on being asked again."""
     settled = Settled(cost=1e-9, step=1e-9, slope=1e-9, evaluations=60)
-    ended = descend(Looked(most=0.5), np.zeros(1), FAR, ONE, 2, settled)
+    ended = descend(Looked(most=0.5), np.zeros(1), FAR, ONE, settled)
     assert 0.3 < ended.x[0] <= 0.5
     asked: set[bytes] = set()
 
@@ -177,4 +177,4 @@ def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
         asked.add(x.tobytes())
         return None if known else (x - 1.0, np.eye(1))
 
-    assert descend(forgetful, np.zeros(1), FAR, ONE, 1, settled).x[0] == pytest.approx(1.0)
+    assert descend(forgetful, np.zeros(1), FAR, ONE, settled).x[0] == pytest.approx(1.0)
