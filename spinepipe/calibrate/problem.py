@@ -140,8 +140,10 @@ class Evaluator:
         problem = replace(problem, cases=needed(problem))
         bounds = within_declared(problem.model, problem.free, problem.lower, problem.upper)
         self.problem = problem = replace(problem, lower=bounds[0], upper=bounds[1])
-        chain = Chain(problem.model)
-        self._systems = [System(chain, chain.model, case.case) for case in problem.cases]
+        # of others in a stack the chain's shape is all that is asked for here
+        chain = Chain(problem.model) if beside is None else beside._systems[0].chain
+        loads = [case.case for case in problem.cases]
+        self._systems: list[System] = [System(chain, problem.model, case) for case in loads]
         refusal = no_settling(self._systems[0]) if problem.course else None
         if refusal:
             raise RefusedModel(refusal)
@@ -153,7 +155,6 @@ class Evaluator:
         shared = sharing(problem.cases, self._used, problem.correlated)
         self.sharing = np.concatenate([shared, alone])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
-        loads = [case.case for case in problem.cases]
         self._solver: AtRest | Settling
         if beside is not None:
             self._solver = beside._solver

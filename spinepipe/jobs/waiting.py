@@ -18,14 +18,23 @@ def waiting(output: str | Path) -> Path:
     return path.with_name(f".{path.name}")
 
 
-def take(output: str | Path, mark: str, read: str | Path) -> bool:
-    """Put a waiting file where its job writes that reads ``read``; whether there was one."""
-    ready = waiting(output)
+def is_made(path: str | Path, mark: str, read: str | Path) -> bool:
+    """Whether there is a file with this mark, no older than the file ``read`` that it hangs on."""
     try:
-        fresh = os.stat(ready).st_mtime_ns >= os.stat(read).st_mtime_ns
-        if not fresh or read_mark(ready) != mark:
-            return False
-        os.replace(ready, output)
+        fresh = os.stat(path).st_mtime_ns >= os.stat(read).st_mtime_ns
+        return fresh and read_mark(path) == mark
     except FileNotFoundError:
         return False
-    return True
+
+
+def is_to_make(output: str | Path, mark: str, read: str | Path) -> bool:
+    """Whether a file is neither in its place nor waits for its job."""
+    return not any(is_made(path, mark, read) for path in (output, waiting(output)))
+
+
+def take(output: str | Path, mark: str, read: str | Path) -> bool:
+    """Put a waiting file in its place, whether there is one; parameters as of `is_made`."""
+    there = is_made(waiting(output), mark, read)
+    if there:
+        os.replace(waiting(output), output)
+    return there

@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.waiting import take, waiting
+from spinepipe.jobs.waiting import is_to_make, take, waiting
 from spinepipe.marks import KEY
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
@@ -19,48 +19,49 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
-from spinepipe.tables import to_arrow, write
+from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_COLUMNS
 
 _Rows = list[dict[str, Any]]
 
-BLOCK = 25
-"""Poses that are fitted side by side: together they take as long as about ten one by one."""
+BLOCK = 100
+"""Poses that are fitted side by side: together they take as long as about thirty one by one."""
 
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
-    """Write the calibration row of one specimen and pose, and those of its neighbours to wait."""
+    """Write the calibration row of one pose, and of its neighbours without any to wait for them."""
     settings, cohort = study_and_cohort(root, study)
     made_by = provenance("calibrate", settings, cohort, [specimen])
-    if take(output, made_by[KEY], poses):
+    mark, number = made_by[KEY], int(pose)
+    if take(output, mark, poses):
         return
-    number = int(pose)
-    for other, rows in _neighbours(root, settings, specimen, number, poses).items():
-        place = Path(output).with_name(f"pose={other:04d}.parquet")
-        if other != number and place.exists():
-            continue
-        columns = {
-            column.name: [row[column.name] for row in rows] for column in CALIBRATIONS.columns
-        }
-        path = output if other == number else waiting(place)
-        write(to_arrow(CALIBRATIONS, columns), path, made_by)
-    waiting(output).unlink(missing_ok=True)  # where another job did the same meanwhile
+    first, known = number - number % BLOCK, sampled_poses(poses)
+    places = {
+        n: Path(output).with_name(f"pose={n:04d}.parquet") for n in range(first, first + BLOCK)
+    }
+    others = [
+        n
+        for n, place in places.items()
+        if n != number and any(known.of(specimen, n)) and is_to_make(place, mark, poses)
+    ]
+    for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
+        if n == number or is_to_make(places[n], mark, poses):  # nobody has done so meanwhile
+            table = from_rows(CALIBRATIONS, rows)
+            write(table, output if n == number else waiting(places[n]), made_by)
 
 
-def _neighbours(
-    root: str, settings: JointPoseSensitivity, specimen: str, pose: int, poses: str
+def _beside(
+    root: str, settings: JointPoseSensitivity, specimen: str, poses: Sequence[int], poses_file: str
 ) -> dict[int, _Rows]:
-    """Rows of a pose, and of those beside it unless one of them ends in an error."""
-    first, known = pose - pose % BLOCK, sampled_poses(poses)
-    block = [n for n in range(first, first + BLOCK) if n == pose or any(known.of(specimen, n))]
+    """Rows of poses, of the first alone where any of them ends in an error."""
     try:
-        return _calibrated(root, settings, specimen, block, poses)
-    except Exception:  # of any: the one asked for alone, so that each fails in its own job
+        return _calibrated(root, settings, specimen, poses, poses_file)
+    except Exception:  # whatever it is: each pose fails in its own job, or not at all
         pass
     try:
-        return _calibrated(root, settings, specimen, [pose], poses)
+        return _calibrated(root, settings, specimen, poses[:1], poses_file)
     except RefusedModel as error:
-        return {pose: [_refused(specimen, pose, str(error))]}
+        return {poses[0]: [_refused(specimen, poses[0], str(error))]}
 
 
 def _calibrated(
