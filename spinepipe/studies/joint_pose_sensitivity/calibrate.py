@@ -48,6 +48,7 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
         if n == number or is_to_make(places[n], mark, poses):  # nobody has done so meanwhile
             table = from_rows(CALIBRATIONS, rows)
             write(table, output if n == number else waiting(places[n]), made_by)
+    waiting(output).unlink(missing_ok=True)  # of another job that began with the same poses
 
 
 def _beside(
