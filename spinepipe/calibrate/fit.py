@@ -7,6 +7,7 @@ poses from the neutral pose.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,8 @@ from scipy.stats import qmc
 
 from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend, descend_along
 from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, side_by_side
-from spinepipe.calibrate.profile import Profile, Reach, profile
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
+from spinepipe.calibrate.profile import Profile, Reach, profiles
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
@@ -159,50 +160,84 @@ def fit(
         refuse_correlated(problem)
     evaluator = Evaluator(problem)
     points = _start_points(evaluator.problem, starts, seed)
-    descents = [partial(_descend, evaluator, start) for start in points]
-    optima = in_lockstep(descents, evaluator.together)
-    return _ended(evaluator, optima, identifiable_below, noise, profiled)
+    return _fits([(evaluator, points)], identifiable_below, noise, profiled)[0]
 
 
-def fit_alike(problems: Sequence[Problem]) -> list[Fit]:
-    """Fits of problems with the same tests and unknowns, each from its own model's values.
+def fit_alike(
+    problems: Sequence[Problem],
+    starts: int = 1,
+    seeds: Sequence[int] = (),
+    identifiable_below: float = 1.0,
+    profiled: bool = False,
+) -> list[Fit]:
+    """Fits of problems with the same loads and unknowns, all solved in one stack.
 
-    Their models differ in numbers alone, so that all are solved in one stack.
+    Their models differ in numbers alone. What comes out of one hangs on no other.
+
+    Parameters
+    ----------
+    seeds : of each problem's further starts. Others as of `fit`.
 
     Raises
     ------
     RefusedModel
         As `Evaluator` does.
     """
-    evaluators: list[Evaluator] = []
-    for problem in problems:
-        evaluators.append(Evaluator(problem, evaluators[0] if evaluators else None))
-    descents = [partial(_descend, one, np.zeros(len(one.problem.free))) for one in evaluators]
-
-    def together(asked: Sequence[tuple[int, Array]]) -> list[Evaluation]:
-        return side_by_side([(number, evaluators[number], x) for number, x in asked])
-
-    optima = in_lockstep(descents, together)
-    return [_ended(one, [optimum]) for one, optimum in zip(evaluators, optima, strict=True)]
+    tasks: list[_Task] = []
+    for problem, seed in zip(problems, seeds or [0] * len(problems), strict=True):
+        evaluator = Evaluator(problem, tasks[0][0] if tasks else None)
+        tasks.append((evaluator, _start_points(evaluator.problem, starts, seed)))
+    return _fits(tasks, identifiable_below, None, profiled)
 
 
-def _ended(
-    evaluator: Evaluator,
-    ends: Sequence[Optimum],
-    identifiable_below: float = 1.0,
-    noise: Array | None = None,
-    profiled: bool = False,
+_Task = tuple[Evaluator, Sequence[Array]]
+"""A problem's evaluator and the points (m,) from which it is fitted."""
+
+
+def _fits(
+    tasks: Sequence[_Task], identifiable_below: float, noise: Array | None, profiled: bool
+) -> list[Fit]:
+    """Fits side by side, each from its starts; parameters as of `fit`."""
+    searches = [(one, start) for one, starts in tasks for start in starts]
+    evaluators = [one for one, _ in searches]
+    descents = [partial(_descend, *search) for search in searches]
+    every = iter(in_lockstep(descents, partial(among, evaluators)))
+    ends = [(one, list(islice(every, len(starts)))) for one, starts in tasks]
+    lead(
+        [
+            (one, optimum.x)
+            for one, optima in ends
+            for k, optimum in enumerate(optima)
+            if optimum.status.usable and _twin(optima[:k], optimum, one.problem.scale) is None
+        ]
+    )
+    found = [_on_record(one, optima) for one, optima in ends]
+    fits = [
+        _fitted(one.problem, optima, one.evaluations, identifiable_below, noise)
+        for (one, _), optima in zip(tasks, found, strict=True)
+    ]
+    if not profiled:
+        return fits
+    usable = [number for number, one in enumerate(fits) if one.status.usable]
+    best = [(tasks[k][0], _best(found[k])) for k in usable]
+    asked = [(one, end.x, end.evaluation, end.at_bound) for one, end in best]
+    for number, region in zip(usable, profiles(asked, noise), strict=True):
+        notes = (fits[number].message, BETTER if region.lower_cost else "")
+        message = "; ".join(filter(None, notes))
+        fits[number] = replace(fits[number], profile=region, message=message)
+    return fits
+
+
+def _fitted(
+    problem: Problem,
+    optima: Sequence[Optimum],
+    evaluations: int,
+    identifiable_below: float,
+    noise: Array | None,
 ) -> Fit:
-    """The fit that descents to these ends make; parameters as of `fit`."""
-    problem = evaluator.problem
-    optima = _on_record(evaluator, ends)
+    """The fit of a problem whose descents ended there."""
     best = _best(optima)
     found = uncertainty(problem, best.evaluation, best.at_bound, identifiable_below, noise)
-    evaluations, region, message = evaluator.evaluations, None, best.message
-    if profiled and best.status.usable:
-        region = profile(evaluator, best.x, best.evaluation, best.at_bound, noise)
-        if region.lower_cost:
-            message = "; ".join(one for one in (message, BETTER) if one)
     return Fit(
         x=best.x,
         values=values(problem, best.x),
@@ -210,14 +245,13 @@ def _ended(
         uncertainty=found,
         cost=best.cost,
         status=best.status,
-        message=message,
+        message=best.message,
         iterations=best.iterations,
         evaluations=evaluations,
         n_optima=_distinct(optima, found.identifiable, problem.scale),
         stiffened=best.stiffened,
         cases=problem.cases,
         poses=best.evaluation.poses if best.status.usable else (),
-        profile=region,
         cost_of_priors=float(np.sum((problem.by_priors @ best.x) ** 2)),
     )
 
@@ -267,8 +301,7 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
     if problem.along_bounds:
         ended = descend_along(point, begin, bounds, problem.scale, settled)
     else:
-        size = len(evaluator.coordinate)
-        ended = descend(point, begin, bounds, problem.scale, size, settled)
+        ended = descend(point, begin, bounds, problem.scale, settled)
     x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)
@@ -291,7 +324,7 @@ def _on_record(evaluator: Evaluator, optima: Sequence[Optimum]) -> list[Optimum]
     """The optima as the engine of record has them; one that an earlier one ties with goes by it."""
     found: list[Optimum] = []
     for optimum in optima:
-        twin = next((one for one in found if _ties(one, optimum, evaluator.problem.scale)), None)
+        twin = _twin(found, optimum, evaluator.problem.scale)
         if twin is not None:
             found.append(replace(optimum, status=twin.status, message=twin.message))
             continue
@@ -302,6 +335,11 @@ def _on_record(evaluator: Evaluator, optima: Sequence[Optimum]) -> list[Optimum]
         else:
             found.append(replace(optimum, evaluation=record))
     return found
+
+
+def _twin(earlier: Sequence[Optimum], optimum: Optimum, scale: Array) -> Optimum | None:
+    """The first of earlier optima that ties with one."""
+    return next((one for one in earlier if _ties(one, optimum, scale)), None)
 
 
 def _ties(one: Optimum, other: Optimum, scale: Array) -> bool:

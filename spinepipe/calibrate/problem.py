@@ -140,8 +140,10 @@ class Evaluator:
         problem = replace(problem, cases=needed(problem))
         bounds = within_declared(problem.model, problem.free, problem.lower, problem.upper)
         self.problem = problem = replace(problem, lower=bounds[0], upper=bounds[1])
-        chain = Chain(problem.model)
-        self._systems = [System(chain, chain.model, case.case) for case in problem.cases]
+        # of others in a stack the chain's shape is all that is asked for here
+        chain = Chain(problem.model) if beside is None else beside._systems[0].chain
+        loads = [case.case for case in problem.cases]
+        self._systems: list[System] = [System(chain, problem.model, case) for case in loads]
         refusal = no_settling(self._systems[0]) if problem.course else None
         if refusal:
             raise RefusedModel(refusal)
@@ -153,7 +155,6 @@ class Evaluator:
         shared = sharing(problem.cases, self._used, problem.correlated)
         self.sharing = np.concatenate([shared, alone])
         self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
-        loads = [case.case for case in problem.cases]
         self._solver: AtRest | Settling
         if beside is not None:
             self._solver = beside._solver
@@ -255,6 +256,20 @@ def side_by_side(points: Sequence[tuple[int, Evaluator, Array]]) -> list[Evaluat
             one.evaluations += 1
             one._known[x.tobytes()] = one._evaluation(x, seen)
     return [one._known[x.tobytes()] for _, one, x in points]
+
+
+def among(evaluators: Sequence[Evaluator], asked: Sequence[tuple[int, Array]]) -> list[Evaluation]:
+    """The same for searches in lockstep, by the number of each among ``evaluators``."""
+    return side_by_side([(number, evaluators[number], x) for number, x in asked])
+
+
+def lead(points: Sequence[tuple[Evaluator, Array]]) -> None:
+    """Solve at once where loads lead models at x (m,), of evaluators that share a stack.
+
+    `Evaluator.on_record` and `Evaluator.start_at` then find it.
+    """
+    if points:
+        points[0][0]._solver.lead([(one.problem.model, x) for one, x in points])
 
 
 def sharing(

@@ -14,6 +14,7 @@ the standard error.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,9 @@ from spinepipe.calibrate.descent import (
     damped_step,
     descend,
     descend_along,
-    once,
 )
 from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
 from spinepipe.calibrate.uncertainty import UNSEEN_SHARE, uncertainty
 from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array, Indices
@@ -158,36 +158,42 @@ class _Rise:
 
 _Search = Callable[[Point], _End]
 
+_Side = tuple[int, int, _Search]
+"""An unknown, -1 below or 1 above, and how its end is looked for."""
 
-def profile(
-    evaluator: Evaluator,
-    x: Array,
-    evaluation: Evaluation,
-    at_bound: Array,
-    noise: Array | None = None,
-    level: float = LEVEL,
-) -> Profile:
-    """Region of every unknown of a fit without a prior; those with one are fitted among the others.
+
+Asked = tuple[Evaluator, Array, Evaluation, Array]
+"""An optimum: x (m,), what there is, and which unknowns are at a bound (m,), see `Optimum`."""
+
+
+def profiles(
+    asked: Sequence[Asked], noise: Array | None = None, level: float = LEVEL
+) -> list[Profile]:
+    """Region of every unknown of fits without a prior; those with one are fitted among the others.
 
     Parameters
     ----------
-    x, evaluation, at_bound : the optimum. noise : as in `uncertainty`.
+    asked : of evaluators that share a stack. noise : as in `uncertainty`.
     """
+    lead([(evaluator, x) for evaluator, x, _, _ in asked])
+    plans = [(one[0], *_plan(one, noise, level)) for one in asked]
+    searches = [(one, search) for one, _, sides in plans for _, _, search in sides]
+    asking = [partial(_through, search) for _, search in searches]
+    ends = iter(in_lockstep(asking, partial(among, [one for one, _ in searches])))
+    return [_region(best, sides, list(islice(ends, len(sides)))) for _, best, sides in plans]
+
+
+def _plan(asked: Asked, noise: Array | None, level: float) -> tuple[Best, list[_Side]]:
+    """What is known of an optimum, and the ends to be looked for."""
+    evaluator, x, evaluation, at_bound = asked
     problem = evaluator.problem
-    if evaluation.residual is None or evaluation.jacobian is None:
-        nothing = np.ones((2, len(x)), dtype=bool)
-        return Profile(problem.lower.copy(), problem.upper.copy(), nothing[0], nothing[1], False)
+    assert evaluation.residual is not None
+    assert evaluation.jacobian is not None
     evaluator.start_at(x)  # or regions would hang on where other starts have been
     bent = np.array([parameter.logarithmic for parameter in problem.free])
     measured, limits = (evaluation.residual, evaluation.jacobian), (problem.lower, problem.upper)
     best = Best(x, *measured, *limits, problem.scale, bent, along_bounds=problem.along_bounds)
-    rises = _rises(problem, evaluation, at_bound, noise, level)
-
-    def together(searches: Sequence[_Search]) -> list[_End]:
-        asking = [partial(_through, search) for search in searches]
-        return in_lockstep(asking, evaluator.together) if asking else []
-
-    return _profile(best, list(rises), together)
+    return best, _sides(best, list(_rises(problem, evaluation, at_bound, noise, level)))
 
 
 def profile_in_turn(
@@ -205,19 +211,23 @@ def profile_in_turn(
         size = best.told_by(unknown)
         if size > UNSEEN_SHARE * float(np.linalg.norm(best.jacobian[:, unknown])):
             rises[unknown] = _Rise(limit**2, limit / size)
-    return _profile(best, rises, lambda searches: [search(point) for search in searches])
+    sides = _sides(best, rises)
+    return _region(best, sides, [search(point) for _, _, search in sides])
 
 
-def _profile(
-    best: Best,
-    rises: Sequence[_Rise | None],
-    together: Callable[[Sequence[_Search]], list[_End]],
-) -> Profile:
+def _sides(best: Best, rises: Sequence[_Rise | None]) -> list[_Side]:
+    return [
+        (unknown, side, partial(_end, best, unknown, rise, side))
+        for unknown, rise in enumerate(rises)
+        if rise is not None
+        for side in (-1, 1)
+    ]
+
+
+def _region(best: Best, sides: Sequence[_Side], ends: Sequence[_End]) -> Profile:
     low, high = best.lower.copy(), best.upper.copy()
     is_open = np.ones((2, len(best.x)), dtype=bool)
-    sides = [(k, r, side) for k, r in enumerate(rises) if r is not None for side in (-1, 1)]
-    ends = together([partial(_end, best, k, rise, side) for k, rise, side in sides])
-    for (unknown, _, side), end in zip(sides, ends, strict=True):
+    for (unknown, side, _), end in zip(sides, ends, strict=True):
         (low if side < 0 else high)[unknown] = end.at
         is_open[int(side > 0), unknown] = end.is_open
     lower = any(end.least < -NEAR for end in ends)
@@ -384,7 +394,7 @@ def _refitted(
         found = held(begin)
         if found is None:
             continue
-        size, scale = len(best.residual), best.scale[others]
+        scale = best.scale[others]
         along = (bounds, scale) if best.along_bounds else None
         cost, moved = _one_step(*found, begin, along)
         if float(found[0] @ found[0]) - cost <= STRAIGHT * rise.allowed and np.all(
@@ -394,7 +404,7 @@ def _refitted(
         if best.along_bounds:
             ended = descend_along(held, begin, bounds, scale, best.enough)
         else:
-            ended = descend(once(held), begin, bounds, scale, size, best.enough)
+            ended = descend(held, begin, bounds, scale, best.enough)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, best.x
 

@@ -46,22 +46,37 @@ class AtRest:
         self._cases = tuple(cases)
         self._stacks = _Stacks(self._cases)
         self._last: dict[int, tuple[Array, Array, Array]] = {}
-        self._first: tuple[Array, Array, Array] | None = None
-        self._first_of: SpineModel | None = None
+        self._first: dict[int, tuple[Array, Array, Array]] = {}
+        self._led: dict[tuple[int, bytes], tuple[SpineModel, tuple[Array, Array, Array] | None]]
+        self._led = {}
 
     def forget(self) -> None:
         """Start the next points from the neutral pose."""
         self._last.clear()
-        self._first = None
+        self._first.clear()
 
     def start_at(self, model: SpineModel, x: Array) -> None:
-        """Begin the next searches from the poses to which the loads lead a model at x (m,)."""
-        first, same = self._first, self._first_of is model
+        """Begin a model's next searches from the poses to which the loads lead it at x (m,)."""
+        self.lead([(model, x)])
+        self._last.clear()
+        _, first = self._led[id(model), x.tobytes()]
+        if first is None:
+            self._first.pop(id(model), None)
+        else:
+            self._first[id(model)] = first
+
+    def lead(self, points: Sequence[tuple[SpineModel, Array]]) -> None:
+        """Solve the poses to which the loads lead models at x (m,), all at once, for `start_at`."""
+        new = [(model, x) for model, x in points if (id(model), x.tobytes()) not in self._led]
+        if not new:
+            return
         self.forget()
-        if first is None or not same or not np.array_equal(first[0], x):
-            self.solve([(0, x)], [model])
-            first = self._last.pop(0, None)
-        self._first, self._first_of = first, model
+        self.solve([(number, x) for number, (_, x) in enumerate(new)], [model for model, _ in new])
+        self._led = {
+            (id(model), x.tobytes()): (model, self._last.get(number))
+            for number, (model, x) in enumerate(new)
+        }
+        self.forget()
 
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
@@ -76,7 +91,7 @@ class AtRest:
         models = models or [self._model] * len(points)
         there = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
         stack, unknowns = self._stacks.of(models, there), [self._free] * len(points)
-        found = stack.solve(self._guesses(points, stack), why=False)
+        found = stack.solve(self._guesses(points, models, stack), why=False)
         q = np.where(np.isnan(found.q), 0.0, found.q)
         dq = poses_by(stack, q, unknowns)
         seen, by_x = readings(stack, q), readings_by(stack, q, dq, unknowns)
@@ -94,14 +109,16 @@ class AtRest:
             result.append(Seen(*parts))
         return result
 
-    def _guesses(self, points: Sequence[tuple[int, Array]], stack: Stack) -> Array | None:
+    def _guesses(
+        self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel], stack: Stack
+    ) -> Array | None:
         """(L, J, 6) poses to start from, to first order; NaN for searches that have none."""
-        if self._first is None and not self._last:
+        if not self._first and not self._last:
             return None
         nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
         guesses = []
-        for number, x in points:
-            known = self._last.get(number, self._first)
+        for model, (number, x) in zip(models, points, strict=True):
+            known = self._last.get(number, self._first.get(id(model)))
             if known is None:
                 guesses.append(nothing)
                 continue
@@ -117,11 +134,11 @@ class AtRest:
         """
         model = model or self._model
         self.start_at(model, x)
-        there = moved(model, self._free, x)
-        if self._first is None:
+        there, first = moved(model, self._free, x), self._first.get(id(model))
+        if first is None:
             return by_record(there, self._cases)
         ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
-        return by_record(there, self._cases, np.split(self._first[1], ends))
+        return by_record(there, self._cases, np.split(first[1], ends))
 
 
 class _Stacks:
@@ -167,6 +184,9 @@ class Settling:
         """Nothing: each run starts from the neutral pose."""
 
     def start_at(self, model: SpineModel, x: Array) -> None:
+        """Nothing: each run starts from the neutral pose."""
+
+    def lead(self, points: Sequence[tuple[SpineModel, Array]]) -> None:
         """Nothing: each run starts from the neutral pose."""
 
     def solve(

@@ -264,12 +264,13 @@ def _effect_problem(model: SpineModel) -> str | None:
         declared = scoped.effect.parameters
         if scoped.values.shape != (rows, len(declared)):
             return f"effect {scoped.effect.name}: values must be {rows} x {len(declared)}"
-        for column, parameter in zip(scoped.values.T, declared, strict=True):
-            inside = (column >= parameter.low) & (column <= parameter.high)
-            if not inside.all():
-                found = column[~inside][0]
-                return (
-                    f"effect {scoped.effect.name}: {parameter.name} is {found:.6g} "
-                    f"{parameter.unit}, allowed {parameter.low:.3g} to {parameter.high:.3g}"
-                )
+        limits = np.array([(one.low, one.high) for one in declared]).reshape(-1, 2)
+        outside = ~((scoped.values >= limits[:, 0]) & (scoped.values <= limits[:, 1]))
+        if outside.any():
+            at = int(np.flatnonzero(outside.any(axis=0))[0])
+            parameter, found = declared[at], scoped.values[outside[:, at], at][0]
+            return (
+                f"effect {scoped.effect.name}: {parameter.name} is {found:.6g} "
+                f"{parameter.unit}, allowed {parameter.low:.3g} to {parameter.high:.3g}"
+            )
     return None

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from spinepipe.files import appearing
@@ -88,8 +87,8 @@ def _problem(column: Column, array: pa.Array) -> str | None:
     if len(array) == array.null_count:
         return None
     if column.kind in ("number", "integer"):
-        ends = pc.min_max(array)
-        low, high = ends["min"].as_py(), ends["max"].as_py()
+        numbers = array.to_numpy(zero_copy_only=False)  # of few rows, ten times as fast as Arrow
+        low, high = np.fmin.reduce(numbers), np.fmax.reduce(numbers)
         if not (np.isfinite(low) and np.isfinite(high)):
             return "an infinite cell"
         if column.low is not None and low < column.low:

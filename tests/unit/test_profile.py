@@ -4,8 +4,6 @@ Catches a region too narrow, and an end that was not looked for.
 """
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 from sweeps import sweep
 
 from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
-from spinepipe.calibrate.problem import Evaluation
-from spinepipe.calibrate.profile import NEAR, Best, Profile, profile, profile_in_turn
+from spinepipe.calibrate.profile import NEAR, Best, Profile, profile_in_turn
 from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
@@ -256,16 +253,6 @@ def test_a_stiffness_reaches_from_one_end_of_its_region_to_the_other() -> None:
         else:
             assert reach.high == pytest.approx(1.0 / (u - way), rel=2.0 * SLACK)
         assert found.identifiable(0) is not is_open
-
-
-def test_where_nothing_stands_all_is_open() -> None:
-    problem: Any = SimpleNamespace(lower=np.array([-3.0, -2.0]), upper=np.array([4.0, 5.0]))
-    evaluator: Any = SimpleNamespace(problem=problem, forget=lambda: None)
-    nowhere = Evaluation(None, None, (), np.zeros(0), np.zeros(0))  # type: ignore[arg-type]
-    found = profile(evaluator, np.zeros(2), nowhere, np.zeros(2))
-    assert (found.low.tolist(), found.high.tolist()) == ([-3.0, -2.0], [4.0, 5.0])
-    assert found.open_below.tolist() == found.open_above.tolist() == [True, True]
-    assert not found.lower_cost
 
 
 def test_a_fit_without_regions_identifies_nothing() -> None:

@@ -8,7 +8,15 @@ import pytest
 from sklearn.model_selection import GroupKFold
 from sweeps import sweep
 
-from spinepipe.sensitivity.tree import BEYOND_ROOT, _cross_validated, _growth, regression_tree
+from spinepipe.sensitivity.tree import (
+    BEYOND_ROOT,
+    _cross_validated,
+    _cut_back,
+    _growth,
+    _pruned,
+    _weakest_links,
+    regression_tree,
+)
 from spinepipe.statistics import Ended
 
 MILEAGE = np.array(
@@ -231,3 +239,16 @@ def test_what_cannot_be_grown_is_refused(change, message) -> None:
     x, y = data(30, 3, seed=12)
     with pytest.raises(ValueError, match=message):
         regression_tree(**({"x": x, "y": y, "names": "abc", "seed": 1} | change))
+
+
+def test_a_tree_that_is_cut_back_is_the_one_that_scikit_learn_prunes() -> None:
+    x, y = data(400, 4, seed=3)
+    y = (y - y.mean()) / y.std()
+    growth = _growth(complexity=1e-3, seed=5)
+    whole = growth.fit(x, y)
+    ends, leaves = _weakest_links(whole.tree_), whole.apply(x)
+    path = whole.cost_complexity_pruning_path(x, y).ccp_alphas
+    assert len(path) > 10
+    for complexity in (0.0, *(0.5 * (path[:-1] + path[1:])), BEYOND_ROOT):
+        pruned = _pruned(growth, complexity).fit(x, y).predict(x)
+        np.testing.assert_array_equal(_cut_back(whole.tree_, ends, complexity)[leaves], pruned)

@@ -1,12 +1,16 @@
 """Job: stiffness of one specimen with one sampled joint pose."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import mark_of, provenance
+from spinepipe.jobs.waiting import is_to_make, take, waiting
+from spinepipe.marks import KEY
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
@@ -15,42 +19,89 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
-from spinepipe.tables import to_arrow, write
+from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_COLUMNS
+
+_Rows = list[dict[str, Any]]
+
+BLOCK = 100
+"""Poses that are fitted side by side: together they take as long as about thirty one by one."""
 
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
-    """Write the calibration row of one specimen and pose."""
+    """Write the calibration row of one pose, and of its neighbours without any to wait for them."""
     settings, cohort = study_and_cohort(root, study)
-    rows = _rows(root, settings, specimen, int(pose), poses)
-    names = [column.name for column in CALIBRATIONS.columns]
-    columns = {name: [row[name] for row in rows] for name in names}
-    write(
-        to_arrow(CALIBRATIONS, columns),
-        output,
-        provenance("calibrate", settings, cohort, [specimen], [mark_of(poses)]),
-    )
+    made_by = provenance("calibrate", settings, cohort, [specimen], [mark_of(poses)])
+    mark, number = made_by[KEY], int(pose)
+    if take(output, mark):
+        return
+    first, known = number - number % BLOCK, sampled_poses(poses)
+    places = {
+        n: Path(output).with_name(f"pose={n:04d}.parquet") for n in range(first, first + BLOCK)
+    }
+    others = [
+        n
+        for n, place in places.items()
+        if n != number and any(known.of(specimen, n)) and is_to_make(place, mark)
+    ]
+    for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
+        if n == number or is_to_make(places[n], mark):  # nobody has done so meanwhile
+            table = from_rows(CALIBRATIONS, rows)
+            write(table, output if n == number else waiting(places[n]), made_by)
+    waiting(output).unlink(missing_ok=True)  # of another job that began with the same poses
 
 
-def _rows(
-    root: str, settings: JointPoseSensitivity, specimen: str, pose: int, poses_file: str
-) -> list[dict[str, Any]]:
-    frames, reason = sampled_poses(poses_file).of(specimen, pose)
-    if frames is None:
-        return [_refused(specimen, pose, reason)]
+def _beside(
+    root: str, settings: JointPoseSensitivity, specimen: str, poses: Sequence[int], poses_file: str
+) -> dict[int, _Rows]:
+    """Rows of poses, of the first alone where any of them ends in an error."""
     try:
-        problem = calibration_problem(root, settings, specimen, frames)
-        seed = specimen_seed(settings.seed, f"{specimen}/{pose}")
-        options = settings.calibration
-        found = fit(problem, options.starts, seed, options.identifiable_below, profiled=True)
+        return _calibrated(root, settings, specimen, poses, poses_file)
+    except Exception:  # whatever it is: each pose fails in its own job, or not at all
+        pass
+    try:
+        return _calibrated(root, settings, specimen, poses[:1], poses_file)
     except RefusedModel as error:
-        return [_refused(specimen, pose, str(error))]
-    return _fitted(settings, specimen, pose, problem, found)
+        return {poses[0]: [_refused(specimen, poses[0], str(error))]}
+
+
+def _calibrated(
+    root: str,
+    settings: JointPoseSensitivity,
+    specimen: str,
+    poses: Sequence[int],
+    poses_file: str,
+) -> dict[int, _Rows]:
+    """Rows of poses of one specimen, fitted side by side.
+
+    Raises
+    ------
+    RefusedModel
+        As `fit_alike` does.
+    """
+    rows: dict[int, _Rows] = {}
+    problems: dict[int, Problem] = {}
+    for pose in poses:
+        frames, reason = sampled_poses(poses_file).of(specimen, pose)
+        try:
+            if frames is None:
+                raise RefusedModel(reason)
+            problems[pose] = calibration_problem(root, settings, specimen, frames)
+        except RefusedModel as error:
+            rows[pose] = [_refused(specimen, pose, str(error))]
+    seeds = [specimen_seed(settings.seed, f"{specimen}/{pose}") for pose in problems]
+    options = settings.calibration
+    fits = fit_alike(
+        list(problems.values()), options.starts, seeds, options.identifiable_below, profiled=True
+    )
+    for (pose, problem), found in zip(problems.items(), fits, strict=True):
+        rows[pose] = _fitted(settings, specimen, pose, problem, found)
+    return rows
 
 
 def _fitted(
     settings: JointPoseSensitivity, specimen: str, pose: int, problem: Problem, found: Fit
-) -> list[dict[str, Any]]:
+) -> _Rows:
     """One row, or one per joint where stiffness is per joint."""
     shared = settings.calibration.grouping == "per_specimen"
     solved = found.status.usable
