@@ -25,6 +25,9 @@ SMALL = 1e-10
 _RIDGE = 1e-8
 """Of the largest diagonal: what is not seen does not move."""
 
+_AT_REST = np.array([[1.0], [0.0], [0.0]])
+"""Weights of a posture alone: its place, no velocity, no acceleration."""
+
 
 @dataclass(frozen=True, eq=False)
 class Postures:
@@ -118,23 +121,23 @@ def _cost(ask: Ask, watched: Watched, q: Array) -> Array:
 def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, Array]:
     """(F, n, n) and (F, n)."""
     off, slopes = Markers(watched, ask).with_slopes(q)
-    rows = [(off, slopes @ whole)]
     over, steep = (one.reshape(len(q), COUNT) for one in beyond(ask, q))
     # what each coordinate costs by itself: the diagonal of its curvature, and its slope
     curved, pulled = steep**2, over * steep
-    if ask.loads:
-        rest = np.zeros_like(q)
-        load, by_motion, _ = Loads.of(watched, ask).with_slopes(ask.passive, (q, rest, rest))
-        rows.append((load, by_motion[:, 0] @ whole))
-    elif ask.passive is not None:
+    if ask.passive is not None and not ask.loads:
         stretched, stiff = _stretched(ask, q)
         curved[:, PELVIS + 6 :] += stiff**2
         pulled[:, PELVIS + 6 :] += stretched * stiff
-    square, down = whole.T @ (curved[..., None] * whole), pulled @ whole
-    for off, slope in rows:
-        turned = np.swapaxes(slope, 1, 2)
-        square += turned @ slope
-        down += (turned @ off[..., None])[..., 0]
+    slope = slopes @ whole
+    square = whole.T @ (curved[..., None] * whole) + np.swapaxes(slope, 1, 2) @ slope
+    down = pulled @ whole + (off[:, None] @ slope)[:, 0]
+    if ask.loads:
+        rest = np.zeros_like(q)
+        at_rest = Loads.of(watched, ask).by_node(ask.passive, (q, rest, rest), _AT_REST)
+        for k, node in enumerate(at_rest):
+            weighed = node.weighed[0] @ whole
+            square[k] += weighed.T @ (node.each[0] @ whole)
+            down[k] += node.active @ weighed
     return square, down
 
 
