@@ -52,18 +52,21 @@ def damped_steps(
     rest, moved, p, row = np.empty((bodies, _AXES)), np.empty(_AXES), np.empty(3), np.empty(_AXES)
     for f in range(len(q)):
         chain(q[f], turned, apart, turns, origins, axes)
-        inertia[:], force[:], twists[:] = 0.0, 0.0, 0.0
         for b in range(bodies):
             o = origins[b]
+            for j in range(_AXES):
+                force[b, j] = 0.0
+                for r in range(_AXES):
+                    inertia[b, j, r] = twists[b, j, r] = 0.0
             for j in range(3):
                 w = axes[b, 3 + j]
-                if free[b, j]:
-                    twists[b, j, 3:] = axes[b, j]
-                if free[b, 3 + j]:
-                    twists[b, 3 + j, :3] = w
-                    twists[b, 3 + j, 3] = o[1] * w[2] - o[2] * w[1]
-                    twists[b, 3 + j, 4] = o[2] * w[0] - o[0] * w[2]
-                    twists[b, 3 + j, 5] = o[0] * w[1] - o[1] * w[0]
+                for i in range(3):
+                    if free[b, j]:
+                        twists[b, j, 3 + i] = axes[b, j, i]
+                    if free[b, 3 + j]:
+                        y, z = (i + 1) % 3, (i + 2) % 3
+                        twists[b, 3 + j, i] = w[i]
+                        twists[b, 3 + j, 3 + i] = o[y] * w[z] - o[z] * w[y]
         # each marker a point mass on its body, off its place by as much
         for k in range(len(body)):
             b, mass = body[k], worth[f, k]
@@ -73,18 +76,20 @@ def damped_steps(
                     p[i] += turns[b, i, j] * on_body[k, j]
             for i in range(3):
                 # row i of the speed at p that a twist (w, v) makes: v + w x p
-                row[:] = 0.0
-                row[3 + i], row[(i + 1) % 3], row[(i + 2) % 3] = 1.0, p[(i + 2) % 3], -p[(i + 1) % 3]
+                for r in range(_AXES):
+                    row[r] = 1.0 if r == 3 + i else 0.0
+                row[(i + 1) % 3], row[(i + 2) % 3] = p[(i + 2) % 3], -p[(i + 1) % 3]
                 off = mass * (p[i] - seen[f, k, i])
                 for r in range(_AXES):
                     force[b, r] += row[r] * off
                     for s in range(_AXES):
                         inertia[b, r, s] += mass * row[r] * row[s]
         # diagonal of the normal equations: composite inertias from the top down
-        whole[:] = 0.0
         largest = 0.0
         for b in range(bodies - 1, -1, -1):
-            whole += inertia[b]
+            for r in range(_AXES):
+                for s in range(_AXES):
+                    whole[r, s] = inertia[b, r, s] + (whole[r, s] if b < bodies - 1 else 0.0)
             for j in range(_AXES):
                 diagonal[b, j] = 0.0
                 if free[b, j]:
@@ -136,7 +141,8 @@ def damped_steps(
                     for j in range(_AXES):
                         inertia[b - 1, r, s] -= half[j, r] * half[j, s]
         # from the pelvis up: each joint moves as it gives way to what moves below it
-        moved[:] = 0.0
+        for r in range(_AXES):
+            moved[r] = 0.0
         for b in range(bodies):
             step = found[f, b]
             for j in range(_AXES - 1, -1, -1):
