@@ -51,7 +51,8 @@ class RigidBodies:
         for k, now in enumerate(zip(q, velocity, acceleration, strict=True)):
             pin.computeRNEADerivatives(self._model, self._data, *now)
             loads[k] = self._data.tau
-            slopes[k] = self._data.dtau_dq, self._data.dtau_dv, self._data.M
+            slopes[k, 0], slopes[k, 1] = self._data.dtau_dq, self._data.dtau_dv
+            slopes[k, 2] = self._data.M
         _mirror(slopes[:, 2])
         return loads, slopes
 

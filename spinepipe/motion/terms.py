@@ -42,10 +42,9 @@ class Markers:
     def _weighed(self, rows: Array) -> Array:
         """(F, 3 K, n) over their sizes."""
         seen, size = self.watched, self.ask.sizes.marker_m
-        if seen.shares is not None:
-            return seen.shares @ (rows / size)
-        share = np.repeat(np.sqrt(seen.weight), 3, axis=1) / size
-        found: Array = rows * share[..., None]
+        share = np.repeat(np.sqrt(seen.weight), 3, axis=1)[..., None]
+        found: Array = rows * share if seen.shares is None else seen.shares @ rows
+        found /= size
         return found
 
 
