@@ -1,10 +1,11 @@
 """Normal equations of a trajectory: a band of blocks, with a border of what is shared.
 
 A node touches three neighbouring coefficients of n numbers each (108 where all coordinates are
-free), so that the matrix of all nodes is block pentadiagonal; parameters that all nodes share border it and are eliminated last (Schur
-complement). Cholesky factors and substitutions go block by block, so that all is matrix times
-matrix: LAPACK substitutes into a band column by column, which takes ten times as long. BLAS works in
-place: a block that lies in memory row by row is to it the transposed block, column by column.
+free), so that the matrix of all nodes is block pentadiagonal; parameters that all nodes share
+border it and are eliminated last (Schur complement). Cholesky factors and substitutions go block by
+block, so that all is matrix times matrix: LAPACK substitutes into a band column by column, which
+takes ten times as long. BLAS works in place: what lies in memory row by row is to it the transposed
+block, column by column.
 """
 
 from collections.abc import Sequence
@@ -48,13 +49,8 @@ class Band:
     @property
     def diagonal(self) -> Array:
         """(C, n), a view that can be written to."""
-        return _diagonal(self.blocks[:, 0])
-
-
-def _diagonal(blocks: Array) -> Array:
-    """(C, n) of (C, n, n), a view."""
-    found: Array = np.einsum("cii->ci", blocks)
-    return found
+        found: Array = np.einsum("cii->ci", self.blocks[:, 0])
+        return found
 
 
 @dataclass(frozen=True, eq=False)

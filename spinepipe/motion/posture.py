@@ -97,7 +97,7 @@ def _rounds(
             diagonal = np.einsum("fii->fi", square)
             ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)
             diagonal += damping[left, None] * diagonal + ridge
-            move = -np.linalg.solve(square, down[..., None])[..., 0]
+            move = np.asarray(-np.linalg.solve(square, down[..., None])[..., 0], dtype=float)
             there = q[left] + (move @ whole.T).reshape(-1, *SHAPE)
         found = _cost(ask, seen, there)
         better = found <= cost[left]
@@ -136,10 +136,23 @@ def _by_themselves(ask: Ask, q: Array) -> tuple[Array, Array]:
 def _steps_of_joints(ask: Ask, watched: Watched, q: Array, damping: Array) -> Array:
     """(F, 108) damped steps where each coordinate moves by itself, and no load costs."""
     markers, found = watched.markers, np.empty(q.shape)
-    own = (one.reshape(q.shape) for one in _by_themselves(ask, q))
-    worth = watched.weight / ask.sizes.marker_m**2
-    at = (*joints_of(watched.skeleton), markers.body, markers.at, watched.places, worth)
-    damped_steps(q, *at, ask.free, *own, damping, _RIDGE, found)
+    curved, pulled = _by_themselves(ask, q)
+    turned, apart = joints_of(watched.skeleton)
+    damped_steps(
+        q,
+        turned,
+        apart,
+        markers.body,
+        markers.at,
+        watched.places,
+        watched.weight / ask.sizes.marker_m**2,
+        ask.free,
+        curved.reshape(q.shape),
+        pulled.reshape(q.shape),
+        damping,
+        _RIDGE,
+        found,
+    )
     return found.reshape(len(q), COUNT)
 
 
