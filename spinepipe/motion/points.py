@@ -22,7 +22,8 @@ def with_slopes(
     """Places (F, K, 3) m of markers, and their slopes (F, K, 3, 108) by the coordinates."""
     shape = (len(q), len(markers), 3)
     places, found = np.empty(shape), np.zeros((*shape, COUNT) if slopes else (0, 0, 0, 0))
-    _place(np.ascontiguousarray(q), *joints_of(skeleton), markers.body, markers.at, places, found)
+    on_body = np.ascontiguousarray(markers.at)  # another layout would be compiled again
+    _place(np.ascontiguousarray(q), *joints_of(skeleton), markers.body, on_body, places, found)
     return places, found
 
 

@@ -143,7 +143,7 @@ def _steps_of_joints(ask: Ask, watched: Watched, q: Array, damping: Array) -> Ar
         turned,
         apart,
         markers.body,
-        markers.at,
+        np.ascontiguousarray(markers.at),
         watched.places,
         watched.weight / ask.sizes.marker_m**2,
         ask.free,

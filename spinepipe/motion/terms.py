@@ -110,7 +110,8 @@ class Loads:
         force, stiffness, by_shape = np.zeros((3, frames, count))
         if law is not None:
             force, stiffness, by_shape = (
-                one.reshape(frames, count) for one in law.with_slopes(motion[0][:, 1:])
+                np.ascontiguousarray(one).reshape(frames, count)
+                for one in law.with_slopes(motion[0][:, 1:])
             )
         size, common = self.ask.sizes.of_loads, self._common
         whole_size = np.tile(size, len(JOINTS))
