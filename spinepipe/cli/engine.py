@@ -1,7 +1,8 @@
 """One joint under a pure moment: prints how far its equilibrium is from the closed form M/k.
 
-It is fitted too, with regions: what numba compiles for equilibria and fits is then kept beside the
-code, and no study waits for it (`make env` runs this file).
+It is fitted too, with regions, and a spine that stands is tracked: what numba compiles for
+equilibria, fits and motions is then kept beside the code, and no study waits for it (`make env`
+runs this file).
 """
 
 from dataclasses import replace
@@ -12,6 +13,11 @@ from spinepipe.calibrate import Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, MeasuredCase, ScopedEffect, SpineModel
+from spinepipe.motion.asked import SHAPE, Ask, watched
+from spinepipe.motion.points import marker_places
+from spinepipe.motion.posture import postures
+from spinepipe.motion.skeleton import BODIES, MarkerSet, Masses, Skeleton, Trial
+from spinepipe.motion.trajectory import solve
 from spinepipe.statics import System, follow, free_parameters
 from spinepipe.world import Chain
 
@@ -51,5 +57,23 @@ def relative_error() -> float:
     return max(solved, float(np.abs(STIFFER * np.exp(found.x) - 1.0).max()))
 
 
+def track_a_spine_that_stands() -> None:
+    """Straight joints 30 mm apart, one marker on each body, which stay where they are."""
+    bodies = len(BODIES)
+    steps = (Pose(np.eye(3), np.array([0.0, 0.03, 0.0])),) * (bodies - 1)
+    masses = Masses(
+        np.ones(bodies), np.zeros((bodies, 3)), np.tile(1e-3 * np.eye(3), (bodies, 1, 1))
+    )
+    empty = ("",) * bodies
+    markers = MarkerSet(empty, np.arange(bodies), np.zeros((bodies, 3)), np.ones(bodies), empty)
+    q = np.zeros((2, *SHAPE))
+    places = marker_places(Skeleton(steps, masses), markers, q)
+    trial = Trial("", "", np.arange(2.0), places, np.ones(places.shape[:2], dtype=bool), "hanging")
+    seen = watched(Skeleton(steps, masses), markers, trial, 1)
+    postures(Ask(loads=False), seen)
+    solve(Ask(force_cost="level_difference"), [seen], [seen.grid.through(q)])
+
+
 if __name__ == "__main__":
+    track_a_spine_that_stands()
     print(relative_error())

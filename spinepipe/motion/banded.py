@@ -1,16 +1,20 @@
 """Normal equations of a trajectory: a band of blocks, with a border of what is shared.
 
-A node touches three neighbouring coefficients of 108 numbers each, so that the matrix of all nodes
-is block pentadiagonal; parameters that all nodes share border it and are eliminated last (Schur
-complement). Cholesky factors and substitutions go block by block, so that all is matrix times
-matrix: LAPACK substitutes into a band column by column, which takes ten times as long.
+A node touches three neighbouring coefficients of n numbers each (108 where all coordinates are
+free), so that the matrix of all nodes is block pentadiagonal; parameters that all nodes share
+border it and are eliminated last (Schur complement). Cholesky factors and substitutions go block by
+block, so that all is matrix times matrix: LAPACK substitutes into a band column by column, which
+takes ten times as long. BLAS works in place: what lies in memory row by row is to it the transposed
+block, column by column.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dtrsm
+from numpy.linalg import LinAlgError
+from scipy.linalg.blas import dgemm, dtrsm, dtrsv
+from scipy.linalg.lapack import dpotrf
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.points import COUNT
@@ -25,8 +29,8 @@ class Band:
 
     Attributes
     ----------
-    blocks : (C, 3, 108, 108) of the coefficient itself, the next and the one after that (rows)
-        with the coefficient (columns). border : (C, 108, P). slope : (C, 108).
+    blocks : (C, 3, n, n) of the coefficient itself, the next and the one after that (rows) with
+        the coefficient (columns). border : (C, n, P). slope : (C, n).
     """
 
     blocks: Array
@@ -34,23 +38,24 @@ class Band:
     slope: Array
 
     @classmethod
-    def empty(cls, coefficients: int, shared: int) -> "Band":
-        """Of so many coefficients and shared parameters."""
+    def empty(cls, coefficients: int, shared: int, count: int = COUNT) -> "Band":
+        """Of so many coefficients of `count` numbers, and shared parameters."""
         return cls(
-            np.zeros((coefficients, REACH, COUNT, COUNT)),
-            np.zeros((coefficients, COUNT, shared)),
-            np.zeros((coefficients, COUNT)),
+            np.zeros((coefficients, REACH, count, count)),
+            np.zeros((coefficients, count, shared)),
+            np.zeros((coefficients, count)),
         )
 
     @property
     def diagonal(self) -> Array:
-        """(C, 108), a view that can be written to."""
-        return self.blocks[:, 0].reshape(len(self.blocks), -1)[:, :: COUNT + 1]
+        """(C, n), a view that can be written to."""
+        found: Array = np.einsum("cii->ci", self.blocks[:, 0])
+        return found
 
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """A damped band, factored: (C, 3, 108, 108), below each diagonal block the two under it."""
+    """A damped band, factored: (C, 3, n, n), below each diagonal block the two under it."""
 
     blocks: Array
 
@@ -63,54 +68,52 @@ class Factor:
         LinAlgError
             Of a matrix that is not positive definite.
         """
-        count = len(band.blocks)
+        size = band.blocks.shape[-1]
+        grown = damping * band.diagonal + least
         # two coefficients past the end, with which nothing hangs together, spare the loop its ends
-        found = np.zeros((count + REACH - 1, *band.blocks.shape[1:]))
-        found[:count] = band.blocks
-        found[:count, 0].reshape(count, -1)[:, :: COUNT + 1] += damping * band.diagonal + least
-        for k in range(count):
-            pivot = found[k, 0] = np.linalg.cholesky(found[k, 0])
-            under = found[k, 1:].reshape(-1, COUNT)
-            under[:] = _substituted(pivot, under.T).T
-            left = under @ under.T
-            found[k + 1, 0] -= left[:COUNT, :COUNT]
-            found[k + 1, 1] -= left[COUNT:, :COUNT]
-            found[k + 2, 0] -= left[COUNT:, COUNT:]
-        return cls(found[:count])
+        found = np.zeros((len(grown) + REACH - 1, *band.blocks.shape[1:]))
+        for k, own in enumerate(band.blocks):
+            here = found[k]
+            here += own
+            here[0].reshape(-1)[:: size + 1] += grown[k]
+            pivot, failed = dpotrf(here[0].T, lower=0, overwrite_a=1)
+            if failed:
+                raise LinAlgError("Matrix is not positive definite")
+            under = here[1:].reshape(-1, size).T
+            dtrsm(1.0, pivot, under, trans_a=1, overwrite_b=1)
+            first, second = under[:, :size], under[:, size:]
+            next_two, after = found[k + 1, :2].reshape(-1, size).T, found[k + 2, 0].T
+            dgemm(-1.0, first, under, 1.0, next_two, trans_a=1, overwrite_c=1)
+            dgemm(-1.0, second, second, 1.0, after, trans_a=1, overwrite_c=1)
+        return cls(found[: len(grown)])
 
     def forwards(self, right: Array) -> Array:
-        """(C, 108, n) of (C, 108, n): the lower factor's inverse times it."""
-        count = len(right)
-        found = np.zeros((count + REACH - 1, *right.shape[1:]))
-        found[:count] = right
-        for k in range(count):
-            found[k] = _substituted(self.blocks[k, 0], found[k])
-            found[k + 1 : k + REACH] -= self.blocks[k, 1:] @ found[k]
-        return found[:count]
-
-    def backwards(self, right: Array) -> Array:
-        """(C, 108, n) of (C, 108, n): the inverse of the lower factor, transposed, times it."""
-        found = np.zeros((len(right) + REACH - 1, *right.shape[1:]))
-        for k in reversed(range(len(right))):
-            under = self.blocks[k, 1:].reshape(-1, COUNT)
-            above = right[k] - under.T @ found[k + 1 : k + REACH].reshape(len(under), -1)
-            found[k] = _substituted(self.blocks[k, 0], above, turned=True)
+        """(C, n, m) of (C, n, m): the lower factor's inverse times it."""
+        _, size, columns = right.shape
+        found = np.zeros((len(right) + REACH - 1, size, columns))
+        found[: len(right)] = right
+        for k, (pivot, *_) in enumerate(self.blocks):
+            here, under = found[k].T, self.blocks[k, 1:].reshape(-1, size).T
+            dtrsm(1.0, pivot.T, here, side=1, overwrite_b=1)
+            next_two = found[k + 1 : k + REACH].reshape(-1, columns).T
+            dgemm(-1.0, here, under, 1.0, next_two, overwrite_c=1)
         return found[: len(right)]
 
-
-def _substituted(lower: Array, right: Array, turned: bool = False) -> Array:
-    """(108, n): a triangle's inverse, or that of the transposed one, times (108, n).
-
-    The triangle is handed over transposed: rows in memory are the columns that BLAS looks for.
-    """
-    found: Array = dtrsm(1.0, lower.T, right, lower=0, trans_a=0 if turned else 1)
-    return found
+    def backwards(self, right: Array) -> Array:
+        """(C, n) of (C, n): the inverse of the lower factor, transposed, times it."""
+        size = right.shape[1]
+        found = np.zeros((len(right) + REACH - 1, size))
+        for k in reversed(range(len(right))):
+            under = self.blocks[k, 1:].reshape(-1, size)
+            above = right[k] - found[k + 1 : k + REACH].reshape(-1) @ under
+            found[k] = dtrsv(self.blocks[k, 0].T, above)
+        return found[: len(right)]
 
 
 def bordered_step(
     bands: Sequence[Band], factors: Sequence[Factor], square: Array, slope: Array
 ) -> tuple[list[Array], Array]:
-    """Newton step of each trial's coefficients (C, 108), and of the P parameters they share.
+    """Newton step of each trial's coefficients (C, n), and of the P parameters they share.
 
     Parameters
     ----------
@@ -125,6 +128,5 @@ def bordered_step(
     step: Array = -np.asarray(np.linalg.solve(square, slope), dtype=float) if shared else slope
     weights = np.append(step, 1.0)
     return [
-        -factor.backwards((half @ weights)[..., None])[..., 0]
-        for half, factor in zip(halves, factors, strict=True)
+        -factor.backwards(half @ weights) for half, factor in zip(halves, factors, strict=True)
     ], step

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.motion.articulated import damped_steps
 from spinepipe.motion.asked import SHAPE, Ask, Watched
-from spinepipe.motion.points import COUNT, marker_places
+from spinepipe.motion.points import COUNT, joints_of, marker_places
 from spinepipe.motion.skeleton import PELVIS
 from spinepipe.motion.terms import Loads, Markers, beyond
 
@@ -24,6 +25,9 @@ SMALL = 1e-10
 
 _RIDGE = 1e-8
 """Of the largest diagonal: what is not seen does not move."""
+
+_AT_REST = np.array([[1.0], [0.0], [0.0]])
+"""Weights of a posture alone: its place, no velocity, no acceleration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +54,14 @@ def postures(
     ratios : (108, n) what each of fewer numbers makes of all coordinates; None for the free
         coordinates themselves.
     """
-    whole = np.eye(COUNT)[:, ask.free.reshape(-1)] if ratios is None else ratios
-    frames = len(watched.places)
-    q = np.zeros((frames, *SHAPE))
+    q = np.zeros((len(watched.places), *SHAPE))
     q[:, PELVIS, :3] = _first_place(watched)
-    q, _, _ = _rounds(_stiff(ask), watched, q, np.eye(COUNT)[:, :6], most_steps)
-    q, steps, settled = _rounds(ask, watched, q, whole, most_steps)
+    # the trunk as a whole first, then its joints
+    alone = np.zeros(SHAPE, dtype=bool)
+    alone[PELVIS] = True
+    stiff = replace(ask, free=alone, loads=False, passive=None)
+    q, _, _ = _rounds(stiff, watched, q, None, most_steps)
+    q, steps, settled = _rounds(ask, watched, q, ratios, most_steps)
     return Postures(q, settled, steps)
 
 
@@ -71,12 +77,8 @@ def _first_place(watched: Watched) -> Array:
     return found
 
 
-def _stiff(ask: Ask) -> Ask:
-    return replace(ask, loads=False, passive=None)
-
-
 def _rounds(
-    ask: Ask, watched: Watched, q: Array, whole: Array, most_steps: int
+    ask: Ask, watched: Watched, q: Array, ratios: Array | None, most_steps: int
 ) -> tuple[Array, int, Array]:
     """Steps of each frame until they are short; each frame has its own damping."""
     damping, q = np.full(len(q), 1e-4), q.copy()
@@ -86,12 +88,17 @@ def _rounds(
         steps += 1
         left = np.flatnonzero(~settled)
         seen = watched.at(left)
-        square, down = _normal(ask, seen, q[left], whole)
-        diagonal = np.einsum("fii->fi", square)
-        ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)
-        grown = square + (damping[left, None] * diagonal + ridge)[:, :, None] * np.eye(len(whole.T))
-        move = -np.linalg.solve(grown, down[..., None])[..., 0]
-        there = q[left] + (move @ whole.T).reshape(-1, *SHAPE)
+        if ratios is None and not ask.loads and watched.shares is None:
+            move = _steps_of_joints(ask, seen, q[left], damping[left])
+            there = q[left] + move.reshape(-1, *SHAPE)
+        else:
+            whole = np.eye(COUNT)[:, ask.free.reshape(-1)] if ratios is None else ratios
+            square, down = _normal(ask, seen, q[left], whole)
+            diagonal = np.einsum("fii->fi", square)
+            ridge = np.maximum(_RIDGE * diagonal.max(axis=1, keepdims=True), _RIDGE)
+            diagonal += damping[left, None] * diagonal + ridge
+            move = np.asarray(-np.linalg.solve(square, down[..., None])[..., 0], dtype=float)
+            there = q[left] + (move @ whole.T).reshape(-1, *SHAPE)
         found = _cost(ask, seen, there)
         better = found <= cost[left]
         short = np.abs(move).max(axis=1) < SHORTEST
@@ -115,26 +122,54 @@ def _cost(ask: Ask, watched: Watched, q: Array) -> Array:
     return np.asarray(found)
 
 
-def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, Array]:
-    """(F, n, n) and (F, n)."""
-    off, slopes = Markers(watched, ask).with_slopes(q)
-    rows = [(off, slopes @ whole)]
+def _by_themselves(ask: Ask, q: Array) -> tuple[Array, Array]:
+    """(F, 108) each: curvature and slope of what each coordinate costs by itself."""
     over, steep = (one.reshape(len(q), COUNT) for one in beyond(ask, q))
-    # what each coordinate costs by itself: the diagonal of its curvature, and its slope
     curved, pulled = steep**2, over * steep
-    if ask.loads:
-        rest = np.zeros_like(q)
-        load, by_motion, _ = Loads.of(watched, ask).with_slopes(ask.passive, (q, rest, rest))
-        rows.append((load, by_motion[:, 0] @ whole))
-    elif ask.passive is not None:
+    if ask.passive is not None and not ask.loads:
         stretched, stiff = _stretched(ask, q)
         curved[:, PELVIS + 6 :] += stiff**2
         pulled[:, PELVIS + 6 :] += stretched * stiff
-    square, down = whole.T @ (curved[..., None] * whole), pulled @ whole
-    for off, slope in rows:
-        turned = np.swapaxes(slope, 1, 2)
-        square += turned @ slope
-        down += (turned @ off[..., None])[..., 0]
+    return curved, pulled
+
+
+def _steps_of_joints(ask: Ask, watched: Watched, q: Array, damping: Array) -> Array:
+    """(F, 108) damped steps where each coordinate moves by itself, and no load costs."""
+    markers, found = watched.markers, np.empty(q.shape)
+    curved, pulled = _by_themselves(ask, q)
+    turned, apart = joints_of(watched.skeleton)
+    damped_steps(
+        q,
+        turned,
+        apart,
+        markers.body,
+        np.ascontiguousarray(markers.at),
+        watched.places,
+        watched.weight / ask.sizes.marker_m**2,
+        ask.free,
+        curved.reshape(q.shape),
+        pulled.reshape(q.shape),
+        damping,
+        _RIDGE,
+        found,
+    )
+    return found.reshape(len(q), COUNT)
+
+
+def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, Array]:
+    """(F, n, n) and (F, n)."""
+    off, slopes = Markers(watched, ask).with_slopes(q)
+    curved, pulled = _by_themselves(ask, q)
+    slope = slopes @ whole
+    square = whole.T @ (curved[..., None] * whole) + np.swapaxes(slope, 1, 2) @ slope
+    down = pulled @ whole + (off[:, None] @ slope)[:, 0]
+    if ask.loads:
+        rest = np.zeros_like(q)
+        at_rest = Loads.of(watched, ask).by_node(ask.passive, (q, rest, rest), _AT_REST)
+        for k, node in enumerate(at_rest):
+            weighed = node.weighed[0] @ whole
+            square[k] += weighed.T @ (node.each[0] @ whole)
+            down[k] += node.active @ weighed
     return square, down
 
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
@@ -51,9 +52,18 @@ class RigidBodies:
             pin.computeRNEADerivatives(self._model, self._data, *now)
             loads[k] = self._data.tau
             slopes[k, 0], slopes[k, 1] = self._data.dtau_dq, self._data.dtau_dv
-            upper = np.triu(self._data.M)
-            slopes[k, 2] = upper + np.triu(upper, 1).T
+            slopes[k, 2] = self._data.M
+        _mirror(slopes[:, 2])
         return loads, slopes
+
+
+@njit(cache=True)
+def _mirror(matrices: Array) -> None:
+    """Below their diagonals what is above: pinocchio writes one half of an inertia matrix."""
+    for k in range(len(matrices)):
+        for i in range(len(matrices[k])):
+            for j in range(i):
+                matrices[k, i, j] = matrices[k, j, i]
 
 
 @lru_cache(maxsize=8)

@@ -3,9 +3,12 @@
 All come as residuals, so that a cost is a sum of squares and half its curvature their slopes'.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.asked import SHAPE, Ask, Watched
@@ -39,11 +42,28 @@ class Markers:
     def _weighed(self, rows: Array) -> Array:
         """(F, 3 K, n) over their sizes."""
         seen, size = self.watched, self.ask.sizes.marker_m
-        if seen.shares is not None:
-            return seen.shares @ (rows / size)
-        share = np.repeat(np.sqrt(seen.weight), 3, axis=1) / size
-        found: Array = rows * share[..., None]
+        share = np.repeat(np.sqrt(seen.weight), 3, axis=1)[..., None]
+        found: Array = rows * share if seen.shares is None else seen.shares @ rows
+        found /= size
         return found
+
+
+class LoadSlopes(NamedTuple):
+    """Loads of one node, over their sizes, and what moves them.
+
+    Attributes
+    ----------
+    each : (n, 102, 108) slopes by its coefficients. weighed : the same, each load with those that
+        it is held against (`Loads.metric` times it), so that `weighed.T @ each` is a curvature.
+    active : (102,) what muscles do. by_size, by_shape : (102,) slopes of each load by the
+        logarithms of A and of B of its own passive element.
+    """
+
+    each: Array
+    weighed: Array
+    active: Array
+    by_size: Array
+    by_shape: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,45 +97,57 @@ class Loads:
         active = self.active(law, motion) / self.ask.sizes.of_loads
         return self._between(active.reshape(len(active), len(JOINTS), -1)).reshape(len(active), -1)
 
-    def with_slopes(
-        self, law: PassiveLaw | None, motion: tuple[Array, Array, Array]
-    ) -> tuple[Array, Array, Array]:
-        """Residuals (F, R), slopes (F, 3, R, 108) by place, velocity and acceleration, and slopes
-        (F, R, P) by the logarithms of sizes and shapes that are fitted."""
-        frames = len(motion[0])
-        loads, slopes = self.bodies.with_slopes(*(one.reshape(frames, COUNT) for one in motion))
-        loads, slopes = loads[:, _PELVIS:].copy(), slopes[:, :, _PELVIS:].copy()
-        fitted = np.flatnonzero(self.ask.fitted.ravel())
-        shared = np.zeros((frames, loads.shape[1], 2 * len(fitted)))
+    def by_node(
+        self, law: PassiveLaw | None, motion: tuple[Array, Array, Array], weights: Array
+    ) -> Iterator[LoadSlopes]:
+        """Of each node, with slopes by its coefficients.
+
+        Parameters
+        ----------
+        weights : (3, n) of the n coefficients of a node: place, velocity, acceleration (`spline`).
+        """
+        frames, count = len(motion[0]), COUNT - _PELVIS
+        force, stiffness, by_shape = np.zeros((3, frames, count))
         if law is not None:
             force, stiffness, by_shape = (
-                one.reshape(frames, -1) for one in law.with_slopes(motion[0][:, 1:])
+                np.ascontiguousarray(one).reshape(frames, count)
+                for one in law.with_slopes(motion[0][:, 1:])
             )
-            loads += force
-            diagonal = np.arange(loads.shape[1])
-            slopes[:, 0, diagonal, diagonal + _PELVIS] += stiffness
-            shared[:, fitted, np.arange(len(fitted))] = force[:, fitted]
-            shared[:, fitted, len(fitted) + np.arange(len(fitted))] = by_shape[:, fitted]
-        size = np.tile(self.ask.sizes.of_loads, len(JOINTS))
-        loads, slopes, shared = (
-            loads / size,
-            slopes / size[:, None],
-            shared / size[:, None],
-        )
-        levels = len(JOINTS), SHAPE[1]
-        return (
-            self._between(loads.reshape(frames, *levels)).reshape(frames, -1),
-            self._between(slopes.reshape(frames, 3, *levels, -1), 2).reshape(slopes.shape),
-            self._between(shared.reshape(frames, *levels, -1)).reshape(shared.shape),
-        )
+        size, common = self.ask.sizes.of_loads, self._common
+        whole_size = np.tile(size, len(JOINTS))
+        flat = [one.reshape(frames, COUNT) for one in motion]
+        for k in range(frames):
+            loads, by_motion = self.bodies.with_slopes(*(one[k : k + 1] for one in flat))
+            each = np.empty((weights.shape[1], count, COUNT))
+            _by_coefficients(by_motion[0], stiffness[k], size, weights, each)
+            weighed = each
+            if self.ask.force_cost == "level_difference":
+                weighed = np.empty_like(each)
+                _weigh_levels(each, common**2, weighed)
+            own = (loads[0, _PELVIS:] + force[k], force[k], by_shape[k])
+            yield LoadSlopes(each, weighed, *(one / whole_size for one in own))
+
+    @property
+    def metric(self) -> Array:
+        """(102, 102) by which loads over their sizes are multiplied before they meet each other."""
+        count = COUNT - _PELVIS
+        rows = self._between(np.eye(count).reshape(len(JOINTS), SHAPE[1], count), 0)
+        flat = rows.reshape(count, count)
+        found: Array = flat.T @ flat
+        return found
+
+    @property
+    def _common(self) -> Array:
+        """(6,) of the sum over joints of loads over their sizes."""
+        found: Array = self.ask.sizes.of_loads / self.ask.sizes.of_common / np.sqrt(len(JOINTS))
+        return found
 
     def _between(self, by_level: Array, axis: int = 1) -> Array:
         """Rows (..., 17, 6, ...) as they cost, levels on that axis."""
         if self.ask.force_cost != "level_difference":
             return by_level
-        lighter = self.ask.sizes.of_loads / self.ask.sizes.of_common / np.sqrt(len(JOINTS))
         whole = by_level.sum(axis=axis, keepdims=True)
-        whole *= lighter.reshape(-1, *[1] * (by_level.ndim - axis - 2))
+        whole *= self._common.reshape(-1, *[1] * (by_level.ndim - axis - 2))
         return np.concatenate([np.diff(by_level, axis=axis), whole], axis=axis)
 
 
@@ -124,3 +156,45 @@ def beyond(ask: Ask, q: Array) -> tuple[Array, Array]:
     over = np.maximum(q - ask.high, 0.0) + np.minimum(q - ask.low, 0.0)
     size = np.broadcast_to(ask.sizes.beyond, SHAPE)
     return over / size, (over != 0.0) / size
+
+
+@njit(cache=True)
+def _by_coefficients(
+    by_motion: Array, stiffness: Array, size: Array, weights: Array, found: Array
+) -> None:
+    """Slopes (n, 102, 108) of joints' loads over their size, from those (3, 108, 108) by motion."""
+    joint_rows, columns = found.shape[1:]
+    for i in range(len(found)):
+        place, velocity, acceleration = weights[:, i]
+        for r in range(joint_rows):
+            row, per = r + _PELVIS, 1.0 / size[r % len(size)]
+            for s in range(columns):
+                found[i, r, s] = per * (
+                    place * by_motion[0, row, s]
+                    + velocity * by_motion[1, row, s]
+                    + acceleration * by_motion[2, row, s]
+                )
+            found[i, r, row] += per * place * stiffness[r]
+
+
+@njit(cache=True)
+def _weigh_levels(each: Array, common: Array, found: Array) -> None:
+    """Differences from level to level, and the sum of all with its share `common` (6,), transposed
+    times themselves: the Laplacian of a path, and a constant beside it."""
+    coefficients, rows, columns = each.shape
+    axes = len(common)
+    whole = np.empty((axes, columns))
+    for i in range(coefficients):
+        whole[:] = 0.0
+        for r in range(rows):
+            for s in range(columns):
+                whole[r % axes, s] += common[r % axes] * each[i, r, s]
+        for r in range(rows):
+            for s in range(columns):
+                found[i, r, s] = whole[r % axes, s]
+            if r >= axes:
+                for s in range(columns):
+                    found[i, r, s] += each[i, r, s] - each[i, r - axes, s]
+            if r + axes < rows:
+                for s in range(columns):
+                    found[i, r, s] += each[i, r, s] - each[i, r + axes, s]

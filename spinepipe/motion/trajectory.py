@@ -5,10 +5,12 @@ elements are solved together.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.linalg import LinAlgError
+from numpy.typing import NDArray
+from scipy.linalg.blas import dgemm
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.asked import Ask, Watched
@@ -202,86 +204,93 @@ class Trajectory:
             band, own_square, own_slope = self._band(trial, coefficients, law)
             bands.append(band)
             square, slope = square + own_square, slope + own_slope
+        if self.held is not None:
+            # what is held hangs together with nothing and is not asked to move
+            held = np.flatnonzero(self.held)
+            for band in bands:
+                band.border[..., held] = 0.0
+            square[held], square[:, held], slope[held] = 0.0, 0.0, 0.0
+            square[held, held] = 1.0
         return _Asked(bands, square, slope)
+
+    @property
+    def _free(self) -> NDArray[np.int64]:
+        """(n,) coordinates that there are, of all 108."""
+        return np.flatnonzero(self.ask.free)
 
     def _band(
         self, trial: Watched, coefficients: Array, law: PassiveLaw | None
     ) -> tuple[Band, Array, Array]:
-        count, worth = self.ask.parameters, self._worth(trial)
-        band = Band.empty(trial.grid.coefficients, count)
+        shared, worth, free = self.ask.parameters, self._worth(trial), self._free
+        band = Band.empty(trial.grid.coefficients, shared, len(free))
         motion, weights = trial.grid.at_nodes(coefficients), trial.grid.weights
-        squares, slopes = self._by_place(trial, motion)
-        frames, places = len(squares), weights[0]
-        square, slope = np.zeros((count, count)), np.zeros(count)
-        if self.ask.loads:
-            off, by_motion, shared = Loads.of(trial, self.ask).with_slopes(law, motion)
-            # (F, 3, 108, R): what each of a node's three coefficients does to its loads
-            each = np.swapaxes(
-                (weights.T @ by_motion.reshape(frames, REACH, -1)).reshape(by_motion.shape), 2, 3
-            )
-            flat = shared.reshape(off.size, count)
-            square += worth * (flat.T @ flat)
-            slope += worth * (flat.T @ off.ravel())
-        for i in range(REACH):
-            down = places[i] * slopes
-            if self.ask.loads:
-                down += (each[:, i] @ off[..., None])[..., 0]
-                band.border[i : i + frames] += worth * (each[:, i] @ shared)
-            band.slope[i : i + frames] += worth * down
-            for j in range(i + 1):
-                block = places[i] * places[j] * squares
-                if self.ask.loads:
-                    block += each[:, i] @ np.swapaxes(each[:, j], 1, 2)
-                band.blocks[j : j + frames, i - j] += worth * block
-        self._smoothed(band, trial, motion[2], worth)
-        self._locked(band)
+        self._placed(band, trial, motion[0])
+        self._smoothed(band, trial, motion[2])
+        square, slope = np.zeros((shared, shared)), np.zeros(shared)
+        if not self.ask.loads:
+            return band, square, slope
+        loads, fitted = Loads.of(trial, self.ask), np.flatnonzero(self.ask.fitted)
+        own = []
+        for k, node in enumerate(loads.by_node(law, motion, weights)):
+            each, weighed = node.each, node.weighed
+            if len(free) < COUNT:
+                each, weighed = each[..., free], weighed[..., free]
+            band.slope[k : k + REACH] += worth * (node.active @ weighed)
+            for j in range(REACH):
+                for i in range(j, REACH):
+                    block = band.blocks[k + j, i - j].T
+                    dgemm(worth, each[j].T, weighed[i].T, 1.0, block, trans_b=1, overwrite_c=1)
+            if shared:
+                by = np.append(node.by_size[fitted], node.by_shape[fitted])
+                twice = np.concatenate([weighed[:, fitted]] * 2, axis=1)
+                band.border[k : k + REACH] += worth * np.swapaxes(by[:, None] * twice, 1, 2)
+                own.append((by, node.active))
+        if shared:
+            by, active = (np.array(one) for one in zip(*own, strict=True))
+            rows = loads.metric[np.tile(fitted, 2)]
+            square = worth * rows[:, np.tile(fitted, 2)] * (by.T @ by)
+            slope = worth * (by * (active @ rows.T)).sum(axis=0)
         return band, square, slope
 
-    def _by_place(self, trial: Watched, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-        """(F, 108, 108) and (F, 108) of markers and ranges."""
-        off, slopes = Markers(trial, self.ask).with_slopes(motion[0])
-        turned = np.swapaxes(slopes, 1, 2)
-        squares = turned @ slopes
-        down = np.einsum("fqr,fr->fq", turned, off)
-        over, steep = (one.reshape(len(off), COUNT) for one in beyond(self.ask, motion[0]))
-        diagonal = np.arange(COUNT)
-        squares[:, diagonal, diagonal] += steep**2
-        return squares, down + over * steep
+    def _placed(self, band: Band, trial: Watched, q: Array) -> None:
+        """Markers and ranges: what hangs on places alone."""
+        free, curve, worth = self._free, trial.grid.weights[0], self._worth(trial)
+        off, slopes = Markers(trial, self.ask).with_slopes(q)
+        over, steep = (one.reshape(len(q), COUNT)[:, free] for one in beyond(self.ask, q))
+        diagonal = np.arange(len(free))
+        for k, here in enumerate(slopes if len(free) == COUNT else slopes[..., free]):
+            square = here.T @ here
+            square[diagonal, diagonal] += steep[k] ** 2
+            down = off[k] @ here + over[k] * steep[k]
+            band.slope[k : k + REACH] += worth * curve[:, None] * down
+            for j in range(REACH):
+                for i in range(j, REACH):
+                    band.blocks[k + j, i - j] += worth * curve[i] * curve[j] * square
 
-    def _smoothed(self, band: Band, trial: Watched, acceleration: Array, worth: float) -> None:
+    def _smoothed(self, band: Band, trial: Watched, acceleration: Array) -> None:
         """Accelerations: each coordinate's own three coefficients."""
         if not self.ask.smooth:
             return
-        share = worth / np.tile(self.ask.sizes.of_accelerations, COUNT // 6) ** 2
+        free, frames = self._free, len(acceleration)
+        sizes = np.tile(self.ask.sizes.of_accelerations, COUNT // 6)[free]
+        share = self._worth(trial) / sizes**2
         curve = trial.grid.weights[2]
-        frames = len(acceleration)
-        flat = acceleration.reshape(frames, COUNT) * share
-        diagonal = np.arange(COUNT)
+        flat = acceleration.reshape(frames, COUNT)[:, free] * share
+        diagonal = np.arange(len(free))
         for i, first in enumerate(curve):
             band.slope[i : i + frames] += first * flat
             for j, second in enumerate(curve[: i + 1]):
                 band.blocks[j : j + frames, i - j, diagonal, diagonal] += first * second * share
 
-    def _locked(self, band: Band) -> None:
-        """Coordinates that are not there neither move nor are asked to."""
-        locked = np.flatnonzero(~self.ask.free.reshape(COUNT))
-        band.slope[:, locked] = 0.0
-        band.border[:, locked] = 0.0
-        band.blocks[:, :, locked] = 0.0
-        band.blocks[..., locked] = 0.0
-        band.diagonal[:, locked] = 1.0
-
     def step(self, asked: _Asked, damping: float) -> tuple[list[Array], Array]:
-        """Damped step of all coefficients and parameters."""
+        """Damped step (C, 108) of each trial's coefficients, and of the parameters."""
         # every diagonal gets a little besides: what nothing asks about stays where it is
         factors = [
             Factor.of(band, damping, 1e-9 * float(band.diagonal.max())) for band in asked.bands
         ]
         square = asked.square + damping * np.diag(np.diag(asked.square))
-        loose = np.ones(len(square), dtype=bool) if self.held is None else ~self.held.astype(bool)
-        bands = [replace(band, border=band.border[..., loose]) for band in asked.bands]
-        shared = np.zeros(len(square))
-        steps, shared[loose] = bordered_step(
-            bands, factors, square[np.ix_(loose, loose)], asked.slope[loose]
-        )
+        found, shared = bordered_step(asked.bands, factors, square, asked.slope)
+        steps = [np.zeros((len(one), COUNT)) for one in found]
+        for step, one in zip(steps, found, strict=True):
+            step[:, self._free] = one
         return steps, shared

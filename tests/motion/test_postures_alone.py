@@ -98,6 +98,28 @@ def test_a_posture_has_the_least_cost(name: str) -> None:
         assert (np.abs(up - down) < 0.05 * bend).all()
 
 
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", ["markers alone, within ranges", "springs"])
+def test_steps_of_an_articulated_body_are_those_of_the_normal_equations(name: str) -> None:
+    """Ratios that leave every coordinate to itself have the equations made and solved as a whole;
+    weak markers, one out of sight, far from where they belong, so that no step is short."""
+    ask = ASKS[name]
+    q = postures(33, 3, 0.1)
+    places = marker_places(spine(), markers(), q)
+    seen = np.ones(places.shape[:2], bool)
+    seen[1, 4] = False
+    heavier = replace(markers(), weight=np.linspace(0.2, 2.0, len(markers())))
+    trial = Trial("made", "stance", 0.1 * np.arange(3), places, seen, "hanging")
+    known = watched(spine(), heavier, trial, 2)
+    each = np.eye(np.prod(SHAPE))[:, ask.free.ravel()]
+    for rounds in (1, 4):
+        found, expected = (fitted(ask, known, ratios, most_steps=rounds) for ratios in (None, each))
+        assert found.steps == expected.steps == rounds
+        # what no marker tells is held by a ridge of 1e-8 alone, which leaves half the digits
+        np.testing.assert_allclose(found.q, expected.q, rtol=0.0, atol=1e-7)
+    assert np.abs(found.q - fitted(ask, known, most_steps=0).q).max() > 0.01
+
+
 def test_ratios_move_all_joints_as_fewer_numbers_say() -> None:
     """One number bends all joints alike; the pelvis is free."""
     shares = np.zeros((np.prod(SHAPE), 7))
