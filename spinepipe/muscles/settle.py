@@ -169,10 +169,9 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
     pushes[:, 1] = -start
     rounds: list[Round] = []
     trail: list[Array] = []
-    step, last, beyond = 1.0, np.zeros_like(pushes), False
+    step, last = 1.0, np.zeros_like(pushes)
     while True:
-        now = _at(person, task, how, tone, turned, pushes, beyond)
-        beyond = not now.found.enough
+        now = _at(person, task, how, tone, turned, pushes)
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
         residual = _residual(now, before, how)
@@ -237,7 +236,6 @@ def _at(
     tone: float,
     turned: Turned,
     pushes: Array,
-    beyond: bool = False,
     given: Array | None = None,
 ) -> Held:
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
@@ -264,7 +262,7 @@ def _at(
         pulls.along_sheath,
     )
     if given is None:
-        found = least_stress(_lowest(demand) if how.lowest_alone else demand, beyond)
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand)
         slack = demand.required - demand.arms @ found.forces
         found = replace(found, slack=slack)
     else:
