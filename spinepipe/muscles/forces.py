@@ -41,26 +41,36 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces (M,) N that meet a demand but for a slack (L,) N m; `enough` where none is needed."""
+    """Forces (M,) N that meet a demand but for a slack (L,) N m; `enough` where none is needed.
+
+    Attributes
+    ----------
+    multipliers : (L + 2,) of the rows and sheaths, where the demand is met; else none.
+    """
 
     forces: Array
     slack: Array
     enough: bool
+    multipliers: Array | None = None
 
 
-def least_stress(demand: Demand) -> Forces:
-    """Forces with the least sum of squared stress."""
-    found = _quadratic(demand, demand.required)
+def least_stress(demand: Demand, nearby: Forces | None = None) -> Forces:
+    """Forces with the least sum of squared stress; those of a demand nearby, where they are known,
+    shorten the way and change nothing."""
+    start = None if nearby is None else nearby.multipliers
+    found, multipliers = _quadratic(demand, demand.required, start=start)
     if found is not None:
-        return Forces(found, demand.required - demand.arms @ found, True)
-    found = _quadratic(demand, demand.required - least_slack(demand), tolerance=1e-5)
+        return Forces(found, demand.required - demand.arms @ found, True, multipliers)
+    found, _ = _quadratic(demand, demand.required - least_slack(demand), tolerance=1e-5)
     if found is None:
         found = _least_slack_forces(demand)
     return Forces(found, demand.required - demand.arms @ found, False)
 
 
-def _quadratic(demand: Demand, required: Array, tolerance: float = 0.0) -> Array | None:
-    """Forces (M,) N of the quadratic programme, None where there are none.
+def _quadratic(
+    demand: Demand, required: Array, tolerance: float = 0.0, start: Array | None = None
+) -> tuple[Array | None, Array]:
+    """Forces (M,) N of the quadratic programme, None where there are none; multipliers (L + 2,).
 
     What may be left over, up to the tolerance, counts as forces that cost next to nothing.
     """
@@ -72,8 +82,10 @@ def _quadratic(demand: Demand, required: Array, tolerance: float = 0.0) -> Array
         columns = np.vstack([columns, np.eye(rows, len(of_rows))])
         least = np.concatenate([least, np.full(rows, -tolerance)])
         most = np.concatenate([most, np.full(rows, tolerance)])
-    x, met = least_norm(columns, of_rows, rows, least, most)
-    return np.clip(x[: len(unit)] * unit, demand.least, demand.most) if met else None
+    first = np.zeros(len(of_rows)) if start is None else start
+    x, multipliers, met = least_norm(columns, of_rows, rows, least, most, first)
+    found = np.clip(x[: len(unit)] * unit, demand.least, demand.most) if met else None
+    return found, multipliers
 
 
 def least_slack(demand: Demand) -> Array:

@@ -25,19 +25,20 @@ _CENTRED = 0.1
 
 @njit(cache=True)
 def least_norm(
-    columns: Array, required: Array, equal: int, least: Array, most: Array
-) -> tuple[Array, bool]:
-    """The smallest x (M,), and whether it meets the rows.
+    columns: Array, required: Array, equal: int, least: Array, most: Array, start: Array
+) -> tuple[Array, Array, bool]:
+    """The smallest x (M,), its multipliers (R,), and whether it meets the rows.
 
     Parameters
     ----------
     columns : (M, R), what a unit of each x adds to the rows. required : (R,).
     equal : how many rows must be met as they are; the others may exceed what is required.
-    least, most : (M,) bounds.
+    least, most : (M,) bounds. start : (R,) multipliers of a problem nearby, or noughts.
     """
     many, rows = columns.shape
     x, z, along = np.zeros(many), np.zeros(many), np.zeros(many)
-    y, centre, left, slope = np.zeros(rows), np.zeros(rows), np.zeros(rows), np.zeros(rows)
+    y, centre, left, slope = start.copy(), start.copy(), np.zeros(rows), np.zeros(rows)
+    anew = not np.any(start)
     free = np.ones(rows, dtype=np.bool_)
     weight = _PROXIMAL * np.max(np.square(columns))
     for rounds in range(MOST_ROUNDS):
@@ -60,13 +61,13 @@ def least_norm(
             if free[r]:
                 off, inner = max(off, abs(left[r])), max(inner, abs(slope[r]))
         if off < _MET:
-            return x, True
+            return x, y, True
         if gain < -_MET * size:
-            return x, False
+            return x, y, False
         if inner < _CENTRED * off:
             centre[:] = y
             slope[:] = left
-        curved = _curvature(columns, z, least, most, rounds == 0)
+        curved = _curvature(columns, z, least, most, anew and rounds == 0)
         step = _newton(curved, slope, free, weight)
         while np.any(free[equal:] & (y[equal:] == 0.0) & (step[equal:] < 0.0)):
             # an inequality that is met and would be left on its other side stays out of the step
@@ -82,7 +83,7 @@ def least_norm(
         y += t * step
         if stopped >= 0:
             y[stopped] = 0.0
-    return x, False
+    return x, y, False
 
 
 @njit(cache=True)
