@@ -13,15 +13,20 @@ from spinepipe.calibrate import Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, MeasuredCase, ScopedEffect, SpineModel
+from spinepipe.muscles import pose
+from spinepipe.muscles.diaphragm import AREA_M2
+from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
+from spinepipe.muscles.masses import masses_of
 from spinepipe.muscles.myo_sim import source_of_myo_sim
-from spinepipe.muscles.regressions import packaged
+from spinepipe.muscles.passive_muscle import PassiveMuscle
+from spinepipe.muscles.paths import Lines, Standoff
+from spinepipe.muscles.person import Person
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
-from spinepipe.muscles.trunk import BODIES
+from spinepipe.muscles.trunk import BODIES, LEVELS
+from spinepipe.muscles.upright import upright
 from spinepipe.statics import System, follow, free_parameters
-from spinepipe.studies.trunk_loads.persons import how_of, standing
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.world import Chain
 
 MOMENT_NM = 7.5
@@ -62,11 +67,18 @@ def relative_error() -> float:
 
 def moment_left_over() -> float:
     """N m that the muscles of the reference person, standing, leave over."""
-    settings = TrunkLoads(study="doctor", kind="trunk_loads", cohort="doctor")
-    person = standing(settings, source_of_myo_sim().trunk, REFERENCE, packaged()).person
-    task = Task("standing", None, np.zeros((len(BODIES), 3)), from_upright=True)
-    found = held(person, task, how_of(settings)).found
-    return float(np.abs(found.slack).max())
+    trunk, unknown = source_of_myo_sim().trunk, np.zeros((len(BODIES), 3))
+    axial = np.array([AXIAL_N_PER_M[level] for level in LEVELS])
+    shear = np.full((len(LEVELS), 2), 1e6)
+    laws = JointLaws(CURVES["mixed"], np.ones((len(LEVELS), 3)), axial, shear, True)
+    chain, lines = pose.Chain.of(trunk, 0.004), Lines.of(trunk, Standoff())
+    person = Person(
+        *(REFERENCE, chain, lines, laws, PassiveMuscle(), masses_of(trunk, REFERENCE)),
+        *(AREA_M2, unknown, *np.ones((2, len(trunk.muscles)))),
+    )
+    stood = upright(person, unknown[:, 0], np.radians(5.0))
+    task = Task("standing", None, unknown, from_upright=True)
+    return float(np.abs(held(person.standing(stood.turned), task).found.slack).max())
 
 
 if __name__ == "__main__":
