@@ -1,27 +1,21 @@
 """Which muscle forces hold a posture: the least sum of squared stress that balances every joint.
 
 All joints and all axes are balanced at once (Ghezelbash 2016 Eq 1, as cuts through the trunk: what
-is above a joint is in balance about it). The quadratic programme is solved by DAQP, a dual
-active-set method. Where no forces within the muscles' strength balance the joints, a linear
-programme finds the least moment that must be left over, and the forces are the best of those that
-leave no more: nothing is infeasible in silence.
+is above a joint is in balance about it). Where no forces within the muscles' strength balance the
+joints, a linear programme finds the least moment that must be left over, and the forces are the
+best of those that leave no more: nothing is infeasible in silence.
 """
 
 from dataclasses import dataclass
 
-import daqp
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from spinepipe.effects.contract import Array
+from spinepipe.muscles.least_norm import least_norm
 
 STRESS_PA = 1e6
 """Unit of the unknowns: their size is then near 1."""
-
-SMALL_NM = 1e-6
-"""What a linear programme leaves over by rounding."""
-
-_EQUAL, _SOLVED = 5, (1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,48 +41,51 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces (M,) N that meet a demand but for a slack (L,) N m; `enough` where none is needed."""
+    """Forces (M,) N that meet a demand but for a slack (L,) N m; `enough` where none is needed.
+
+    Attributes
+    ----------
+    multipliers : (L + 2,) of the rows and sheaths, where the demand is met; else none.
+    """
 
     forces: Array
     slack: Array
     enough: bool
+    multipliers: Array | None = None
 
 
-def least_stress(demand: Demand, beyond: bool = False) -> Forces:
-    """Forces with the least sum of squared stress.
-
-    Parameters
-    ----------
-    beyond : whether muscles are likely too weak, so that it is asked first what must be left over.
-    """
-    lacking = least_slack(demand) if beyond else None
-    if lacking is None or np.abs(lacking).sum() < SMALL_NM:
-        found = _quadratic(demand, demand.required)
-        if found is not None:
-            return Forces(found, demand.required - demand.arms @ found, True)
-    met = demand.required - (least_slack(demand) if lacking is None else lacking)
-    found = _quadratic(demand, met, tolerance=1e-5)
+def least_stress(demand: Demand, nearby: Forces | None = None) -> Forces:
+    """Forces with the least sum of squared stress; those of a demand nearby, where they are known,
+    shorten the way and change nothing."""
+    start = None if nearby is None else nearby.multipliers
+    found, multipliers = _quadratic(demand, demand.required, start=start)
+    if found is not None:
+        return Forces(found, demand.required - demand.arms @ found, True, multipliers)
+    found, _ = _quadratic(demand, demand.required - least_slack(demand), tolerance=1e-5)
     if found is None:
         found = _least_slack_forces(demand)
     return Forces(found, demand.required - demand.arms @ found, False)
 
 
-def _quadratic(demand: Demand, required: Array, tolerance: float = 0.0) -> Array | None:
-    """Forces (M,) N of the quadratic programme, None where there are none.
+def _quadratic(
+    demand: Demand, required: Array, tolerance: float = 0.0, start: Array | None = None
+) -> tuple[Array | None, Array]:
+    """Forces (M,) N of the quadratic programme, None where there are none; multipliers (L + 2,).
 
-    DAQP starts from no active bounds: from those of forces nearby it takes longer.
+    What may be left over, up to the tolerance, counts as forces that cost next to nothing.
     """
-    unit = demand.pcsa * STRESS_PA
-    rows = np.ascontiguousarray(np.vstack([demand.arms * unit, demand.sheath * unit / 1e2]))
-    upper = np.concatenate([demand.most / unit, required + tolerance, np.full(2, 1e30)])
-    lower = np.concatenate([demand.least / unit, required - tolerance, np.zeros(2)])
-    sense = np.zeros(len(upper), dtype=np.int32)
-    if tolerance == 0.0:
-        sense[len(unit) : -2] = _EQUAL
-    x, _, flag, _ = daqp.solve(
-        np.eye(len(unit)), np.zeros(len(unit)), rows, upper, lower, sense, iter_limit=4000
-    )
-    return np.clip(x * unit, demand.least, demand.most) if flag in _SOLVED else None
+    unit, rows = demand.pcsa * STRESS_PA, len(required)
+    of_rows = np.concatenate([required, np.zeros(2)])
+    columns = np.hstack([demand.arms.T * unit[:, None], demand.sheath.T * unit[:, None] / 1e2])
+    least, most = demand.least / unit, demand.most / unit
+    if tolerance > 0.0:
+        columns = np.vstack([columns, np.eye(rows, len(of_rows))])
+        least = np.concatenate([least, np.full(rows, -tolerance)])
+        most = np.concatenate([most, np.full(rows, tolerance)])
+    first = np.zeros(len(of_rows)) if start is None else start
+    x, multipliers, met = least_norm(columns, of_rows, rows, least, most, first)
+    found = np.clip(x[: len(unit)] * unit, demand.least, demand.most) if met else None
+    return found, multipliers
 
 
 def least_slack(demand: Demand) -> Array:
@@ -97,7 +94,10 @@ def least_slack(demand: Demand) -> Array:
 
 
 def _least_slack_forces(demand: Demand) -> Array:
-    """(M,) N; a linear programme by HiGHS, asked through `milp`, which adds least of its own."""
+    """(M,) N; a linear programme by HiGHS, asked through `milp`, which adds least of its own.
+
+    So small a programme is solved before it is simplified.
+    """
     many, rows = len(demand.pcsa), len(demand.required)
     either = np.hstack([np.eye(rows), -np.eye(rows)])
     weights = np.block([[demand.arms, either], [demand.sheath, np.zeros((2, 2 * rows))]])
@@ -110,6 +110,7 @@ def _least_slack_forces(demand: Demand) -> Array:
             np.concatenate([demand.least, np.zeros(2 * rows)]),
             np.concatenate([demand.most, np.full(2 * rows, np.inf)]),
         ),
+        options={"presolve": False},
     )
     if solved.x is None:
         raise ValueError(f"the linear programme of the least slack failed: {solved.message}")

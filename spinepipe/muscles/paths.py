@@ -11,19 +11,20 @@ push (Ghezelbash 2016 2.3). The part across the sheath is left to transversus an
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.pose import BodyPoses
+from spinepipe.muscles.pose import BodyPoses, crossed
 from spinepipe.muscles.strings import tight
 from spinepipe.muscles.trunk import (
     BODIES,
     NO_BODY,
+    SIDES,
     SLICES,
     THORAX,
-    Muscles,
     Trunk,
     body_of,
 )
@@ -117,53 +118,54 @@ class Lines:
         along = self._sheath(poses, points, forces, moments)
         return Pulls(lengths, forces, moments, contacts, pushes, along, trace, traced, on)
 
+    @cached_property
+    def _in_sheath(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Of the K fascicles that end in a sheath: which they are, their sides, and how far up the
+        sheath they end."""
+        muscles = self.trunk.muscles
+        hung = np.flatnonzero(muscles.in_sheath)
+        side = np.array([SIDES.index(muscles.sides[k]) for k in hung], dtype=np.int64)
+        low, high = self.trunk.sheath[side].swapaxes(0, 1)
+        line, arm = high - low, muscles.point[hung, 1] - low
+        share = np.einsum("ki,ki->k", arm, line) / np.einsum("ki,ki->k", line, line)
+        return hung, side, share
+
     def _points(self, poses: BodyPoses) -> Array:
         """(M, P, 3) m, points of the paths now; those in the sheath between pelvis and ribs."""
         muscles = self.trunk.muscles
         found = poses.of(np.maximum(muscles.body, 0), muscles.point)
-        hung = np.flatnonzero(muscles.in_sheath)
-        if len(hung):
-            point = muscles.point[hung, 1]
-            share = self._share(hung, point)[:, None]
-            low = poses.of(np.full(len(hung), _SACRUM), point)
-            high = poses.of(np.full(len(hung), THORAX), point)
-            found[hung, 1] = (1.0 - share) * low + share * high
-        return found
-
-    def _share(self, hung: NDArray[np.int64], point: Array) -> Array:
-        """How far up the sheath of its side a point lies."""
-        low, high = self.trunk.sheath[_sides(self.trunk.muscles)[hung]].swapaxes(0, 1)
-        line = high - low
-        found: Array = np.einsum("ki,ki->k", point - low, line) / np.einsum("ki,ki->k", line, line)
+        hung, _, share = self._in_sheath
+        ends = muscles.point[hung, 1]
+        low, high = (poses.of(np.full(len(hung), body), ends) for body in (_SACRUM, THORAX))
+        found[hung, 1] = low + share[:, None] * (high - low)
         return found
 
     def _sheath(self, poses: BodyPoses, points: Array, forces: Array, moments: Array) -> Array:
         """Pull on the sheaths, (2, M); forces and moments of what hangs in them are set."""
-        muscles = self.trunk.muscles
+        muscles, (hung, side, _) = self.trunk.muscles, self._in_sheath
         along = np.zeros((2, len(muscles)))
         low, high = (
             poses.of(np.full(2, body), self.trunk.sheath[:, end])
             for end, body in ((0, _SACRUM), (1, THORAX))
         )
-        up = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
-        hung = np.flatnonzero(muscles.in_sheath)
-        side, ends = _sides(muscles)[hung], points[hung, :2]
-        line = ends[:, 1] - ends[:, 0]
-        line /= np.linalg.norm(line, axis=1, keepdims=True)
-        pull = np.einsum("ki,ki->k", line, up[side])
+        up, ends = _unit(high - low)[side], points[hung, :2]
+        line = _unit(ends[:, 1] - ends[:, 0])
+        pull = np.einsum("ki,ki->k", line, up)
         along[side, hung] = pull
-        down = pull[:, None] * up[side]
+        down = pull[:, None] * up
         on_ribs = np.where((muscles.body[hung, 0] == THORAX)[:, None], line, 0.0)
         forces[hung], moments[hung] = 0.0, 0.0
         forces[hung, THORAX] = on_ribs - down
-        moments[hung, THORAX] = np.cross(ends[:, 0], on_ribs) - np.cross(high[side], down)
+        moments[hung, THORAX] = crossed(ends[:, 0], on_ribs) - crossed(high[side], down)
         forces[hung, _SACRUM] = -forces[hung, THORAX]
         moments[hung, _SACRUM] = -moments[hung, THORAX]
         return along
 
 
-def _sides(muscles: Muscles) -> NDArray[np.int64]:
-    return np.array([0 if side == "right" else 1 for side in muscles.sides])
+def _unit(ways: Array) -> Array:
+    """(K, 3) of length 1."""
+    found: Array = ways / np.sqrt(np.einsum("ki,ki->k", ways, ways))[:, None]
+    return found
 
 
 def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:

@@ -1,10 +1,14 @@
 """A person whose trunk is to hold tasks: geometry, joints, muscles and weight."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
+from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.joint_laws import JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle, fibres_of
 from spinepipe.muscles.paths import Lines
@@ -39,6 +43,14 @@ class Person:
     rest: Array
     fibres: Array
 
+    @cached_property
+    def weights(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Of the masses: bodies (K,), centres (K, 3) m in the source's pose, pushes (K, 3) N."""
+        kg = np.array([mass.kg for mass in self.masses])
+        bodies = np.array([mass.body for mass in self.masses], dtype=np.int64)
+        at = np.array([mass.at for mass in self.masses]).reshape(-1, 3)
+        return bodies, at, kg[:, None] * STANDARD_GRAVITY
+
     def standing(self, upright: Array) -> "Person":
         """The same person with an upright posture (8, 3) rad, in which muscles are at rest."""
         poses = posed(self.chain, rotations_of(self.chain, upright), np.zeros((len(LEVELS), 3)))
@@ -58,10 +70,27 @@ def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:
     -------
     (..., 7, 3) N, and (..., 7, 3) N m about the joint.
     """
-    summed = np.cumsum(forces[..., :0:-1, :], axis=-2)[..., ::-1, :]
-    turning = np.cumsum(moments[..., :0:-1, :], axis=-2)[..., ::-1, :]
-    # cross products of the arms with the sums, component by component: (i, j, k) and its turns
-    after, last = [1, 2, 0], [2, 0, 1]
-    return summed, turning - (
-        centres[:, after] * summed[..., last] - centres[:, last] * summed[..., after]
-    )
+    many = forces.reshape(-1, *forces.shape[-2:]), moments.reshape(-1, *moments.shape[-2:])
+    summed, turning = _above(*many, centres)
+    shape = (*forces.shape[:-2], *centres.shape)
+    return summed.reshape(shape), turning.reshape(shape)
+
+
+@njit(cache=True)
+def _above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:
+    """As `above`, of (N, 8, 3)."""
+    levels = len(centres)
+    summed = np.zeros((len(forces), levels, 3))
+    turning = np.zeros((len(forces), levels, 3))
+    for n in range(len(forces)):
+        force, moment = np.zeros(3), np.zeros(3)
+        for k in range(levels - 1, -1, -1):
+            for i in range(3):
+                force[i] += forces[n, k + 1, i]
+                moment[i] += moments[n, k + 1, i]
+            for i in range(3):
+                # cross product with the arm: (i, j, h) and its turns
+                j, h = (i + 1) % 3, (i + 2) % 3
+                summed[n, k, i] = force[i]
+                turning[n, k, i] = moment[i] - (centres[k, j] * force[h] - centres[k, h] * force[j])
+    return summed, turning

@@ -3,11 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
-from spinepipe.muscles.trunk import Mass, Trunk
+from spinepipe.muscles.trunk import Trunk
 
 _SMALL = 1e-9
 
@@ -61,9 +62,9 @@ class BodyPoses:
 
     def of(self, body: NDArray[np.int64], points: Array) -> Array:
         """(..., 3) m, points (..., 3) of bodies (...) where they are now."""
-        turned = np.einsum("...ij,...j->...i", self.rotations[body], points - self.origins[body])
-        found: Array = turned + self.places[body]
-        return found
+        where = (self.rotations, self.places, self.origins)
+        found: Array = _carried(*where, body.ravel(), points.reshape(-1, 3))
+        return found.reshape(points.shape)
 
     def moved(self, translations: Array) -> "BodyPoses":
         """The same, not moved so far, with translations (7, 3) m of the joints."""
@@ -74,10 +75,27 @@ class BodyPoses:
         centres[1:] += shift[:-1]
         return replace(self, places=places, centres=centres)
 
-    def masses(self, masses: tuple[Mass, ...]) -> Array:
-        """(K, 3) m, where centres of mass are now."""
-        body = np.array([mass.body for mass in masses], dtype=np.int64)
-        return self.of(body, np.array([mass.at for mass in masses]).reshape(-1, 3))
+
+def crossed(arms: Array, forces: Array) -> Array:
+    """(..., 3) cross products of (..., 3) each: `numpy.cross` takes longer for so few."""
+    after, last = [1, 2, 0], [2, 0, 1]
+    found: Array = arms[..., after] * forces[..., last] - arms[..., last] * forces[..., after]
+    return found
+
+
+@njit(cache=True)
+def _carried(
+    rotations: Array, places: Array, origins: Array, body: NDArray[np.int64], points: Array
+) -> Array:
+    """(N, 3) m, points (N, 3) of bodies (N,) where they are now."""
+    found = np.empty(points.shape)
+    for n, k in enumerate(body):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        x, y, z = x - origins[k, 0], y - origins[k, 1], z - origins[k, 2]
+        for i in range(3):
+            turn = rotations[k, i]
+            found[n, i] = places[k, i] + (turn[0] * x + turn[1] * y + turn[2] * z)
+    return found
 
 
 def rotations_of(chain: Chain, angles: Array) -> Array:

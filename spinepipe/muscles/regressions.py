@@ -107,9 +107,17 @@ class Regressions:
 
     def row(self, quantity: Quantity, muscle: str = ALL, level: str = ALL) -> Regression:
         """The row that applies to a muscle at a level."""
-        places = ((muscle, level), (muscle, ALL), (ALL, level), (ALL, ALL))
-        found = (self._at.get((quantity, *place)) for place in places)
-        return next(row for row in found if row is not None)
+        asked = (quantity, muscle, level)
+        if asked not in self._applies:
+            places = ((muscle, level), (muscle, ALL), (ALL, level), (ALL, ALL))
+            found = (self._at.get((quantity, *place)) for place in places)
+            self._applies[asked] = next(row for row in found if row is not None)
+        return self._applies[asked]
+
+    @cached_property
+    def _applies(self) -> dict[tuple[str, str, str], Regression]:
+        """Rows that were asked for: each person asks for the same ones."""
+        return {}
 
     @cached_property
     def _at(self) -> Mapping[tuple[str, str, str], Regression]:

@@ -165,7 +165,7 @@ class _Size:
     ) -> None:
         self._trunk, self._regressions = trunk, regressions
         self._subject, self._reference = subject, reference
-        self._of_row: dict[Regression, float] = {}
+        self._of_row: dict[int, float] = {}
         self.height = subject.height_m / reference.height_m
 
     @property
@@ -173,9 +173,10 @@ class _Size:
         return self.of_row(self._regressions.row("rib_cage_area"))
 
     def of_row(self, row: Regression) -> float:
-        if row not in self._of_row:
-            self._of_row[row] = row.ratio(self._subject, self._reference)
-        return self._of_row[row]
+        found = self._of_row.get(id(row))  # a row's own hash is of all its text
+        if found is None:
+            found = self._of_row[id(row)] = row.ratio(self._subject, self._reference)
+        return found
 
     def moved(self, points: Array, muscles: NDArray[np.str_]) -> Array:
         """Points (..., 3) m of muscles (...), at the person's size."""

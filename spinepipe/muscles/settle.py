@@ -169,10 +169,10 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
     pushes[:, 1] = -start
     rounds: list[Round] = []
     trail: list[Array] = []
-    step, last, beyond = 1.0, np.zeros_like(pushes), False
+    step, last, found = 1.0, np.zeros_like(pushes), None
     while True:
-        now = _at(person, task, how, tone, turned, pushes, beyond)
-        beyond = not now.found.enough
+        now = _at(person, task, how, tone, turned, pushes, nearby=found)
+        found = now.found
         before = trail[-1] if trail else np.zeros_like(now.found.forces)
         change = _change(now.found.forces, before) if trail else None
         residual = _residual(now, before, how)
@@ -237,8 +237,8 @@ def _at(
     tone: float,
     turned: Turned,
     pushes: Array,
-    beyond: bool = False,
     given: Array | None = None,
+    nearby: Forces | None = None,
 ) -> Held:
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
     moves = how.feedback and how.translates
@@ -264,7 +264,7 @@ def _at(
         pulls.along_sheath,
     )
     if given is None:
-        found = least_stress(_lowest(demand) if how.lowest_alone else demand, beyond)
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand, nearby)
         slack = demand.required - demand.arms @ found.forces
         found = replace(found, slack=slack)
     else:

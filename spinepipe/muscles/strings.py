@@ -25,19 +25,29 @@ def _dot(a: Array, b: Array) -> float:
 
 
 @njit(cache=True)
-def _slide(ends: Array, at: Array, along: Array, s: Array, n: int) -> None:
-    """Move n contacts along their bars until the string is shortest; Newton, tridiagonal."""
+def _between(a: Array, b: Array, way: Array) -> float:
+    """Distance from a to b, whose difference is written to `way`: an array made anew costs more."""
+    for k in range(3):
+        way[k] = b[k] - a[k]
+    return float(np.sqrt(_dot(way, way)))
+
+
+@njit(cache=True)
+def _slide(x: Array, at: Array, along: Array, s: Array, n: int) -> None:
+    """Move n contacts along their bars until the string is shortest; Newton, tridiagonal.
+
+    The ends of the string are x[0] and x[n + 1]; its contacts are set between them.
+    """
     upper, lower, right = np.zeros(n), np.zeros(n), np.zeros(n)
-    middle, x = np.zeros(n), np.zeros((n + 2, 3))
+    middle, u = np.zeros(n), np.zeros(3)
     for _ in range(_STEPS):
-        x[0], x[n + 1] = ends[0], ends[1]
         for i in range(n):
-            x[i + 1] = at[i] + s[i] * along[i]
+            for k in range(3):
+                x[i + 1, k] = at[i, k] + s[i] * along[i, k]
         middle[:], upper[:], right[:] = 0.0, 0.0, 0.0
         for i in range(n + 1):
-            d = x[i + 1] - x[i]
-            length = np.sqrt(_dot(d, d)) + 1e-12
-            u = d / length
+            length = _between(x[i], x[i + 1], u) + 1e-12
+            u /= length
             if i > 0:
                 c = _dot(along[i - 1], u)
                 right[i - 1] += c
@@ -69,14 +79,17 @@ def _slide(ends: Array, at: Array, along: Array, s: Array, n: int) -> None:
 @njit(cache=True)
 def _gap(p: Array, q: Array, bar: Array, along: Array, behind: Array) -> tuple[float, float]:
     """How far the string from p to q passes behind a bar, and where along the bar."""
-    d, w = q - p, p - bar
-    a, b, c = _dot(d, d), _dot(d, along), _dot(w, along)
+    a, b, c, e, away, rising = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        d, w = q[k] - p[k], p[k] - bar[k]
+        a, e = a + d * d, e + d * w
+        b, c = b + d * along[k], c + w * along[k]
+        away, rising = away + w * behind[k], rising + d * behind[k]
     rest = a - b * b
     t = 0.0
     if rest > 1e-18:
-        t = min(max(float((b * c - _dot(d, w)) / rest), 0.0), 1.0)
-    x = w + t * d
-    return _dot(x, behind), _dot(x, along)
+        t = min(max((b * c - e) / rest, 0.0), 1.0)
+    return away + t * rising, c + t * b
 
 
 @njit(cache=True)
@@ -84,7 +97,9 @@ def _over(ends: Array, bars: Array, along: Array, behind: Array, touched: Array,
     """Which of the bars the string touches (flags, set), where (s, set); rounds taken."""
     n = len(bars)
     at, across, slid = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    index = np.zeros(n, dtype=np.int64)
+    index, x = np.zeros(n, dtype=np.int64), np.zeros((n + 2, 3))
+    back, on = np.zeros(3), np.zeros(3)
+    x[0] = ends[0]
     touched[:] = False
     for rounds in range(MOST_ROUNDS):
         k = 0
@@ -92,12 +107,10 @@ def _over(ends: Array, bars: Array, along: Array, behind: Array, touched: Array,
             if touched[i]:
                 at[k], across[k], slid[k], index[k] = bars[i], along[i], s[i], i
                 k += 1
-        _slide(ends, at, across, slid, k)
-        x = np.zeros((k + 2, 3))
-        x[0], x[k + 1] = ends[0], ends[1]
+        x[k + 1] = ends[1]
+        _slide(x, at, across, slid, k)
         for j in range(k):
             s[index[j]] = slid[j]
-            x[j + 1] = at[j] + slid[j] * across[j]
         worst, which, place, before = -_TOUCH_M, -1, 0.0, 0
         for i in range(n):
             if touched[i]:
@@ -112,10 +125,9 @@ def _over(ends: Array, bars: Array, along: Array, behind: Array, touched: Array,
             continue
         pull, which = -1e-12, -1
         for j in range(k):
-            back, on = x[j] - x[j + 1], x[j + 2] - x[j + 1]
-            push = -_dot(
-                back / np.sqrt(_dot(back, back)) + on / np.sqrt(_dot(on, on)), behind[index[j]]
-            )
+            first, second = _between(x[j + 1], x[j], back), _between(x[j + 1], x[j + 2], on)
+            bar = behind[index[j]]
+            push = -_dot(back, bar) / first - _dot(on, bar) / second
             if push < pull:
                 pull, which = push, index[j]
         if which < 0:
@@ -161,7 +173,7 @@ def tight(
     trace = np.zeros((many, most + MOST_BARS, 3))
     held = np.zeros(most + MOST_BARS, dtype=np.int64)
     lying = np.full((many, most + MOST_BARS), -1)
-    ends = np.zeros((2, 3))
+    ends, u, back = np.zeros((2, 3)), np.zeros(3), np.zeros(3)
     for m in range(many):
         x, n, bar = trace[m], 0, first_bar[m]
         for k in range(most):
@@ -187,21 +199,21 @@ def tight(
         for k in range(n):
             lying[m, k] = held[k] if held[k] >= 0 else -1 - held[k]
         for k in range(n - 1):
-            d = x[k + 1] - x[k]
-            length = np.sqrt(_dot(d, d))
+            length = _between(x[k], x[k + 1], u)
             lengths[m] += length
-            u = d / length if length > 0.0 else d
+            if length > 0.0:
+                u /= length
             for end in range(2):
-                on = lying[m, k + end]
-                pull = u if end == 0 else -u
-                forces[m, on] += pull
-                at = x[k + end]
-                moments[m, on, 0] += at[1] * pull[2] - at[2] * pull[1]
-                moments[m, on, 1] += at[2] * pull[0] - at[0] * pull[2]
-                moments[m, on, 2] += at[0] * pull[1] - at[1] * pull[0]
+                on, at = lying[m, k + end], x[k + end]
+                sign = 1.0 if end == 0 else -1.0
+                for i in range(3):
+                    j, h = (i + 1) % 3, (i + 2) % 3
+                    forces[m, on, i] += sign * u[i]
+                    moments[m, on, i] += sign * (at[j] * u[h] - at[h] * u[j])
         for k in range(1, n - 1):
             if held[k] < 0:
-                back, on_ = x[k - 1] - x[k], x[k + 1] - x[k]
-                push = back / np.sqrt(_dot(back, back)) + on_ / np.sqrt(_dot(on_, on_))
-                pushes[m] += np.sqrt(_dot(push, push))
+                back /= _between(x[k], x[k - 1], back)
+                u /= _between(x[k], x[k + 1], u)
+                back += u
+                pushes[m] += np.sqrt(_dot(back, back))
     return lengths, forces, moments, contacts, pushes, trace, traced, lying

@@ -9,6 +9,7 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from spinepipe.marks import write_marked
@@ -102,8 +103,13 @@ _NO_DATE: dict[str, dict[str, None]] = {
 def picture(figure: Figure, kind: str) -> bytes:
     """A figure as the bytes of an ``svg``, ``png`` or ``pdf``, always the same."""
     content = io.BytesIO()
+    if (layout := figure.get_layout_engine()) is not None:
+        # solved once, for all kinds alike; saving with an engine would draw everything twice
+        FigureCanvasSVG(figure)
+        figure.set_dpi(DPI)
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(content, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
-    figure.set_layout_engine("none")  # solved once: the next kind has the same layout
     return content.getvalue()
 
 

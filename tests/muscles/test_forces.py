@@ -40,15 +40,15 @@ def test_two_solvers_agree(task: str) -> None:
     demand = held_task(task).demand
     ours = least_stress(demand)
     assert ours.enough
-    assert ours.forces == pytest.approx(by_clarabel(demand), abs=1e-2)
+    assert ours.forces == pytest.approx(by_clarabel(demand), abs=1e-3)
 
 
-@pytest.mark.parametrize("task", ["flexion_50", "exertion_torsion"])
-def test_what_is_asked_first_changes_nothing(task: str) -> None:
-    demand = held_task(task).demand
-    quadratic_first, slack_first = (least_stress(demand, beyond) for beyond in (False, True))
-    assert quadratic_first.enough == slack_first.enough
-    assert slack_first.forces == pytest.approx(quadratic_first.forces, abs=1e-6)
+def test_rows_are_met_to_rounding() -> None:
+    demand = held_task("full_flexion").demand
+    found = least_stress(demand).forces
+    assert demand.arms @ found == pytest.approx(demand.required, abs=1e-9)
+    assert np.all(demand.sheath @ found > -1e-6)
+    assert np.all((found >= demand.least) & (found <= demand.most))
 
 
 def two(required: float, most: float = 1000.0, least: float = 0.0) -> Demand:

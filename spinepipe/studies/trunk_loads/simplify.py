@@ -38,8 +38,9 @@ def rows_of(settings: TrunkLoads, cohort: Cohort, specimen: str) -> Iterator[Row
     """Each task in the whole model and in each wrong one."""
     source, who = source_of(settings, cohort).trunk, subject_of(cohort, specimen)
     regressions = regressions_of(settings, cohort.folder)
-    whole = standing(settings, source, who, regressions).person
-    straight = standing(settings, source, who, regressions, wrapping=False).person
+    stood = standing(settings, source, who, regressions)
+    whole, at = stood.person, stood.upright  # no muscle has a say in how somebody stands
+    straight = standing(settings, source, who, regressions, wrapping=False, stood=at).person
     tasks = read_tasks(cohort, settings.trunk_angle)
     for name in settings.simplified_tasks or tuple(tasks):
         for simplification in SIMPLIFICATIONS:
