@@ -223,8 +223,12 @@ class Bound:
         """Add what a law's own unknowns, and its state, do to its load."""
         used = NOTHING if slope is None else np.flatnonzero(slope.any(axis=(0, 1)))
         if slope is not None and len(used):
-            own = law.by_parameter(here, carried, self.states) @ slope[:, :, used]
-            by_x[law.joints[:, None, None], np.arange(6)[:, None], used] += own
+            own = law.by_parameter(here, carried, self.states)
+            if len(used) == by_x.shape[2]:  # all of them: whole rows are added faster
+                by_x[law.joints] += own @ slope
+            else:
+                own = own @ slope[:, :, used]
+                by_x[law.joints[:, None, None], np.arange(6)[:, None], used] += own
         if isinstance(law, ActivePath):
             assert state_by_x is not None
             by_x[law.joints] += law.by_state(here, carried, self.states) @ state_by_x

@@ -41,18 +41,23 @@ def _skew(
     axes: Array, rows: Array, blocks: Array, slope: Array, towards: Array, own: Array
 ) -> None:
     """A of a joint: (6, 6) by the twist below, which is that of all earlier axes; and its block."""
+    pulled = np.empty((6, 3))  # moment by the motion along each axis
+    for k in range(6):
+        for r in range(3):
+            value = 0.0
+            for i in range(6):
+                value += slope[r, i] * axes[k, i]
+            pulled[k, r] = value
     for k in range(6):
         for c in range(6):
-            towards[k, c] = -0.5 * rows[k, c]
-            own[k, c] = 0.5 * (blocks[k, c] - blocks[c, k])
+            value, bend = rows[k, c], blocks[k, c] - blocks[c, k]
             for r in range(3):
-                towards[k, c] -= 0.5 * axes[k, r] * slope[r, c]
-                for i in range(6):
-                    turned = axes[c, r] * axes[k, i] - axes[k, r] * axes[c, i]
-                    own[k, c] += 0.5 * slope[r, i] * turned
-        for r in range(3):
-            for c in range(6):
-                towards[k, r] += 0.5 * slope[r, c] * axes[k, c]
+                value += axes[k, r] * slope[r, c]
+                bend += axes[c, r] * pulled[k, r] - axes[k, r] * pulled[c, r]
+            if c < 3:
+                value -= pulled[k, c]
+            towards[k, c] = -0.5 * value
+            own[k, c] = 0.5 * bend
 
 
 @compiled
@@ -65,9 +70,13 @@ def _twist(axes: Array, rows: Array, blocks: Array, slopes: Array, damping: Arra
         s = axes[j]
         _skew(s, rows[j], blocks[j], slopes[j], towards, own)
         for k in range(6):
+            square = 0.0
             for r in range(6):
+                value = 0.0
                 for c in range(6):
-                    total += towards[k, r] * gram[r, c] * towards[k, c] / damping[j, k]
+                    value += gram[r, c] * towards[k, c]
+                square += towards[k, r] * value
+            total += square / damping[j, k]
             for c in range(k):
                 total += own[k, c] * own[k, c] / (damping[j, k] * damping[j, c])
         for k in range(6):
