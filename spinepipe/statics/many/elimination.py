@@ -125,6 +125,13 @@ def _hand_down(axes: Array, right: Array, slope: Array, passed: Array) -> None:
 @compiled
 def _add_product(matrix: Array, vectors: Array, out: Array) -> None:
     """Add matrix (r, k) times vectors (k, m) to out (r, m)."""
+    if vectors.shape[1] == 1:  # of Newton's steps: a loop of one turn would cost more than its sum
+        for r in range(matrix.shape[0]):
+            value = out[r, 0]
+            for k in range(matrix.shape[1]):
+                value += matrix[r, k] * vectors[k, 0]
+            out[r, 0] = value
+        return
     for r in range(matrix.shape[0]):
         for k in range(matrix.shape[1]):
             f = matrix[r, k]
