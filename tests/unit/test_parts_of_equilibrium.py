@@ -14,7 +14,6 @@ from spinepipe.statics.equilibrium import (
     STEP_TOLERANCE,
     SingularTangent,
     _newton,
-    _smallest_eigenvalue_bound,
     decays,
     factor,
 )
@@ -68,19 +67,6 @@ def test_a_tangent_without_an_inverse_has_no_factors(matrix: np.ndarray, why: st
 
 
 # What decays
-
-
-def test_the_bound_of_the_smallest_eigenvalue_is_one() -> None:
-    """Exact for diagonal matrices; else between the eigenvalue and a share of it."""
-    assert _smallest_eigenvalue_bound(np.diag([5.0, 2.0, 3.0])) == pytest.approx(2.0)
-    rng = np.random.default_rng(20022)
-    for _ in range(30):
-        half = rng.normal(size=(6, 6))
-        matrix = half @ half.T + 0.1 * np.eye(6)
-        smallest = float(np.linalg.eigvalsh(matrix)[0])
-        found = _smallest_eigenvalue_bound(matrix)
-        assert smallest / np.sqrt(6.0) * (1.0 - 1e-9) <= found <= smallest * (1.0 + 1e-9)
-    assert _smallest_eigenvalue_bound(np.diag([5.0, -1e-9])) == 0.0
 
 
 @sweep("share", [0.99, 1.01])
