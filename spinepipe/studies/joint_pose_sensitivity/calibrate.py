@@ -1,6 +1,7 @@
 """Job: stiffness of one specimen with one sampled joint pose."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import mark_of, provenance
-from spinepipe.jobs.waiting import is_to_make, take, waiting
+from spinepipe.jobs.waiting import alone_at, is_to_make, take, waiting
 from spinepipe.marks import KEY
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
@@ -24,8 +25,8 @@ from spinepipe.units import COORDINATE_COLUMNS
 
 _Rows = list[dict[str, Any]]
 
-BLOCK = 100
-"""Poses that are fitted side by side: together they take as long as about thirty one by one."""
+BLOCK = 50
+"""Poses that are fitted side by side: together they take as long as about twenty one by one."""
 
 
 def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
@@ -35,20 +36,31 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
     mark, number = made_by[KEY], int(pose)
     if take(output, mark):
         return
-    first, known = number - number % BLOCK, sampled_poses(poses)
-    places = {
-        n: Path(output).with_name(f"pose={n:04d}.parquet") for n in range(first, first + BLOCK)
-    }
-    others = [
-        n
-        for n, place in places.items()
-        if n != number and any(known.of(specimen, n)) and is_to_make(place, mark)
-    ]
-    for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
-        if n == number or is_to_make(places[n], mark):  # nobody has done so meanwhile
-            table = from_rows(CALIBRATIONS, rows)
-            write(table, output if n == number else waiting(places[n]), made_by)
+    with _neighbours(settings, Path(output).parent, number, mark) as places:
+        known = sampled_poses(poses)
+        others = [n for n in places if n != number and any(known.of(specimen, n))]
+        for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
+            if n == number or is_to_make(places[n], mark):  # nobody has done so meanwhile
+                table = from_rows(CALIBRATIONS, rows)
+                write(table, output if n == number else waiting(places[n]), made_by)
     waiting(output).unlink(missing_ok=True)  # of another job that began with the same poses
+
+
+@contextmanager
+def _neighbours(
+    settings: JointPoseSensitivity, folder: Path, pose: int, mark: str
+) -> Iterator[dict[int, Path]]:
+    """Files still to be made of the block of a pose; of a later one where others are at that."""
+    blocks = -(-settings.poses // BLOCK)
+    for block in range(pose // BLOCK, blocks):
+        with alone_at(folder / f".block={block:04d}.lock") as alone:
+            numbers = range(block * BLOCK, min((block + 1) * BLOCK, settings.poses))
+            places = {n: folder / f"pose={n:04d}.parquet" for n in numbers}
+            to_make = {n: place for n, place in places.items() if is_to_make(place, mark)}
+            if alone and (to_make or block == pose // BLOCK):
+                yield to_make
+                return
+    yield {}
 
 
 def _beside(

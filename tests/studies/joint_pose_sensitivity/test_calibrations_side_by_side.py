@@ -13,7 +13,7 @@ import pytest
 from spinepipe.calibrate import fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.files import stamp
-from spinepipe.jobs.waiting import is_to_make, take, waiting
+from spinepipe.jobs.waiting import alone_at, is_to_make, take, waiting
 from spinepipe.marks import write_marked
 from spinepipe.model import RefusedModel
 from spinepipe.studies.joint_pose_sensitivity import calibrate, poses
@@ -75,6 +75,19 @@ def test_a_pose_alone_is_as_among_its_neighbours(root: Path, tmp_path: Path) -> 
             elif value is not None:
                 assert found[name][0] == value, name
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_who_finds_a_block_at_work_takes_the_next(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calibrate, "BLOCK", 2)
+    with alone_at(tmp_path / ".block=0000.lock") as alone:
+        assert alone
+        run(root, tmp_path, 1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        *(f".pose={pose:04d}.parquet" for pose in (2, 3)),
+        "pose=0001.parquet",
+    ]
 
 
 def test_only_what_is_lost_is_made_again(
