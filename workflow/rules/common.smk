@@ -178,7 +178,10 @@ def base_model(wildcards):
 
 
 def jobs_of_block(wildcards):
-    """The job files of one block of a table; of some tables those that are yet to be made."""
+    """The job files of one block of a table; of some tables those that are yet to be made.
+
+    A block that is right misses no file: who wants a lost one asks for it (see `everything`).
+    """
     for wait in WAITING.get(wildcards.table, ()):
         wait(wildcards)
     study, table = wildcards.study, wildcards.table
@@ -187,8 +190,14 @@ def jobs_of_block(wildcards):
     forced = workflow.dag_settings.forceall or workflow.dag_settings.forcerun
     if forced or table not in layout(study).known_by_mark:
         return files
-    wanted = expected(study).of_part
-    return [file for file in files if mark_in(file) != wanted(table, file)]
+    marks, block = expected(study), layout(study).block_file(*place)
+    missed = mark_in(block) != marks.of_block(*place)
+    return [
+        file
+        for file in files
+        if (found := mark_in(file)) != marks.of_part(table, file)
+        and (found is not None or missed)
+    ]
 
 
 # What must be done before the job files of a table are known, by table: functions of wildcards.
