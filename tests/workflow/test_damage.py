@@ -22,7 +22,8 @@ def simulation(pose: int, stiffness: str) -> str:
     return f"{POSES}/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
 
 
-FLIPPED, LATE, CUT = simulation(0, "best01"), simulation(1, "best01"), simulation(2, "best01")
+FLIPPED, CUT = simulation(0, "best01"), simulation(2, "best01")
+LATE = f"{POSES}/calibrations.parquet"
 PICKLED = simulation(0, "best02")
 RANKED = f"{POSES}/best.json"
 BLOCK = f"{POSES}/blocks/simulations/specimen=s01/block=001.parquet"

@@ -169,11 +169,11 @@ whole_execute = execute
 
 
 def execute(rule, function, wildcards, log, arguments):
-    if rule == "count_joints":
+    if rule == "joint_count_table":
         shutil.rmtree("results/counted", ignore_errors=True)
     whole_execute(rule, function, wildcards, log, arguments)
 """
-"""Added to the Snakefile: whenever a job begins, somebody removes all results."""
+"""Added to the Snakefile: as files are about to be joined, somebody removes all results."""
 
 
 @pytest.mark.full
