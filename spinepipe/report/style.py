@@ -103,7 +103,7 @@ _NO_DATE: dict[str, dict[str, None]] = {
 def picture(figure: Figure, kind: str) -> bytes:
     """A figure as the bytes of an ``svg``, ``png`` or ``pdf``, always the same."""
     content = io.BytesIO()
-    if (layout := figure.get_layout_engine()) is not None:
+    if figure.axes and (layout := figure.get_layout_engine()) is not None:
         # solved once, for all kinds alike; saving with an engine would draw everything twice
         FigureCanvasSVG(figure)
         figure.set_dpi(DPI)

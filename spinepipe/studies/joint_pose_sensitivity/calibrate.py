@@ -36,9 +36,9 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
     mark, number = made_by[KEY], int(pose)
     if take(output, mark):
         return
-    with _neighbours(settings, Path(output).parent, number, mark) as places:
-        known = sampled_poses(poses)
-        others = [n for n in places if n != number and any(known.of(specimen, n))]
+    sampled = [n for name, n in sampled_poses(poses).frames if name == specimen]
+    with _neighbours(sampled, Path(output).parent, number, mark) as places:
+        others = [n for n in places if n != number]
         for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
             if n == number or is_to_make(places[n], mark):  # nobody has done so meanwhile
                 table = from_rows(CALIBRATIONS, rows)
@@ -48,16 +48,15 @@ def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str
 
 @contextmanager
 def _neighbours(
-    settings: JointPoseSensitivity, folder: Path, pose: int, mark: str
+    sampled: Sequence[int], folder: Path, pose: int, mark: str
 ) -> Iterator[dict[int, Path]]:
     """Files still to be made of the block of a pose; of a later one where others are at that."""
-    blocks = -(-settings.poses // BLOCK)
-    for block in range(pose // BLOCK, blocks):
+    first, last = pose // BLOCK, max(sampled, default=pose) // BLOCK
+    for block in range(first, last + 1):
         with alone_at(folder / f".block={block:04d}.lock") as alone:
-            numbers = range(block * BLOCK, min((block + 1) * BLOCK, settings.poses))
-            places = {n: folder / f"pose={n:04d}.parquet" for n in numbers}
+            places = {n: folder / f"pose={n:04d}.parquet" for n in sampled if n // BLOCK == block}
             to_make = {n: place for n, place in places.items() if is_to_make(place, mark)}
-            if alone and (to_make or block == pose // BLOCK):
+            if alone and (to_make or block == first):
                 yield to_make
                 return
     yield {}
