@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spinepipe.decomposition import bounded_lstsq, lstsq
+from spinepipe.decomposition import bounded_least_squares, bounded_lstsq
 from spinepipe.effects.contract import Array
 
 Point = Callable[[Array], tuple[Array, Array] | None]
@@ -60,100 +59,48 @@ class Descent:
 
 
 def descend(
-    point: Point, start: Array, bounds: tuple[Array, Array], scale: Array, settled: Settled
+    point: Point,
+    start: Array,
+    bounds: tuple[Array, Array],
+    scale: Array,
+    size: int,
+    settled: Settled,
 ) -> Descent:
     """Least squares from a start that has an equilibrium.
-
-    Dogleg steps in a box inside the bounds (Voglis and Lagaris 2004), one after the other as
-    scipy's `dogbox` takes them, but each point is looked at once. Where nothing stands
-    the box becomes smaller.
 
     Parameters
     ----------
     start : (m,), inside the bounds (m,) each. scale : (m,) size of a first step.
+    size : number of residuals.
     """
-    x, found, (low, high) = start, point(start), bounds
-    if found is None:
-        return Descent(start, np.inf, False, 1)
-    residual, jacobian = found
-    cost, looks, arrived = 0.5 * float(residual @ residual), 1, False
-    size = float(np.abs(x / scale).max(initial=0.0)) or 1.0  # of the box, in scales
-    side = np.where(x == high, 1, np.where(x == low, -1, 0))
-    while not arrived:
-        slope = jacobian.T @ residual
-        free = side * slope >= 0.0  # the others would leave the bounds that they are on
-        inner, down = jacobian[:, free], slope[free]
-        arrived = bool(np.abs(down).max(initial=0.0) < settled.slope)
-        if arrived or looks == settled.evaluations:
-            break
-        newton, _ = lstsq(inner, -residual)
-        gained = -1.0
-        while gained <= 0.0 and looks < settled.evaluations:
-            box = size * scale[free]
-            reach = np.array([(low - x)[free], (high - x)[free]])
-            ends = np.array([np.maximum(reach[0], -box), np.minimum(reach[1], box)])
-            step, hit = _dogleg(newton, down, inner, ends)
-            whole = np.zeros(len(x))
-            whole[free] = step
-            trial = np.clip(x + whole, low, high)
-            new, looks = point(trial), looks + 1
-            length = float(np.abs(whole / scale).max())
-            if new is None or not np.isfinite(new[0]).all():
-                size = 0.25 * length
-                continue
-            made = inner @ step
-            promised = -(0.5 * float(made @ made) + float(down @ step))
-            gained = cost - 0.5 * float(new[0] @ new[0])
-            share = gained / promised if promised > 0.0 else float(promised == gained == 0.0)
-            at_box = (hit < 0) & (ends[0] == -box) | (hit > 0) & (ends[1] == box)
-            if share < 0.25:
-                size = 0.25 * length
-            elif share > 0.75 and at_box.any():
-                size *= 2.0
-            short = np.linalg.norm(whole) < settled.step * (settled.step + np.linalg.norm(x))
-            if short or (gained < settled.cost * cost and share > 0.25):
-                arrived = True
-                break
-        if gained > 0.0:
-            assert new is not None
-            residual, jacobian = new
-            cost = 0.5 * float(residual @ residual)
-            on_bound = (hit < 0) & (ends[0] == reach[0]) | (hit > 0) & (ends[1] == reach[1])
-            side[free] = np.where(on_bound, hit, 0)
-            x = np.where(side > 0, high, np.where(side < 0, low, trial))
-            if not np.array_equal(x, trial):
-                # a rounding error away: where a segment is about to snap that may stand no more
-                found = point(x)
-                jacobian = jacobian if found is None else found[1]
-    return Descent(x, cost, arrived, looks)
+    nowhere = np.full(size, np.nan)
+    last: list[Array] = []
 
+    def residual(x: Array) -> Array:
+        found = point(x)
+        if found is None:
+            return nowhere
+        last[:] = [found[1]]
+        return found[0]
 
-def _dogleg(
-    newton: Array, slope: Array, jacobian: Array, ends: Array
-) -> tuple[Array, NDArray[np.int64]]:
-    """(m,) step towards Newton's, by way of the least cost down the slope, inside ends (2, m).
+    def jacobian(x: Array) -> Array:
+        # asked where residuals were finite just before, but for x that is put onto its bounds: a
+        # rounding error away, and where a segment is about to snap that is without equilibrium
+        found = point(x)
+        return last[0] if found is None else found[1]
 
-    And which of the ends it reaches, -1 or 1; 0 for none.
-    """
-    if ((newton >= ends[0]) & (newton <= ends[1])).all():
-        return newton, np.zeros(len(newton), dtype=np.int64)
-    down = jacobian @ slope
-    furthest, _ = _to_ends(np.zeros(len(slope)), -slope, ends)
-    bend = float(down @ down)
-    best = float(slope @ slope) / bend if bend > 0.0 else np.inf
-    cauchy = -min(furthest, best) * slope
-    way = newton - cauchy
-    part, hit = _to_ends(cauchy, way, ends)
-    return cauchy + part * way, hit
-
-
-def _to_ends(start: Array, way: Array, ends: Array) -> tuple[float, NDArray[np.int64]]:
-    """How much of a way leads to the first of the ends (2, m), and which these are."""
-    going = way != 0.0
-    parts = np.full(len(way), np.inf)
-    parts[going] = ((ends - start)[:, going] / way[going]).max(axis=0)
-    least = float(parts.min())
-    return least, np.where(parts == least, np.sign(way), 0.0).astype(np.int64)
+    result = bounded_least_squares(
+        residual,
+        start,
+        jacobian,
+        bounds,
+        x_scale=scale,
+        ftol=settled.cost,
+        xtol=settled.step,
+        gtol=settled.slope,
+        max_nfev=settled.evaluations,
+    )
+    return Descent(result.x, float(result.cost), bool(result.success), int(result.nfev))
 
 
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e9

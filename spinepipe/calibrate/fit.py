@@ -301,7 +301,8 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
     if problem.along_bounds:
         ended = descend_along(point, begin, bounds, problem.scale, settled)
     else:
-        ended = descend(point, begin, bounds, problem.scale, settled)
+        size = len(evaluator.coordinate)
+        ended = descend(point, begin, bounds, problem.scale, size, settled)
     x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)

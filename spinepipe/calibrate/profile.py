@@ -27,6 +27,7 @@ from spinepipe.calibrate.descent import (
     damped_step,
     descend,
     descend_along,
+    once,
 )
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
@@ -394,7 +395,7 @@ def _refitted(
         found = held(begin)
         if found is None:
             continue
-        scale = best.scale[others]
+        size, scale = len(best.residual), best.scale[others]
         along = (bounds, scale) if best.along_bounds else None
         cost, moved = _one_step(*found, begin, along)
         if float(found[0] @ found[0]) - cost <= STRAIGHT * rise.allowed and np.all(
@@ -404,7 +405,7 @@ def _refitted(
         if best.along_bounds:
             ended = descend_along(held, begin, bounds, scale, best.enough)
         else:
-            ended = descend(held, begin, bounds, scale, best.enough)
+            ended = descend(once(held), begin, bounds, scale, size, best.enough)
         return 2.0 * ended.half_cost, whole(ended.x)
     return np.inf, best.x
 

@@ -8,7 +8,6 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.calibrate.descent import Settled, damped_step, descend, descend_along, once
-from spinepipe.decomposition import bounded_least_squares
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
@@ -155,12 +154,12 @@ def test_a_descent_asks_once_and_again_for_what_is_new() -> None:
 
 def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
     settled = Settled(cost=1e-12, step=1e-12, slope=1e-12, evaluations=50)
-    ended = descend(Looked(2.0), np.zeros(1), FAR, ONE, settled)
+    ended = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, settled)
     assert ended.arrived
     assert ended.x[0] == pytest.approx(1.0, abs=1e-5)
     assert ended.half_cost == pytest.approx(2.0)
     few = Settled(cost=1e-15, step=1e-15, slope=1e-15, evaluations=1)
-    given_up = descend(Looked(2.0), np.zeros(1), FAR, ONE, few)
+    given_up = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, few)
     assert not given_up.arrived
     assert given_up.evaluations == 1
     assert few.given_up == "no optimum within 1 evaluations"
@@ -169,7 +168,7 @@ def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
 def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
     """And takes the slope of the point before for one that is lost on being asked again."""
     settled = Settled(cost=1e-9, step=1e-9, slope=1e-9, evaluations=60)
-    ended = descend(Looked(most=0.5), np.zeros(1), FAR, ONE, settled)
+    ended = descend(Looked(most=0.5), np.zeros(1), FAR, ONE, 2, settled)
     assert 0.3 < ended.x[0] <= 0.5
     asked: set[bytes] = set()
 
@@ -178,40 +177,4 @@ def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
         asked.add(x.tobytes())
         return None if known else (x - 1.0, np.eye(1))
 
-    assert descend(forgetful, np.zeros(1), FAR, ONE, settled).x[0] == pytest.approx(1.0)
-
-
-@sweep("seed", range(12))
-def test_inside_bounds_each_step_is_the_one_that_scipy_takes(seed: int) -> None:
-    """Bounds that are met, and a wall beyond which nothing stands, among them."""
-    rng = np.random.default_rng(seed)
-    m, wall = int(rng.integers(1, 5)), float(rng.choice([1.5, np.inf]))
-    matrix, target = rng.normal(size=(m + 3, m)), rng.normal(size=m + 3)
-    bounds, scale = (np.full(m, -0.8), np.full(m, 2.0)), rng.choice([0.1, 1.0, 3.0], size=m)
-    ours: list[Array] = []
-    theirs: list[Array] = []
-
-    def residual(x: Array) -> Array:
-        theirs.append(x.copy())
-        return matrix @ np.exp(x) - target if x.max() <= wall else np.full(m + 3, np.nan)
-
-    def point(x: Array) -> tuple[Array, Array] | None:
-        ours.append(x.copy())
-        return (matrix @ np.exp(x) - target, matrix * np.exp(x)) if x.max() <= wall else None
-
-    ended = descend(point, np.zeros(m), bounds, scale, Settled(1e-11, 1e-7, 1e-14, 60))
-    expected = bounded_least_squares(
-        residual,
-        np.zeros(m),
-        lambda x: matrix * np.exp(x),
-        bounds,
-        x_scale=scale,
-        ftol=1e-11,
-        xtol=1e-7,
-        gtol=1e-14,
-        max_nfev=60,
-    )
-    np.testing.assert_allclose(ended.x, expected.x, rtol=1e-9, atol=1e-12)
-    assert (ended.evaluations, ended.arrived) == (expected.nfev, expected.success)
-    assert len(ours) == len(theirs)
-    np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
+    assert descend(forgetful, np.zeros(1), FAR, ONE, 1, settled).x[0] == pytest.approx(1.0)

@@ -183,7 +183,8 @@ class FilmFit:
         begin = next((one for one in within if point(one) is not None), None)
         if begin is None:
             raise NoFit(NO_POSE)
-        ended = descend(point, begin, (low, high), scale, SETTLED)
+        size = 2 * 3 * (self.segments - 1) + len(begin)
+        ended = descend(point, begin, (low, high), scale, size, SETTLED)
         found = self.missed(ended.x)
         assert found is not None  # a descent ends where there is a pose
         told = _told(*found, ended.x)

@@ -49,7 +49,7 @@ def region(
     first = point(begin)
     if first is None:
         return OPEN
-    ended = descend(point, begin, (lower, upper), scale, SETTLED)
+    ended = descend(point, begin, (lower, upper), scale, len(first[0]), SETTLED)
     found = point(ended.x)
     if found is None or not ended.arrived:
         return OPEN

@@ -212,7 +212,8 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     fit = _RegionFit(patient, regions)
     if count > 1:
         reach = np.full(count - 1, FARTHEST_MULTIPLIER)
-        best = descend(once(fit.missed), best, (-reach, reach), np.ones(count - 1), SETTLED).x
+        size = 2 * len(patient.curves)
+        best = descend(once(fit.missed), best, (-reach, reach), np.ones(count - 1), size, SETTLED).x
     return _springs(patient, fit.stiffness(best), count - 1)
 
 

@@ -212,7 +212,7 @@ def fitted(
     if not len(counted) or who.errors(_named(names, start), counted) is None:
         return start, np.zeros(len(names), dtype=bool)
     point = once(_errors(who, names, counted))
-    found = descend(point, start, (low, high), step, SETTLED).x
+    found = descend(point, start, (low, high), step, len(counted), SETTLED).x
     return found, (found - low < 1e-3 * step) | (high - found < 1e-3 * step)
 
 

@@ -166,7 +166,7 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting, near: Near = None) -> Jo
     if begun is None:
         return _nowhere(hypothesis, start, points.trouble)
     scale = np.array([u.step for u in hypothesis.unknowns])
-    ended = descend(points.compressed, start, (low, high), scale, SETTLED)
+    ended = descend(points.compressed, start, (low, high), scale, len(begun[0]), SETTLED)
     status = "" if ended.arrived else SETTLED.given_up
     return _ended(points, ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6), status)
 

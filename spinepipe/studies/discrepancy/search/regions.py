@@ -190,7 +190,7 @@ def _likeliest(fit: JointFit, point: Point, unknown: int, ruler: _Ruler) -> Best
     pull = slope * abs(at - own.mean) / own.sd**2  # of its own prior, which the readings withstood
     if pull <= PULLED * begun.told_by(unknown) and not (fit.at_bound[unknown] or fit.status):
         return begun
-    ended = descend(point, x, (lower, upper), scale, SETTLED)
+    ended = descend(point, x, (lower, upper), scale, len(found[0]), SETTLED)
     found = point(ended.x)
     if found is None or not ended.arrived:
         return None
