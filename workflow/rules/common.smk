@@ -190,14 +190,11 @@ def jobs_of_block(wildcards):
     forced = workflow.dag_settings.forceall or workflow.dag_settings.forcerun
     if forced or table not in layout(study).known_by_mark:
         return files
-    marks, block = expected(study), layout(study).block_file(*place)
-    missed = mark_in(block) != marks.of_block(*place)
-    return [
-        file
-        for file in files
-        if (found := mark_in(file)) != marks.of_part(table, file)
-        and (found is not None or missed)
-    ]
+    marks, block = expected(study), mark_in(layout(study).block_file(*place))
+    wrong = [file for file in files if mark_in(file) != marks.of_part(table, file)]
+    if wrong and block is not None and block == marks.of_block(*place):
+        return [file for file in wrong if mark_in(file) is not None]
+    return wrong
 
 
 # What must be done before the job files of a table are known, by table: functions of wildcards.

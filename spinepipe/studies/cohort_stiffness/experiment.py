@@ -17,8 +17,8 @@ from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.experiment.loop import Loop, Spread, reading_noise
+from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import read_mark
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.status import USABLE, Status
 from spinepipe.studies.cohort_stiffness.loop_rows import (
@@ -106,7 +106,7 @@ def run(
             for curve, axis in _of_joint(cycle, joint, sd, cohort.zeroed_at_step_0, model, why):
                 curves.append({**curve, **key})
                 axes += [{**axis, **key}] if axis else []
-    made = origin("experiment", root, settings, cohort, [specimen], [read_mark(p) for p in fitted])
+    made = origin("experiment", root, settings, cohort, [specimen], [mark_of(p) for p in fitted])
     write(from_rows(LOAD_DISPLACEMENT.without("specimen"), curves), load_displacement, made)
     write(from_rows(HELICAL_AXES.without("specimen"), axes), helical_axes, made)
 

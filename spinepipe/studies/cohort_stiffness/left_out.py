@@ -7,8 +7,8 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
+from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import read_mark
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
@@ -58,7 +58,7 @@ def run(
         if row["test"] in within
     ]
     made = origin(
-        "left_out", root, settings, cohort, [specimen], [read_mark(path) for path in others]
+        "left_out", root, settings, cohort, [specimen], [mark_of(path) for path in others]
     )
     write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
     write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)

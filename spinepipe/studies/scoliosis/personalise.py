@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import read_mark
 from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
@@ -51,7 +50,7 @@ def run(
     settings, cohort = study_of_kind(Scoliosis, root, study)
     learned = [read_frame(path) for path in population]
     rows = rows_of(settings, cohort, specimen, model, *learned)
-    marks = [read_mark(path) for path in population]
+    marks = [mark_of(path) for path in population]
     made_by = provenance("personalise", settings, cohort, [specimen], marks)
     places = zip(
         (LAWS, POSITIONS, DISPLACEMENTS, CURVES),

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import KEY, read_mark, write_marked
+from spinepipe.marks import KEY, write_marked
 from spinepipe.motion.export import mot, osim, usable
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.studies.exports import refuse
@@ -36,7 +36,7 @@ def motion(
 ) -> None:
     """Write the motion of a tracked file; without frames where the fit found no posture."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    made_by = provenance("motion", settings, cohort, [specimen], [read_mark(tracked)])
+    made_by = provenance("motion", settings, cohort, [specimen], [mark_of(tracked)])
     name = "_".join(usable((specimen, trial, approach)))
     write_marked(motion_text(name, tracked), output, made_by[KEY])
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.marks import read_mark
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, learns, seen_in
 from spinepipe.studies.tracking.drawn import drawn_rows
@@ -41,7 +40,7 @@ def run(
     begun = time.process_time()
     found, message = _found(settings, person, trial, approach, learnt, ratio_sets(cohort))
     spent = time.process_time() - begun
-    others = [*marks_of(cohort, specimen), *(read_mark(path) for path in law)]
+    others = [*marks_of(cohort, specimen), *(mark_of(path) for path in law)]
     made_by = provenance("track", settings, cohort, [specimen], others)
     motion = list(motion_rows(found)) if found else []
     fit = fit_row(settings, found, spent) if found else failed_row(message)
