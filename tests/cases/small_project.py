@@ -49,7 +49,7 @@ _NOT_PASSED_ON = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
 STARTS: list[str] = []
 """Arguments of each start of Snakemake in this process of the tests."""
 
-_HANGS_S = 3600
+_HANGS_S = 1200
 """A run that takes longer hangs: it does on no machine, however busy."""
 
 _KILLED = """
@@ -105,7 +105,9 @@ class Project:
         """Without the path of the original package: the copy must find itself."""
         return {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
 
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def snakemake(
+        self, *arguments: str, python: str = sys.executable
+    ) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; `stdout` holds both streams.
 
         A run that ends well leaves nothing of ours in the system's temporary folder.
@@ -113,7 +115,7 @@ class Project:
         STARTS.append(" ".join(arguments))
         with TemporaryDirectory(prefix="run-", ignore_cleanup_errors=True) as temporary:
             done = subprocess.run(
-                [sys.executable, "-m", "snakemake", *arguments],
+                [python, "-m", "snakemake", *arguments],
                 cwd=self.folder,
                 env={**self.environment(), "TMPDIR": temporary},
                 stdout=subprocess.PIPE,

@@ -7,6 +7,7 @@ that start Snakemake one by one, a profile that speaks of rules that are no more
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,12 +41,18 @@ def with_queue(project: Project) -> Project:
 
 
 def run_on_cluster(project: Project, target: str, moves: int) -> str:
-    """What a project is asked for, its jobs submitted; returns what Snakemake said."""
+    """What a project is asked for, its jobs submitted; returns what Snakemake said.
+
+    Its job scripts name Python's path without quotes: the environment is reached by a short one.
+    """
+    environment = project.folder.parent / "environment"
+    environment.symlink_to(sys.prefix)
     done = project.snakemake(
         *(target, "--profile", "profiles/slurm", "--executor", "cluster-generic"),
         *("--cluster-generic-submit-cmd", "./submit.sh", "--jobs", "2", "--cores", "2"),
         *("--group-components", f"moves={moves}"),
         *("--seconds-between-status-checks", "1", "--latency-wait", "10"),
+        python=str(environment / "bin" / "python"),
     )
     logs = "\n".join(path.read_text() for path in project.path("queue").glob("*.log"))
     assert done.returncode == 0, done.stdout + logs
