@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -95,14 +96,16 @@ def marker_places(whole_deg: tuple[float, float, float]) -> Array:
 
 
 def motions() -> dict[str, Motion]:
-    """Trials by their names: a cosine to the end of the motion."""
-    found = {}
-    for trial, count in FRAMES.items():
-        whole = np.array(WHOLE_DEG.get(trial, (0.0, 0.0, 0.0)))
-        shares = (1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0
-        places = [marker_places(tuple((share * whole).tolist())) for share in shares]
-        found[trial] = Motion(list(MARKERS), np.array(places))
-    return found
+    """Trials by their names, each to be written into: a cosine to the end of the motion."""
+    return {trial: Motion(list(MARKERS), _places(trial).copy()) for trial in FRAMES}
+
+
+@cache
+def _places(trial: str) -> Array:
+    """(F, K, 3) mm of all markers in ground."""
+    whole = np.array(WHOLE_DEG.get(trial, (0.0, 0.0, 0.0)))
+    shares = (1.0 - np.cos(np.linspace(0.0, np.pi, FRAMES[trial]))) / 2.0
+    return np.array([marker_places(tuple((share * whole).tolist())) for share in shares])
 
 
 def trc(motion: Motion) -> str:
