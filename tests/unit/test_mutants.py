@@ -99,7 +99,6 @@ def test_tests_are_near_the_lines_that_they_run(
 
 RUNS = """\
 import pytest
-from sweeps import sweep
 
 def test_passes(): pass
 

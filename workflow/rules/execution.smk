@@ -131,7 +131,7 @@ def totals():
 
 # How many jobs are to come that Snakemake does not know yet, by names of rules; functions of jobs.
 FORESEEN = {}
-time_left = TimeLeft(totals, costs(Path(ROOT)), workflow.cores or 1)
+time_left = TimeLeft(totals, costs(Path(ROOT)), workflow.resource_settings.cores or 1)
 
 
 def tell_what_is_ahead():

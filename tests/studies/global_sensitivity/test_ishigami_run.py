@@ -14,7 +14,7 @@ from known_indices import ishigami, morris_truth
 from lever import tables_of, write_lever
 from small_project import Project
 
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
@@ -61,7 +61,8 @@ def in_place_of_a_solve(
         status=["converged"] * len(part),
         message=[""] * len(part),
     )
-    known = provenance("respond", settings, cohort, [specimen], [str(size)])
+    read = [mark_of(path) for path in (design, *base)]
+    known = provenance("respond", settings, cohort, [specimen], [str(size), *read])
     write(to_arrow(table, columns), output, known)
 
 
