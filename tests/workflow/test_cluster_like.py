@@ -43,7 +43,7 @@ def with_queue(project: Project) -> Project:
 def run_on_cluster(project: Project, target: str, moves: int) -> str:
     """What a project is asked for, its jobs submitted; returns what Snakemake said.
 
-    Its job scripts name Python's path without quotes: the environment is reached by a short one.
+    Snakemake's job scripts do not quote the path of Python: it is reached by one without blanks.
     """
     environment = project.folder.parent / "environment"
     environment.symlink_to(sys.prefix)
