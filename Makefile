@@ -11,6 +11,12 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
+# pip, Snakemake and Matplotlib keep things in the home folder; a cluster may not let them.
+ifneq ($(shell test -w "$${XDG_CACHE_HOME:-$$HOME}" && echo writable),writable)
+export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
+export XDG_CONFIG_HOME := $(XDG_CACHE_HOME)
+endif
+
 .PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
