@@ -223,8 +223,8 @@ def certified(
         return None
     effects = [active.effect for active in (*system.laws, *system.geometry)]
     spacing = np.array([min([SPACING, *map(straight_over, effects)])])
-    poses = (one.reshape(1, -1, 6) for one in (begin, way.q, first))
-    near, _, shares = places_between(*poses, spacing)
+    begun, ended, told = (one.reshape(1, -1, 6) for one in (begin, way.q, first))
+    near, _, shares = places_between(begun, ended, told, spacing)
     if not near.all():
         return None
     between = begin + shares[:, None] * (way.q - begin)
@@ -267,8 +267,7 @@ def stands(system: System, tangent: Array) -> bool:
     """Whether a chain without inertia would not move away from a pose with this tangent (n, n)."""
     free = system.free
     own = tangent if free is None else tangent[np.ix_(free, free)]
-    _, refused = dpotrf(own + own.T, lower=True)
-    if not refused:
+    if _positive(own + own.T):
         return True
     if not np.isfinite(own).all() or np.array_equal(own, own.T):
         return False
