@@ -176,8 +176,8 @@ class Stack:
 
     def _past_critical(self, q: Array) -> dict[int, str]:
         """By lane with a pose q (L, J, 6) whose load would move the neutral pose away."""
-        pressed: Flags = self.loads.forces.any(axis=(1, 2))
-        pressed |= self.chains.gravity[self.loads.chain].any(axis=1)
+        weight = np.abs(self.chains.gravity).sum(axis=1)[self.loads.chain]
+        pressed = np.abs(self.loads.forces).sum(axis=(1, 2)) + weight > 0.0
         found: dict[int, str] = {}
         less = 1.0 - ROUNDING
         chains = self.chains._replace(gravity=less * self.chains.gravity)
