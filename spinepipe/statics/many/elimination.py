@@ -91,16 +91,17 @@ def _eliminate(matrix: Array, right: Array) -> int:
 def _holds(matrix: Array, lower: Array) -> bool:
     """Whether a matrix (6, 6) has a positive symmetric part: it has a Cholesky factor ``lower``."""
     for k in range(6):
-        for r in range(k, 6):
+        pivot = matrix[k, k]
+        for i in range(k):
+            pivot -= lower[k, i] * lower[k, i]
+        if not pivot > 0.0:
+            return False
+        inverse = 1.0 / np.sqrt(pivot)
+        for r in range(k + 1, 6):
             value = 0.5 * (matrix[r, k] + matrix[k, r])
             for i in range(k):
                 value -= lower[r, i] * lower[k, i]
-            if r > k:
-                lower[r, k] = value / lower[k, k]
-            elif value > 0.0:
-                lower[k, k] = np.sqrt(value)
-            else:
-                return False
+            lower[r, k] = value * inverse
     return True
 
 
@@ -179,7 +180,9 @@ def _hold(fixed: Flags, matrix: Array, right: Array) -> None:
 
 
 @compiled
-def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indices) -> None:
+def _carry(
+    seen: Plain, fixed: Flags, changes: Plain, asked: bool, rates: Array, signs: Indices
+) -> None:
     """Fill rates (N, J, 6, m) and the signs (N,), see `eliminated`."""
     every_axes, _, rows, blocks, every_slopes, _, _ = seen
     sources, pushes, lower, upper = changes
@@ -192,7 +195,7 @@ def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indic
         axes, slopes = every_axes[lane], every_slopes[lane]
         slope[:] = 0.0
         passed[:] = 0.0
-        sign, positive = 1, True
+        sign, positive = 1, asked
         for j in range(joints - 1, -1, -1):
             right = gains[j]
             for r in range(3):
@@ -254,15 +257,16 @@ def missing(seen: Survey, rates: Array, pushes: Array = NONE) -> Array:
     return found
 
 
-def eliminated(seen: Survey, changes: Changes) -> tuple[Array, Indices]:
+def eliminated(seen: Survey, changes: Changes, asked: bool = False) -> tuple[Array, Indices]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; and signs (N,).
 
-    A sign is that of the tangent's determinant, 0 where there is no answer, and `POSITIVE` where
-    each joint's own matrix has a positive symmetric part: so has every one of them where the whole
-    tangent's is positive (Schur complements), and without constant moments only there.
+    A sign is that of the tangent's determinant, 0 where there is no answer. Where ``asked``, it is
+    `POSITIVE` if each joint's own matrix has a positive symmetric part: so has every one of them
+    where the whole tangent's is positive (Schur complements), and without constant moments only
+    there.
     """
     rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
-    _carry(seen.numbers, seen.fixed, tuple(changes), rates, signs)
+    _carry(seen.numbers, seen.fixed, tuple(changes), asked, rates, signs)
     lost = (signs == 0) | ~np.isfinite(rates).all(axis=(1, 2, 3))
     if lost.any():
         rates[lost], signs[lost] = 0.0, 0

@@ -35,6 +35,10 @@ Laws = Callable[[Indices], Bound]
 """What is at work on some of the lanes."""
 
 
+FEW = 40
+"""Lanes that are kept until half of them have arrived: to look again at their laws takes longer."""
+
+
 class Way(NamedTuple):
     """How Newton went on N lanes.
 
@@ -126,7 +130,7 @@ def stands(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     own eigenvalues tell.
     """
     seen = survey(chains, loads, q, tangents)
-    _, signs = eliminated(seen, Changes(np.empty((*q.shape, 0))))
+    _, signs = eliminated(seen, Changes(np.empty((*q.shape, 0))), asked=True)
     found: Flags = signs == POSITIVE
     for lane in np.flatnonzero(signs == 1):
         scale = 1.0 / np.sqrt(chains.damping[loads.chain[lane]].ravel())
@@ -150,7 +154,9 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
     for iteration in range(MOST_ITERATIONS):
         here = q[left]
         held = bound.held(here)
-        new, sign, missing = _step(chains, acting, here, held.load, held.tangent)
+        new, sign, missing = _step(
+            chains, acting, here, held.load, held.tangent, asked=iteration == 0
+        )
         if iteration == 0:
             first, signs = new.copy(), sign.copy()
         size = (np.abs(new) / STEP_TOLERANCE).max(axis=(1, 2))
@@ -176,7 +182,7 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
         if not going.any():
             break
         step, drive = new, np.where(driven > 0.0, driven, np.inf)
-        if 2 * np.count_nonzero(going) <= len(going):
+        if 2 * np.count_nonzero(going) <= len(going) or (len(going) > FEW and not going.all()):
             left, step, drive = left[going], step[going], drive[going]
             bound, acting, going = laws(left), part(loads, left), going[going]
     arrived &= np.abs(q[..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
@@ -184,10 +190,10 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
 
 
 def _step(
-    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array
+    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array, asked: bool = True
 ) -> tuple[Array, Indices, Array]:
     """Newton steps (N, J, 6) from q, signs (N,) of the tangents, and what is missing (N, J, 6)."""
     seen = survey(chains, loads, q, tangents)
     missing = held - seen.applied
-    rates, signs = eliminated(seen, Changes(-missing[..., None]))
+    rates, signs = eliminated(seen, Changes(-missing[..., None]), asked)
     return rates[..., 0], signs, missing

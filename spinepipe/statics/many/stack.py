@@ -154,17 +154,17 @@ class Stack:
         why : whether the engine of record is asked about runs without memory that have none here.
         """
         q = np.full((len(self.run), self.joints, 6), np.nan)
-        open_ones = ~self.alone
+        open_ones, at_once = ~self.alone, np.zeros(len(q), dtype=bool)
         if guess is not None:
             near = open_ones & ~np.isnan(guess[self.first[:-1], 0, 0])
             for runs in self.chunks(np.flatnonzero(near & ~self.remembers)):
                 open_ones[runs] = ~self._at_once(runs, guess, q)
             for runs in self.chunks(np.flatnonzero(near & self.remembers), stepwise=True):
-                open_ones[runs] = ~self._step_by_step(runs, guess, q)
+                open_ones[runs] = ~self._step_by_step(runs, guess, q, at_once)
         for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
-            open_ones[runs] = ~self._step_by_step(runs, None, q)
+            open_ones[runs] = ~self._step_by_step(runs, None, q, at_once)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
-        messages = self._past_critical(q) if why else {}
+        messages = self._past_critical(q, at_once) if why else {}
         by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
             self._by_engine(number, q, status, messages)
@@ -174,8 +174,11 @@ class Stack:
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
 
-    def _past_critical(self, q: Array) -> dict[int, str]:
-        """By lane with a pose q (L, J, 6) whose load would move the neutral pose away."""
+    def _past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
+        """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
+
+        Of those that one step brings there from the neutral pose this is certified not to be so.
+        """
         weight = np.abs(self.chains.gravity).sum(axis=1)[self.loads.chain]
         pressed = np.abs(self.loads.forces).sum(axis=(1, 2)) + weight > 0.0
         found: dict[int, str] = {}
@@ -183,7 +186,7 @@ class Stack:
         chains = self.chains._replace(gravity=less * self.chains.gravity)
         for runs in self.chunks(np.arange(len(self.remembers))):
             lanes = self.lanes(runs)
-            lanes = lanes[pressed[lanes] & ~np.isnan(q[lanes, 0, 0])]
+            lanes = lanes[pressed[lanes] & ~at_once[lanes] & ~np.isnan(q[lanes, 0, 0])]
             if not len(lanes):
                 continue
             loads = part(self.loads, lanes)
@@ -235,8 +238,11 @@ class Stack:
         q[lanes[there]] = found[there]
         return whole
 
-    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array) -> Flags:
-        """Enter the poses of runs whose steps follow each other; which runs are solved."""
+    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array, at_once: Flags) -> Flags:
+        """Enter the poses of runs whose steps follow each other; which runs are solved.
+
+        And which lanes (L,) a single step brings there from the neutral pose.
+        """
         good = np.ones(len(runs), dtype=bool)
         last = np.zeros((len(self.remembers), *q.shape[1:]))
         states = self.initial_states()
@@ -246,6 +252,7 @@ class Stack:
             origin = last[runs[live]]
             start = origin if guess is None else guess[lanes]
             found, arrived = self._settled(lanes, states, start, origin)
+            at_once[lanes] = arrived & (self.first[runs[live]] == lanes)
             lost = np.flatnonzero(~arrived)
             if len(lost):
                 found[lost], arrived[lost] = self._continued(lanes[lost], origin[lost], states)
