@@ -159,9 +159,10 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
         )
         if iteration == 0:
             first, signs = new.copy(), sign.copy()
-        size = (np.abs(new) / STEP_TOLERANCE).max(axis=(1, 2))
-        length = np.abs(new[..., 3:]).max(axis=(1, 2))
-        new *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))[:, None, None]
+        moved = np.abs(new)
+        size, length = (moved / STEP_TOLERANCE).max(axis=(1, 2)), moved[..., 3:].max(axis=(1, 2))
+        if length.max() > LONGEST_STEP:
+            new *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, LONGEST_STEP))[:, None, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             work = np.einsum("njk,njk->n", missing, step)
             over = going & ~(work <= OVERSHOT * drive)
@@ -173,11 +174,12 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
                 here[over] -= step[over]
                 new[over], driven[over] = step[over] * share[:, None, None], share * drive[over]
                 size[over] = np.inf
-        q[left[going]] = (here + new)[going]
+        ended = here + new
+        q[left[going]] = ended[going]
         there = going & (size < 1.0) & (sign > 0)
         arrived[left[there]] = True
         tangents[left[there]] = held.tangent[there]
-        turned = np.abs(q[left][..., 3:]).max(axis=(1, 2))
+        turned = np.abs(ended[..., 3:]).max(axis=(1, 2))
         going &= (sign > 0) & ~there & (turned < np.pi)
         if not going.any():
             break

@@ -177,8 +177,14 @@ class Stack:
     def _past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
         """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
 
-        Of those that one step brings there from the neutral pose this is certified not to be so.
+        It is certified not to be so where one step brings there from the neutral pose, and in later
+        steps under the same forces.
         """
+        bodies, points, forces = self.loads.bodies, self.loads.points, self.loads.forces
+        first = self.first[self.run]
+        at_once = at_once[first] & (bodies == bodies[first]).all(axis=1)
+        at_once &= (points == points[first]).all(axis=(1, 2))
+        at_once &= (forces == forces[first]).all(axis=(1, 2))
         weight = np.abs(self.chains.gravity).sum(axis=1)[self.loads.chain]
         pressed = np.abs(self.loads.forces).sum(axis=(1, 2)) + weight > 0.0
         found: dict[int, str] = {}
