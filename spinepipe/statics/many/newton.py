@@ -161,7 +161,7 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
             first, signs = new.copy(), sign.copy()
         moved = np.abs(new)
         size, length = (moved / STEP_TOLERANCE).max(axis=(1, 2)), moved[..., 3:].max(axis=(1, 2))
-        if length.max() > LONGEST_STEP:
+        if length.max(initial=0.0) > LONGEST_STEP:
             new *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, LONGEST_STEP))[:, None, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             work = np.einsum("njk,njk->n", missing, step)

@@ -255,6 +255,8 @@ class Stack:
         for live, lanes in self.steps(runs):
             going = good[live]
             live, lanes = live[going], lanes[going]
+            if not len(lanes):
+                break
             origin = last[runs[live]]
             start = origin if guess is None else guess[lanes]
             found, arrived = self._settled(lanes, states, start, origin)
