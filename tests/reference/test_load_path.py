@@ -26,6 +26,7 @@ from spinepipe.units import COORDINATES
 from spinepipe.world import Chain as LoadedChain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
+from tests.reference.peers import opensim_peer
 from tests.reference.peers.virtual_work import slowly
 
 Array = np.ndarray
@@ -436,7 +437,6 @@ def test_a_mirrored_specimen_under_mirrored_loads_stands_mirrored(draw) -> None:
 @pytest.mark.slow
 def test_ten_spines_past_their_critical_loads_lean_as_in_opensim() -> None:
     """Loads that come on over 40 s and stay; damping is heavy, so that little of it is left."""
-    opensim_peer = pytest.importorskip("tests.reference.peers.opensim_peer", reason="no OpenSim")
     done, seed = 0, 0
     while done < 10:
         seed += 1
